@@ -13,11 +13,11 @@
 #include <session/session.h>
 #include <session_gpu/as_seen.h>
 #include <session_gpu/level_control.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
 #include "frame_image.h"
 #include "make_scene.h"
-#include "scene_renderer.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -103,9 +103,9 @@ private:
     Result<void> prepare() {
         const session::Request request{.purpose = session::Purpose::picture};
         if (const auto prepared = session_->prepare(view_, request); !prepared) return prepared.error();
-        auto renderer = SceneRenderer::create(context_, *session_);
+        auto renderer = session::SceneRenderer::create(context_, *session_);
         if (!renderer) return renderer.error();
-        renderer_ = std::make_unique<SceneRenderer>(std::move(*renderer));
+        renderer_ = std::make_unique<session::SceneRenderer>(std::move(*renderer));
         std::vector<vdtree::Cut> whole;
         for (std::size_t i = 0; i < session_->scene().objects.size(); ++i)
             whole.emplace_back(session_->tree(i)).unfold_all();
@@ -126,7 +126,7 @@ private:
         render::DrawOptions drawing;
         drawing.samples = options_.samples;
         drawing.background = session_->background();
-        const auto frame = renderer_->draw(drawn_cuts(cuts), view_, drawing);
+        const auto frame = renderer_->draw(session::drawn_cuts(cuts), view_, drawing);
         if (!frame) return frame.error();
         return luminance_image(*frame, session_->observer().display);
     }
@@ -136,7 +136,7 @@ private:
     std::unique_ptr<session::Session> session_;
     vdtree::View view_;
     const ScenesBenchOptions& options_;
-    std::unique_ptr<SceneRenderer> renderer_;
+    std::unique_ptr<session::SceneRenderer> renderer_;
     std::unique_ptr<perception::Judge> judge_, second_;
 };
 

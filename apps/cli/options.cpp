@@ -347,6 +347,10 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
             "--path, and in the "
             "viewer, they may move (the keys: docs/getting-started.md, Lights)")
         ->type_name("FILE.json");
+    group.add_flag_function(
+        "--shadows,!--no-shadows", [&o](std::int64_t count) { o.shadows = count > 0; },
+        "All lights of --lights or of a scene but headlights cast shadows, or none does (default: those that say so: "
+        "\"shadow\" in --lights, extras.casts_shadow in glTF); at most 4");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
         ->type_name("METRES")

@@ -44,6 +44,7 @@ struct ViewOptions {
     std::optional<double> ambient;             // 0..1
     std::optional<double> fill_light;          // 0..1
     std::string lights;                        // a file of lights instead
+    std::optional<bool> shadows;               // all lights cast some, or none; default: as the lights themselves say
     std::optional<double> background_cdm2;
     double unit_metres = 1; // world units a mesh unit
     TextureOptions texture;

@@ -51,6 +51,12 @@ Result<session::Session> assemble(session::Scene scene, Surroundings around, con
     }
     scene.background = background_of(view);
     if (around.lights) scene.lights = std::move(around.lights);
+    if (view.shadows && scene.lights) {
+        if (const auto set = scene.lights->set_shadows(*view.shadows); !set) return set.error();
+    } else if (view.shadows.value_or(false)) {
+        return Error{ErrorCode::invalid_argument,
+                     "--shadows needs lights that may cast some: give --lights, or a scene that has lights."};
+    }
     return session::Session::create(std::move(scene), std::move(around.observer), terminal_messages());
 }
 

@@ -108,7 +108,7 @@ private:
         const bool has_window = options_.bars == MuseumBars::both || options_.bars == MuseumBars::window;
         if (has_gate) bars("gate", {0, 0, 1.6}, 3, 2.8, false);
         if (has_window) bars("window bars", {-4.15, 1.2, 0}, 2.4, 2.2, true);
-        draft_.add_sun({-0.85, 0.3, 0.25}, sun_lux);
+        draft_.add_sun({-0.85, 0.3, 0.05}, sun_lux, true); // so that its beam meets the statue
         draft_.add_lamp({1.5, 3.2, 2.5}, 1.2);
         draft_.set_light(0.75, 0.12);
         draft_.set_camera({0.4, 1.6, 4.2}, {0, 1.45, 0}, 36);
@@ -149,7 +149,7 @@ private:
         wall("right wall", {0.3, 4.5, 20}, {4.65, 0, -2});
         wall("back wall", {9, 4.5, 0.3}, {0, 0, -12.15});
         wall("ceiling", {9, 0.2, 20}, {0, 4.5, -2});
-        for (const double z : {5.0, -2.0, -9.0}) draft_.add_lamp({0, 4, z}, 3.2);
+        for (const double z : {5.0, -2.0, -9.0}) draft_.add_lamp({0, 4, z}, 3.2, z == 5.0);
         draft_.set_light(0.7, 0.12);
         draft_.set_camera({0, 1.7, 7.4}, {0, 1.1, 0}, 50);
         return {};
@@ -190,7 +190,7 @@ private:
                        {.at = {3.6 * i - 9 + chance_.next(-0.6, 0.6), 0, 6 + chance_.next(-1, 2)},
                         .turn_degrees = chance_.next(0, 360),
                         .scale = glm::dvec3(chance_.next(0.7, 1.0))});
-        draft_.add_sun({0.5, 0.7, 0.8}, sun_lux);
+        draft_.add_sun({0.5, 0.7, 0.8}, sun_lux, true);
         draft_.set_light(0.8, 0.18);
         draft_.set_camera({-2, 1.7, 17}, {0, 3.2, 0}, 45);
         return {};
@@ -231,7 +231,7 @@ private:
         }
         draft_.add(draft_.add_mesh("ground", ground(260, 130, 0.4, options_.seed), 0.3), "ground", {.at = {0, 0, -50}},
                    true);
-        draft_.add_sun({0.4, 0.8, 0.5}, sun_lux);
+        draft_.add_sun({0.4, 0.8, 0.5}, sun_lux, true);
         draft_.set_light(0.8, 0.2);
         draft_.set_camera({0, 1.7, 9}, {0, 1.8, -20}, 50);
         return {};

@@ -90,8 +90,12 @@ void SceneDraft::add(std::size_t mesh, std::string name, const Place& place, boo
     nodes_.push_back({mesh, std::move(name), place, is_background});
 }
 
-void SceneDraft::add_sun(glm::dvec3 towards, double lux) { lights_.push_back({true, towards, lux}); }
-void SceneDraft::add_lamp(glm::dvec3 at, double candela) { lights_.push_back({false, at, candela}); }
+void SceneDraft::add_sun(glm::dvec3 towards, double lux, bool casts_shadow) {
+    lights_.push_back({true, towards, lux, casts_shadow});
+}
+void SceneDraft::add_lamp(glm::dvec3 at, double candela, bool casts_shadow) {
+    lights_.push_back({false, at, candela, casts_shadow});
+}
 
 void SceneDraft::set_camera(glm::dvec3 eye, glm::dvec3 target, double fov_y_degrees) {
     eye_ = eye, target_ = target, fov_y_degrees_ = fov_y_degrees;
@@ -132,6 +136,7 @@ Result<void> SceneDraft::write(const std::filesystem::path& file) const {
         if (light.is_sun) node["rotation"] = to_json(looking(-light.place));
         else node["translation"] = to_json(light.place);
         lights.push_back({{"type", light.is_sun ? "directional" : "point"}, {"intensity", light.intensity}});
+        if (light.casts_shadow) lights.back()["extras"] = {{"casts_shadow", true}};
         nodes.push_back(std::move(node));
     }
     document["cameras"] = {

@@ -29,8 +29,8 @@ public:
     void add(std::size_t mesh, std::string name, const Place& place, bool is_background = false);
 
     // Lux, from this direction; or candelas.
-    void add_sun(glm::dvec3 towards, double lux);
-    void add_lamp(glm::dvec3 at, double candela);
+    void add_sun(glm::dvec3 towards, double lux, bool casts_shadow = false);
+    void add_lamp(glm::dvec3 at, double candela, bool casts_shadow = false);
     void set_camera(glm::dvec3 eye, glm::dvec3 target, double fov_y_degrees);
     void set_light(double exposure, double ambient); // see meshio::SceneContents
 
@@ -55,6 +55,7 @@ private:
         bool is_sun;
         glm::dvec3 place; // or the direction towards it
         double intensity;
+        bool casts_shadow;
     };
     std::vector<Mesh> meshes_;
     std::vector<Node> nodes_;

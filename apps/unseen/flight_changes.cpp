@@ -64,6 +64,8 @@ FlightChanges::FlightChanges(const session::Session& session, Renderers renderer
 
 Result<FlightChanges> FlightChanges::create(const session::Session& session, const render::Context& context,
                                             std::optional<double> glide_s) {
+    if (session.scene().lights && !session.scene().lights->casting().empty())
+        return Error{ErrorCode::unsupported, "--changes are judged without shadows: give --no-shadows."};
     auto full = render::Renderer::create(context, session.tree());
     if (!full) return full.error();
     auto cut = render::Renderer::create(context, session.tree());

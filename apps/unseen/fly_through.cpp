@@ -11,6 +11,7 @@
 #include <perception/image.h>
 #include <session/follower.h>
 #include <vdtree/internal/atomic_file.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "camera_path.h"
 #include "cut_report.h"
@@ -21,7 +22,6 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
-#include "scene_renderer.h"
 #include "session_options.h"
 #include "terminal.h"
 
@@ -47,13 +47,13 @@ struct FrameRecord {
 // The parts that draw, where anything is drawn.
 struct Drawing {
     std::unique_ptr<render::Context> context; // whose place does not change: the renderer refers to it
-    SceneRenderer renderer;
+    session::SceneRenderer renderer;
 };
 
 Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context) {
     if (!context) return std::optional<Drawing>();
     auto kept = std::make_unique<render::Context>(std::move(*context));
-    auto renderer = SceneRenderer::create(*kept, session);
+    auto renderer = session::SceneRenderer::create(*kept, session);
     if (!renderer) return renderer.error();
     return std::optional<Drawing>(Drawing{std::move(kept), std::move(*renderer)});
 }
@@ -309,7 +309,7 @@ private:
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
-            frame = drawing->renderer.draw(drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
+            frame = drawing->renderer.draw(session::drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
             record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());

@@ -4,6 +4,7 @@
 
 #include <perception/image.h>
 #include <render/renderer.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "cut_report.h"
 #include "fly_through.h"
@@ -13,7 +14,6 @@
 #include "numbered_pictures.h"
 #include "output_files.h"
 #include "report.h"
-#include "scene_renderer.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
@@ -48,6 +48,16 @@ struct RenderArguments {
 };
 
 bool is_for_people(const std::string& file) { return has_ending(file, ".png"); }
+
+Json shadows_json(const render::ShadowFacts& shadows, const session::Session& session) {
+    const auto& lights = *session.scene().lights;
+    return {{"casting_lights", lights.casting()},
+            {"of_lights", lights.light_count()},
+            {"maps", shadows.maps},
+            {"map_size", shadows.size},
+            {"bytes", shadows.bytes},
+            {"draw_ms", shadows.draw_ms}};
+}
 
 Result<int> run_flight(RenderArguments& a) {
     a.flight.pictures = a.out;
@@ -99,11 +109,11 @@ Result<int> run(RenderArguments& a) {
     const auto result = simplify_by(a.what, *session, view, request, &*context);
     if (!result) return result.error();
 
-    auto renderer = SceneRenderer::create(*context, *session);
+    auto renderer = session::SceneRenderer::create(*context, *session);
     if (!renderer) return renderer.error();
     render::DrawOptions options = a.draw;
     options.background = session->background();
-    const auto frame = renderer->draw(drawn_cuts(result->cuts), view, options);
+    const auto frame = renderer->draw(session::drawn_cuts(result->cuts), view, options);
     if (!frame) return frame.error();
 
     const perception::Display& display = session->observer().display;
@@ -115,6 +125,7 @@ Result<int> run(RenderArguments& a) {
     }
     Json json = to_json(*result, frame->draw_ms);
     add_scene(json, *session, result->cuts);
+    if (const auto shadows = renderer->shadows()) json["shadows"] = shadows_json(*shadows, *session);
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();

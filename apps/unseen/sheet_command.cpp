@@ -49,6 +49,8 @@ Result<int> run(const SheetArguments& a) {
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
+    if (session->scene().lights && !session->scene().lights->casting().empty())
+        return Error{ErrorCode::unsupported, "Sheets are drawn without shadows: give --no-shadows."};
     const auto sheet = draw(*session, *context, a);
     if (!sheet) return sheet.error();
     if (auto ok = report->prepare(sheet_json(sheet->cuts)); !ok) return ok.error();

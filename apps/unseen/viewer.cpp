@@ -15,9 +15,9 @@
 #include <glm/trigonometric.hpp>
 
 #include <perception/image.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "frame_image.h"
-#include "scene_renderer.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "viewer_overlay.h"
@@ -76,7 +76,7 @@ private:
 class Viewer {
 public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
-           SceneRenderer renderer)
+           session::SceneRenderer renderer)
         : session_(session), options_(options), context_(context), window_(context.glfw_window()),
           renderer_(std::move(renderer)), overlay_(context), follower_(session), view_(options.first_view),
           request_(options.what.request_for(session.triangle_count())), gaze_px_(options.what.gaze_px),
@@ -396,13 +396,13 @@ private:
     }
 
     const perception::Display& display() const { return session_.observer().display; }
-    std::vector<DrawnCut> cuts() const { return drawn_cuts(follower_, session_.scene().objects.size()); }
+    std::vector<session::DrawnCut> cuts() const { return session::drawn_cuts(follower_, session_.scene().objects.size()); }
 
     session::Session& session_;
     const ViewerOptions& options_;
     const render::Context& context_;
     GLFWwindow* window_;
-    SceneRenderer renderer_;
+    session::SceneRenderer renderer_;
     ViewerOverlay overlay_;
     session::Follower follower_;
     vdtree::View view_;
@@ -437,7 +437,7 @@ Result<void> run_viewer(render::Context& window, session::Session& session, sess
     session::Request request = options.what.request_for(session.triangle_count());
     request.purpose = session::Purpose::picture;
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
-    auto renderer = SceneRenderer::create(window, session);
+    auto renderer = session::SceneRenderer::create(window, session);
     if (!renderer) return renderer.error();
     glfwShowWindow(window.glfw_window());
     if (options.frames == 0) print_note("press h in the window to see its keys.");

@@ -192,6 +192,14 @@ Result<void> JsonObject::get(std::string_view key, std::string& value) const {
     return {};
 }
 
+Result<void> JsonObject::get(std::string_view key, bool& value) const {
+    const auto found = object_.find(key);
+    if (found == object_.end()) return {};
+    if (!found->is_boolean()) return key_error(key, "must be true or false, but is " + excerpt(*found));
+    value = found->get<bool>();
+    return {};
+}
+
 Result<void> JsonObject::get(std::string_view key, double& value, const Range& range) const {
     if (!has(key)) return {};
     const Result<double> number_ = number(key, range);

@@ -38,9 +38,10 @@ public:
         return *object_.find(key);
     } // precondition: has(key)
 
-    // The value of a key, or an error where it is of another type or outside of its range. The first two leave `value`
+    // The value of a key, or an error where it is of another type or outside of its range. The first three leave `value`
     // as it is where the key is missing.
     Result<void> get(std::string_view key, std::string& value) const;
+    Result<void> get(std::string_view key, bool& value) const;
     Result<void> get(std::string_view key, double& value, const Range& range) const;
     Result<double> number(std::string_view key, const Range& range) const;
     Result<const nlohmann::json*> array(std::string_view key) const;

@@ -30,6 +30,11 @@ constexpr double fastest_deg_per_s = 360000; // a thousand turns a second
 // Directions that are opposite but for so many radians have no shorter arc between them.
 constexpr double opposite = 1e-6;
 
+std::string too_many_cast(std::size_t casting) {
+    return std::to_string(casting) + " lights that cast shadows, but at most " +
+           std::to_string(vdtree::most_shadow_lights) + " can: give the weaker ones no \"shadow\"";
+}
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 Result<glm::dvec3> vector(const JsonObject& object, std::string_view key) {
@@ -86,13 +91,16 @@ struct LightRig::Reader {
             return object->key_error("lights", "has " + std::to_string((*lights)->size()) + " lights, but at most " +
                                                    std::to_string(vdtree::most_lights) + " can be drawn");
         bool any = rig.ambient_ > 0;
+        std::size_t casting = 0;
         for (const json& value : **lights) {
             if (auto ok = read_light(*object, value); !ok) return ok;
             const Light& light = rig.lights_.back(); // keyframes take the intensity's place
+            casting += light.at_rest.casts_shadow;
             any = any || (light.keys.empty() ? light.at_rest.intensity > 0
                                              : std::any_of(light.keys.begin(), light.keys.end(),
                                                            [](const Key& key) { return key.intensity > 0; }));
         }
+        if (casting > vdtree::most_shadow_lights) return object->key_error("lights", "has " + too_many_cast(casting));
         if (!any)
             return object->error(
                 "the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");
@@ -120,13 +128,14 @@ private:
                                   "must be an object with a key \"type\": directional, point, spot or headlight");
         type = value["type"].get<std::string>();
         if (type == "directional")
-            return file.child(value, place, {"type", "direction", "intensity", "orbit", "keyframes"});
+            return file.child(value, place, {"type", "direction", "intensity", "shadow", "orbit", "keyframes"});
         if (type == "point")
-            return file.child(value, place, {"type", "position", "intensity", "distance", "orbit", "keyframes"});
+            return file.child(value, place,
+                              {"type", "position", "intensity", "distance", "shadow", "orbit", "keyframes"});
         if (type == "spot")
             return file.child(value, place,
                               {"type", "position", "direction", "intensity", "distance", "inner_degrees",
-                               "outer_degrees", "orbit", "keyframes"});
+                               "outer_degrees", "shadow", "orbit", "keyframes"});
         if (type == "headlight") return file.child(value, place, {"type", "intensity"});
         return file.key_error(place + ".type",
                               "must be directional, point, spot or headlight, but is " + to_json(type));
@@ -158,6 +167,7 @@ private:
         }
         if (source.kind == Kind::spot)
             if (auto ok = read_angles(*object, source); !ok) return ok;
+        if (auto ok = object->get("shadow", source.casts_shadow); !ok) return ok;
         if (auto ok = read_motion(*object, light); !ok) return ok;
         rig.moves_ = rig.moves_ || light.degrees_per_second != 0 || light.keys.size() > 1;
         rig.follows_camera_ = rig.follows_camera_ || light.is_headlight;
@@ -270,6 +280,23 @@ Result<LightRig> LightRig::of(vdtree::Lighting lighting, std::filesystem::path f
     rig.shininess_ = lighting.shininess;
     for (const vdtree::LightSource& source : lighting.lights) rig.lights_.emplace_back().at_rest = source;
     return rig;
+}
+
+Result<void> LightRig::set_shadows(bool cast) {
+    const auto can = [](const Light& light) { return !light.is_headlight; };
+    const auto casting = static_cast<std::size_t>(std::count_if(lights_.begin(), lights_.end(), can));
+    if (cast && casting > vdtree::most_shadow_lights)
+        return Error{ErrorCode::invalid_argument,
+                     file_.string() + ": it has " + too_many_cast(casting) + ", and do not let all of them cast one."};
+    for (Light& light : lights_) light.at_rest.casts_shadow = cast && can(light);
+    return {};
+}
+
+std::vector<std::size_t> LightRig::casting() const {
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < lights_.size(); ++i)
+        if (lights_[i].at_rest.casts_shadow) numbers.push_back(i);
+    return numbers;
 }
 
 vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,

@@ -11,6 +11,10 @@ layout(location = 1) in vec3 corner_weights;
 
 layout(location = 0) out vec4 pixel; // linear RGB; relative luminance in a
 
+#ifdef MASK
+layout(location = 1) out vec4 mask; // how much of each light that casts shadows comes here; 1 of others
+#endif
+
 // The least and the largest shade of any vertex. Interpolation in triangles seen edge-on extrapolates, to anything and
 // even to NaN.
 layout(location = 1) uniform vec4 lowest_shade;
@@ -20,6 +24,94 @@ vec4 bounded(vec4 shade) {
     shade = mix(lowest_shade, shade, greaterThanEqual(shade, lowest_shade)); // false for NaN
     return mix(highest_shade, shade, lessThanEqual(shade, highest_shade));
 }
+
+#ifdef CASTING
+layout(location = 4) in vec3 surface_place; // in the unit frame
+#ifdef FLAT
+layout(location = 5) flat in vec4 surface_cast[CASTING];
+#else
+layout(location = 5) in vec4 surface_cast[CASTING];
+#endif
+#ifdef TEXTURED
+layout(location = 9) in vec4 surface_cast_highlights;
+#endif
+layout(location = 62) uniform vec4 whitest_shade; // what the sum is cut off at
+// A layer a directional light or spot, and six a point light: from the unit frame to where the layer's window is from -1
+// to 1, depth is 1 near the light and falls to 0, and w is above 0 before the light.
+layout(location = 64) uniform mat4 layer_from_unit[24];
+layout(location = 96) uniform vec4 shadow_lights[CASTING]; // position in the unit frame; the first layer
+// x: 1 for six layers; y: 1 where light comes from a place; z: by how much depth changes over the window's coordinate
+// where it changes by as much as the place, times the depth itself where light comes from a place.
+layout(location = 100) uniform vec4 shadow_kinds[CASTING];
+layout(location = 104) uniform mat4 world_from_unit;       // rotation alone
+layout(binding = 2) uniform sampler2DArray shadow_maps;    // depth; 0 outside
+
+// What is nearer to the light than the triangle's plane by less than this hides nothing, in texels, on slopes times the
+// slope: that much rounding, the grid that rasterisers put corners on, and surfaces that curve up beside the triangle come
+// to. From there on it takes another `fading_texels` until it hides all, so that where it is by a little does not matter.
+const float bias_texels = 0.5;
+const float fading_texels = 0.5;
+// Steeper slopes, as depth over width, are of triangles that the light grazes, which it hardly lights.
+const float steepest = 64.0;
+
+// The layer of six that looks this way: -x, +x, -y, ...
+int side_of(vec3 direction) {
+    vec3 size = abs(direction);
+    int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    return 2 * axis + (direction[axis] > 0.0 ? 1 : 0);
+}
+
+// How much of a light comes here. Sixteen texels are compared with the depth that the triangle's own plane has at each
+// of them, so that no plane ever hides itself, and no shadow has to be moved for that. Weighted with the mean of nine
+// interpolated looks a texel apart.
+float visibility_of(int light, vec3 across, vec3 along) {
+    int layer = int(shadow_lights[light].w);
+    if (shadow_kinds[light].x > 0.5)
+        layer += side_of(mat3(world_from_unit) * (surface_place - shadow_lights[light].xyz));
+    mat4 m = layer_from_unit[layer];
+    vec4 at = m * vec4(surface_place, 1.0);
+    if (!(at.w > 0.0))
+        return 1.0;
+    vec3 here = at.xyz / at.w;
+
+    // Depth is a linear function of the window's coordinates on a plane: its gradient from two directions on it.
+    vec4 m_across = m * vec4(across, 0.0), m_along = m * vec4(along, 0.0);
+    vec3 a = (m_across.xyz - here * m_across.w) / at.w, b = (m_along.xyz - here * m_along.w) / at.w;
+    float determinant = a.x * b.y - a.y * b.x;
+    vec2 gradient = vec2(a.z * b.y - b.z * a.y, b.z * a.x - a.z * b.x) / determinant;
+    float size = float(textureSize(shadow_maps, 0).x);
+    float texel = 2.0 / size;
+    float upright = shadow_kinds[light].z * (shadow_kinds[light].y > 0.5 ? here.z : 1.0); // the gradient of slope 1
+    float slope = length(gradient);
+    if (!(slope <= steepest * upright))
+        gradient = slope > 0.0 && slope < 1e30 ? gradient * (steepest * upright / slope) : vec2(0.0);
+    float unit = texel * (upright + length(gradient));
+
+    vec2 place = (here.xy * 0.5 + 0.5) * size - 0.5;
+    vec2 first = floor(place), part = place - first;
+    vec4 weights_x = vec4(1.0 - part.x, 1.0, 1.0, part.x) / 3.0, weights_y = vec4(1.0 - part.y, 1.0, 1.0, part.y) / 3.0;
+    float seen = 0.0;
+    for (int j = 0; j < 4; j += 2)
+        for (int i = 0; i < 4; i += 2) {
+            // Texels first - 1 + i and the next one: in the order (i, j + 1), (i + 1, j + 1), (i + 1, j), (i, j).
+            vec4 depths = textureGather(shadow_maps, vec3((first + vec2(i, j)) / size, float(layer)));
+            vec2 off = vec2(i, j) - 1.0 - part;
+            vec4 own = here.z + texel * (gradient.x * (off.x + vec4(0, 1, 1, 0)) + gradient.y * (off.y + vec4(1, 1, 0, 0)));
+            vec4 open = clamp(1.0 + ((own - depths) / unit + bias_texels) / fading_texels, 0.0, 1.0);
+            seen += dot(open, vec4(weights_x[i] * weights_y[j + 1], weights_x[i + 1] * weights_y[j + 1],
+                                   weights_x[i + 1] * weights_y[j], weights_x[i] * weights_y[j]));
+        }
+    return seen >= 0.0 ? min(seen, 1.0) : 1.0;
+}
+
+vec4 visibilities() {
+    vec4 visible = vec4(1);
+    vec3 across = dFdx(surface_place), along = dFdy(surface_place);
+    for (int i = 0; i < CASTING; ++i)
+        visible[i] = visibility_of(i, across, along);
+    return visible;
+}
+#endif
 
 #ifdef TEXTURED
 layout(location = 2) in vec2 surface_uv;
@@ -33,12 +125,12 @@ layout(location = 61) uniform vec4 uv_bounds; // the least of any vertex, and th
 
 const vec3 rec709 = vec3(0.2126, 0.7152, 0.0722);
 
-vec4 textured(vec4 shade) {
+vec4 textured(vec4 shade, float highlight) {
     vec2 uv = mix(uv_bounds.xy, surface_uv, greaterThanEqual(surface_uv, uv_bounds.xy));
     uv = mix(uv_bounds.zw, uv, lessThanEqual(uv, uv_bounds.zw));
     vec3 rgb = shade.rgb * texture(surface_image, uv, lod_bias).rgb;
 #ifdef LIT
-    rgb += vec3(surface_highlight >= 0.0 ? surface_highlight : 0.0); // neither less nor NaN, as for shades
+    rgb += vec3(highlight >= 0.0 ? highlight : 0.0); // neither less nor NaN, as for shades
     rgb /= max(dot(rgb, rec709), 1.0);
 #endif
     return vec4(rgb, dot(rgb, rec709));
@@ -85,8 +177,30 @@ vec3 srgb_encoded(vec3 linear) {
 
 void main() {
     vec4 result = bounded(surface_shade);
+    float highlight = 0.0;
+#if defined(TEXTURED) && defined(LIT)
+    highlight = surface_highlight;
+#endif
+#ifdef MASK
+    mask = vec4(1);
+#endif
+#ifdef CASTING
+    vec4 visible = visibilities();
+    for (int i = 0; i < CASTING; ++i)
+        result += visible[i] * bounded(surface_cast[i]);
 #ifdef TEXTURED
-    result = textured(result);
+    vec4 cast_highlights = max(surface_cast_highlights, 0.0);
+    for (int i = 0; i < CASTING; ++i)
+        highlight += visible[i] * cast_highlights[i];
+#else
+    result = min(result / max(result.a, 1.0), whitest_shade);
+#endif
+#ifdef MASK
+    mask = visible;
+#endif
+#endif
+#ifdef TEXTURED
+    result = textured(result, highlight);
 #endif
 #ifdef WIREFRAME
     result = mix(result, line_shade(result), line_coverage());

@@ -20,6 +20,21 @@ layout(location = 3) out float surface_highlight;
 #endif
 #endif
 
+#ifdef CASTING
+layout(location = 4) in vec3 place[];
+layout(location = 4) out vec3 surface_place;
+layout(location = 5) in vec4 cast_shade[][CASTING];
+#ifdef FLAT
+layout(location = 5) flat out vec4 surface_cast[CASTING];
+#else
+layout(location = 5) out vec4 surface_cast[CASTING];
+#endif
+#ifdef TEXTURED
+layout(location = 9) in vec4 cast_highlights[];
+layout(location = 9) out vec4 surface_cast_highlights;
+#endif
+#endif
+
 invariant gl_Position;
 
 void main() {
@@ -38,6 +53,22 @@ void main() {
         surface_highlight = (highlight[0] + highlight[1] + highlight[2]) / 3.0;
 #else
         surface_highlight = highlight[corner];
+#endif
+#endif
+#endif
+#ifdef CASTING
+        surface_place = place[corner];
+        for (int i = 0; i < CASTING; ++i)
+#ifdef FLAT
+            surface_cast[i] = (cast_shade[0][i] + cast_shade[1][i] + cast_shade[2][i]) / 3.0;
+#else
+            surface_cast[i] = cast_shade[corner][i];
+#endif
+#ifdef TEXTURED
+#ifdef FLAT
+        surface_cast_highlights = (cast_highlights[0] + cast_highlights[1] + cast_highlights[2]) / 3.0;
+#else
+        surface_cast_highlights = cast_highlights[corner];
 #endif
 #endif
 #endif

@@ -23,6 +23,18 @@ struct Texture2dTraits {
     static void destroy(GLuint id) { glDeleteTextures(1, &id); }
 };
 
+struct Texture2dArrayTraits {
+    static constexpr GLenum kind = GL_TEXTURE;
+    static void create(GLuint* id) { glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, id); }
+    static void destroy(GLuint id) { glDeleteTextures(1, &id); }
+};
+
+struct TimestampTraits {
+    static constexpr GLenum kind = GL_QUERY;
+    static void create(GLuint* id) { glCreateQueries(GL_TIMESTAMP, 1, id); }
+    static void destroy(GLuint id) { glDeleteQueries(1, &id); }
+};
+
 struct RenderbufferTraits {
     static constexpr GLenum kind = GL_RENDERBUFFER;
     static void create(GLuint* id) { glCreateRenderbuffers(1, id); }
@@ -63,6 +75,8 @@ GlObject<Traits>::~GlObject() {
 template class GlObject<BufferTraits>;
 template class GlObject<VertexArrayTraits>;
 template class GlObject<Texture2dTraits>;
+template class GlObject<Texture2dArrayTraits>;
+template class GlObject<TimestampTraits>;
 template class GlObject<RenderbufferTraits>;
 template class GlObject<FramebufferTraits>;
 template class GlObject<ProgramTraits>;

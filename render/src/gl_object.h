@@ -13,6 +13,8 @@ namespace unseen::render {
 struct BufferTraits;
 struct VertexArrayTraits;
 struct Texture2dTraits;
+struct Texture2dArrayTraits;
+struct TimestampTraits;
 struct RenderbufferTraits;
 struct FramebufferTraits;
 struct ProgramTraits;
@@ -50,6 +52,8 @@ private:
 using Buffer = GlObject<BufferTraits>;
 using VertexArray = GlObject<VertexArrayTraits>;
 using Texture2d = GlObject<Texture2dTraits>;
+using Texture2dArray = GlObject<Texture2dArrayTraits>;
+using Timestamp = GlObject<TimestampTraits>; // a query of when the GPU comes to it
 using Renderbuffer = GlObject<RenderbufferTraits>;
 using FramebufferObject = GlObject<FramebufferTraits>;
 using ProgramObject = GlObject<ProgramTraits>;
@@ -58,6 +62,8 @@ using Sampler = GlObject<SamplerTraits>;
 extern template class GlObject<BufferTraits>;
 extern template class GlObject<VertexArrayTraits>;
 extern template class GlObject<Texture2dTraits>;
+extern template class GlObject<Texture2dArrayTraits>;
+extern template class GlObject<TimestampTraits>;
 extern template class GlObject<RenderbufferTraits>;
 extern template class GlObject<FramebufferTraits>;
 extern template class GlObject<ProgramTraits>;

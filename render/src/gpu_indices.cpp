@@ -49,6 +49,7 @@ Result<void> GpuIndices::prepare_patching() {
 Result<void> GpuIndices::update(const IndexState& state) {
     uploaded_bytes_ = 0;
     if (state.version != 0 && state.version == version_) return {};
+    ++changes_;
     const bool follows = can_follow(state);
     version_ = 0; // until it is done
     if (follows)

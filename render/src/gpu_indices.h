@@ -39,6 +39,7 @@ public:
     unsigned buffer() const noexcept { return buffer_.id(); } // another one after it has grown; 0 at first
     std::uint64_t count() const noexcept { return count_; }
     std::uint64_t uploaded_bytes() const noexcept { return uploaded_bytes_; } // by the last update
+    std::uint64_t changes() const noexcept { return changes_; }               // how often an update found other indices
 
 private:
     struct DeleteSync {
@@ -63,6 +64,7 @@ private:
     std::uint64_t capacity_ = 0, count_ = 0; // indices
     std::uint64_t version_ = 0;
     std::uint64_t uploaded_bytes_ = 0;
+    std::uint64_t changes_ = 0;
 
     const Program* patch_ = nullptr; // null: nothing was patched yet
     Buffer staging_;

@@ -49,7 +49,10 @@ private:
 
 std::string prologue(std::span<const std::string_view> defines) {
     std::string text = "#version 450 core\n";
-    for (std::string_view define : defines) text.append("#define ").append(define).append(" 1\n");
+    for (std::string_view define : defines) {
+        const bool has_value = define.find(' ') != define.npos;
+        text.append("#define ").append(define).append(has_value ? "\n" : " 1\n");
+    }
     return text + "#line 1\n";
 }
 
@@ -124,6 +127,11 @@ void Program::set(int location, std::span<const glm::vec4> values) const {
 
 void Program::set(int location, const glm::mat4& value) const {
     glProgramUniformMatrix4fv(id(), location, 1, GL_FALSE, glm::value_ptr(value));
+}
+
+void Program::set(int location, std::span<const glm::mat4> values) const {
+    glProgramUniformMatrix4fv(id(), location, static_cast<GLsizei>(values.size()), GL_FALSE,
+                              glm::value_ptr(values.front()));
 }
 
 } // namespace unseen::render

@@ -24,7 +24,7 @@ struct ShaderSource {
 // Move-only; needs a current context. Uniforms are set by their explicit layout(location = N).
 class Program {
 public:
-    // Compiles each source with the `defines` (such as "FLAT") before it, and links. The error is the compiler's log,
+    // Compiles each source with the `defines` (such as "FLAT", or "CASTING 2") before it, and links. The error is the compiler's log,
     // which counts lines as the sources do.
     static Result<Program> build(std::string_view label, std::span<const ShaderSource> sources,
                                  std::span<const std::string_view> defines = {});
@@ -40,6 +40,7 @@ public:
     void set(int location, std::span<const float> values) const;     // an array's first elements; not empty
     void set(int location, std::span<const glm::vec4> values) const; // an array's first elements; not empty
     void set(int location, const glm::mat4& value) const;
+    void set(int location, std::span<const glm::mat4> values) const; // likewise
 
 private:
     explicit Program(ProgramObject object) : object_(std::move(object)) {}

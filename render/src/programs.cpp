@@ -1,7 +1,10 @@
 #include "programs.h"
 
+#include <iterator>
 #include <string>
 #include <vector>
+
+#include <vdtree/lighting.h>
 
 #include "shaders.h"
 
@@ -25,6 +28,10 @@ Result<Program> build_surface(const ProgramKey& key) {
     if (key.textured) defines.push_back("TEXTURED");
     if (key.output != Output::linear) defines.push_back("DISPLAY");
     if (key.output == Output::encoded) defines.push_back("ENCODE_SRGB");
+    constexpr std::string_view casting[] = {"CASTING 1", "CASTING 2", "CASTING 3", "CASTING 4"};
+    static_assert(std::size(casting) == vdtree::most_shadow_lights);
+    if (key.casting > 0) defines.push_back(casting[key.casting - 1]);
+    if (key.mask) defines.push_back("MASK");
     return Program::build("surface", sources, defines);
 }
 

@@ -23,6 +23,8 @@ struct ProgramKey {
     Output output = Output::linear;
     bool compares = false; // drops pixels that look like a picture: compare.frag
     bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
+    int casting = 0;   // lights that cast shadows, and are drawn with them
+    bool mask = false; // writes the shadows' mask as well
     auto operator<=>(const ProgramKey&) const = default;
 };
 
@@ -30,6 +32,7 @@ struct ProgramKey {
 class Programs {
 public:
     Result<const Program*> surface(ProgramKey key);
+    std::size_t surface_count() const noexcept { return surfaces_.size(); }
 
     // The one program of this label, a literal.
     Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources,

@@ -6,6 +6,7 @@
 #include "gl.h"
 #include "sample_count.h"
 #include "shaders.h"
+#include "shadows_impl.h"
 #include "surface_pass.h"
 
 namespace unseen::render {
@@ -107,12 +108,21 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
     if (auto valid = check(sampling); !valid) return valid;
     return in_context(impl_->context(), "Drawing", [&]() -> Result<void> {
         const Target::Impl& sample = impl_->sample.impl();
-        const auto pass = SurfacePass::prepare(items, {.view = view}, sample, 0);
+        const auto pass = SurfacePass::prepare(items, {.view = view, .shadows = sampling.shadows}, sample, 0);
         if (!pass) return pass.error();
         const std::vector<glm::dvec2> points = n_rooks(sampling.samples, sampling.seed);
         const PixelBox used = pass->pixels_of(points); // elsewhere the sum stays 0: the background
         impl_->begin(sampling.background);
-        for (const glm::dvec2 point : points) {
+        // Another pattern than that of the points, in another order, so that the two do not go together.
+        const std::vector<glm::dvec2> texels = n_rooks(sampling.samples, sampling.seed + 1),
+                                      order = n_rooks(sampling.samples, sampling.seed + 2);
+        const auto turn = [&](std::size_t i) {
+            return static_cast<std::size_t>(order[i].y * static_cast<double>(order.size()));
+        };
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const glm::dvec2 point = points[i];
+            if (sampling.shadows && points.size() > 1)
+                if (auto shifted = sampling.shadows->impl().shift_texels(texels[turn(i)]); !shifted) return shifted;
             pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
             impl_->add(&used);
         }

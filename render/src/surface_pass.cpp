@@ -26,6 +26,11 @@ enum UniformLocation {
     lights_location = 6,
     lod_bias_location = 60,
     uv_bounds_location = 61,
+    whitest_shade_location = 62,
+    layers_location = 64,
+    shadow_lights_location = 96,
+    shadow_kinds_location = 100,
+    world_from_unit_location = 104,
     compared_location = 70,
     stipple_location = 71,
 };
@@ -70,11 +75,14 @@ LightUniforms uniforms_of(const vdtree::Lighting& lighting, glm::dvec3 eye, cons
     uniforms.material = glm::dvec4(lighting.ambient, lighting.specular * (lighting.shininess + 8) / 8,
                                    lighting.shininess, static_cast<double>(lighting.lights.size()));
     uniforms.eye = glm::dvec4(in_frame(eye), 0);
+    int casting = 0;
     for (const vdtree::LightSource& light : lighting.lights) {
         const double distance = light.kind == Kind::directional ? 1 : light.distance / frame.unit;
         uniforms.lights.push_back(glm::dvec4(light.direction, light.intensity * distance * distance));
         uniforms.lights.push_back(glm::dvec4(in_frame(light.position), static_cast<int>(light.kind)));
-        uniforms.lights.push_back(glm::dvec4(light.outer_cosine, light.inner_cosine, 0, 0));
+        casting += light.casts_shadow;
+        uniforms.lights.push_back(
+            glm::dvec4(light.outer_cosine, light.inner_cosine, light.casts_shadow ? casting : 0, 0));
     }
     return uniforms;
 }
@@ -87,12 +95,14 @@ glm::vec4 shown(glm::vec4 colour, Output output) {
     return {glm::vec3(colour), 1};
 }
 
-void clear_target(const Target::Impl& target, const Clear& clear, int attachment) {
+void clear_target(const Target::Impl& target, const Clear& clear, int attachment, bool has_mask) {
     const Output output = target.output(attachment);
     if (clear.colour && output != Output::depth) {
         const glm::vec4 colour = shown(*clear.colour, output);
         glClearNamedFramebufferfv(target.id, GL_COLOR, 0, &colour.x);
     }
+    const glm::vec4 unhidden(1);
+    if (clear.colour && has_mask) glClearNamedFramebufferfv(target.id, GL_COLOR, 1, &unhidden.x);
     const GLfloat infinitely_far = 0;
     if (clear.depth && target.has_depth) glClearNamedFramebufferfv(target.id, GL_DEPTH, 0, &infinitely_far);
 }
@@ -151,22 +161,34 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
                                 std::to_string(*camera.near_plane) + ".");
     if (!target.outputs.empty())
         if (auto valid = target.check_attachment(attachment); !valid) return valid.error();
+    if (camera.shadow_mask) {
+        if (auto valid = target.check_attachment(*camera.shadow_mask); !valid) return valid.error();
+        if (*camera.shadow_mask == attachment || target.output(*camera.shadow_mask) != Output::linear ||
+            target.is_foreign)
+            return invalid_argument("The mask of shadows needs an attachment of its own, of shares or in floats, of a "
+                                    "target that is the library's own.");
+    }
     for (const Item& item : items)
         if (auto valid = check(item, target.context); !valid) return valid.error();
+    if (camera.shadows)
+        for (const Item& item : items)
+            if (auto valid = camera.shadows->impl().check(item); !valid) return valid.error();
     auto projections = projections_of(items, view, camera.near_plane);
     if (!projections) return projections.error();
 
     const bool compares = use == Use::comparison;
     const Output output = compares ? Output::linear : target.output(attachment);
-    SurfacePass pass(view, attachment, output);
+    SurfacePass pass(camera, attachment, output);
     pass.use_ = use;
     for (std::size_t i = 0; i < items.size(); ++i) {
         const Item& item = items[i];
         GpuTree::Impl& tree = item.cut.tree().impl();
         const bool is_stippled = !compares && item.stipple != glm::vec2(0, 1);
+        const int casting =
+            camera.shadows && item.lighting ? static_cast<int>(vdtree::shadow_lights(*item.lighting)) : 0;
         const auto program = target.context.impl().programs.surface(
             {item.lighting.has_value(), tree.texture.has_value(), item.shading == Shading::flat, item.wireframe, output,
-             compares, is_stippled});
+             compares, is_stippled, casting, camera.shadow_mask.has_value()});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
         PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};
@@ -176,6 +198,7 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
             prepared.is_lit = true;
             prepared.lights =
                 uniforms_of(*item.lighting, vdtree::eye_in_tree(tree.tree, view, item.placement), tree.frame);
+            if (casting > 0) prepared.shadows = camera.shadows->impl().uniforms_of(item);
         }
         pass.items_.push_back(std::move(prepared));
     }
@@ -217,8 +240,8 @@ void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear
         glEnable(GL_SCISSOR_TEST);
     }
     if (output_ == Output::display) glEnable(GL_FRAMEBUFFER_SRGB);
-    target.bind(attachment_);
-    clear_target(target, clear, attachment_);
+    target.bind(attachment_, mask_);
+    clear_target(target, clear, attachment_, mask_.has_value());
     const float lod_bias = -0.5f * std::log2(static_cast<float>(sample_count));
     for (const PreparedItem& item : items_) draw_item(item, point, lod_bias);
 }
@@ -268,13 +291,28 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
     const Program& program = *item.program;
     program.set(lowest_shade_location, item.is_lit ? glm::vec4(0) : tree.lowest_shade);
     // A texture that is lit is cut off at white behind it.
-    const glm::vec4 highest_lit = tree.texture ? glm::vec4(brightest_light) : tree.highest_hue;
+    const bool is_shadowed = !item.shadows.layers.empty();
+    const glm::vec4 highest_lit = tree.texture || is_shadowed ? glm::vec4(brightest_light) : tree.highest_hue;
     program.set(highest_shade_location, item.is_lit ? highest_lit : tree.highest_shade);
     if (item.stipple) glProgramUniform2f(program.id(), stipple_location, item.stipple->x, item.stipple->y);
     if (item.is_lit) {
         program.set(material_location, item.lights.material);
         program.set(eye_location, item.lights.eye);
         if (!item.lights.lights.empty()) program.set(lights_location, item.lights.lights);
+    }
+    if (is_shadowed) {
+        if (!tree.texture) program.set(whitest_shade_location, tree.highest_hue);
+        std::vector<glm::mat4> layers = item.shadows.layers;
+        for (glm::mat4& layer : layers)
+            for (int column = 0; column < 4; ++column) {
+                layer[column].x += static_cast<float>(shadows_->shift.x) * layer[column].w;
+                layer[column].y += static_cast<float>(shadows_->shift.y) * layer[column].w;
+            }
+        program.set(layers_location, layers);
+        program.set(shadow_lights_location, item.shadows.lights);
+        program.set(shadow_kinds_location, item.shadows.kinds);
+        program.set(world_from_unit_location, item.shadows.world_from_unit);
+        shadows_->bind();
     }
     if (tree.texture) {
         program.set(lod_bias_location, lod_bias);

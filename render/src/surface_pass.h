@@ -14,6 +14,7 @@
 #include "camera.h"
 #include "gpu_tree_impl.h"
 #include "program.h"
+#include "shadows_impl.h"
 #include "target_impl.h"
 
 namespace unseen::render {
@@ -67,18 +68,22 @@ private:
         bool is_lit = false;
         LightUniforms lights = {};
         std::optional<glm::vec2> stipple = {}; // none: all pixels
+        ShadowUniforms shadows = {}; // of layers, where its lights cast some
     };
 
-    SurfacePass(const vdtree::View& view, int attachment, Output output)
-        : view_(view), attachment_(attachment), output_(output) {}
+    SurfacePass(const Camera& camera, int attachment, Output output)
+        : view_(camera.view), attachment_(attachment), mask_(camera.shadow_mask), output_(output),
+          shadows_(camera.shadows ? &camera.shadows->impl() : nullptr) {}
     static Cull cull_for(vdtree::Closedness closedness, bool eye_inside);
     void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const;
     void set_colours(const PreparedItem& item, float lod_bias) const;
 
     vdtree::View view_;
     int attachment_;
+    std::optional<int> mask_; // the attachment of shadows' masks
     Output output_;
     Use use_ = Use::drawing;
+    const Shadows::Impl* shadows_; // null: none are drawn
     std::vector<PreparedItem> items_;
 };
 

@@ -44,6 +44,7 @@ GLenum gl_format(ColourFormat format) {
     case ColourFormat::rgba32f: return GL_RGBA32F;
     case ColourFormat::rgba16f: return GL_RGBA16F;
     case ColourFormat::srgb8: return GL_SRGB8_ALPHA8;
+    case ColourFormat::shares8: return GL_RGBA8;
     }
     return GL_NONE;
 }
@@ -141,9 +142,14 @@ Result<void> Target::Impl::adopt(const ForeignFramebuffer& foreign) {
     return {};
 }
 
-void Target::Impl::bind(int attachment) const {
-    if (!is_foreign && outputs.size() > 1)
+void Target::Impl::bind(int attachment, std::optional<int> mask) const {
+    if (mask) {
+        const GLenum both[] = {colour_attachment(static_cast<std::size_t>(attachment)),
+                               colour_attachment(static_cast<std::size_t>(*mask))};
+        glNamedFramebufferDrawBuffers(id, 2, both);
+    } else if (!is_foreign && outputs.size() > 1) {
         glNamedFramebufferDrawBuffer(id, colour_attachment(static_cast<std::size_t>(attachment)));
+    }
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, id);
 }
 

@@ -1,6 +1,7 @@
 // What a target holds.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,8 +21,8 @@ struct Target::Impl {
     Result<void> make(const TargetOptions& options);
     Result<void> adopt(const ForeignFramebuffer& foreign);
 
-    // Binds it to draw to one of its attachments, and to no other.
-    void bind(int attachment) const;
+    // Binds it to draw to one of its attachments, and to no other; with a `mask` to that one as the second.
+    void bind(int attachment, std::optional<int> mask = {}) const;
     Result<void> check_attachment(int attachment) const;
     Result<void> check_readable() const;
     Result<void> read_colour(int attachment, std::span<glm::vec4> pixels) const; // as many as it has

@@ -14,11 +14,11 @@
 #include <perception/judge_tables.h>
 #include <perception/masking.h>
 #include <session_gpu/gpu_judge.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "built.h"
 #include "gl_test.h"
 #include "measured.h"
-#include "scene_renderer.h"
 #include "shapes.h"
 
 namespace unseen::session {
@@ -335,11 +335,11 @@ protected:
         return window;
     }
     Image picture(const Session& session, const vdtree::Cut& cut) {
-        auto renderer = app::SceneRenderer::create(context(), session);
+        auto renderer = session::SceneRenderer::create(context(), session);
         render::DrawOptions options;
         options.samples = 16;
         options.background = session.background();
-        const app::DrawnCut drawn[] = {{&cut}};
+        const session::DrawnCut drawn[] = {{&cut}};
         const auto frame = renderer->draw(drawn, view(), options);
         EXPECT_TRUE(frame) << frame.error().message;
         Image image{frame->width, frame->height, 1, frame->luminance};

@@ -572,6 +572,39 @@ TEST_F(RenderCommandTest, FollowsLightsThatMove) {
     EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lit.ply", "--lights", "lights.json"}).status, 0);
 }
 
+TEST_F(RenderCommandTest, LightsCastShadowsWhereTheyAreToldTo) {
+    write_text(path("lights.json"),
+               R"({"ambient": 0.1, "lights": [
+                   {"type": "directional", "direction": [1, 1, 1], "intensity": 0.5, "shadow": true},
+                   {"type": "directional", "direction": [1, -1, 1], "intensity": 0.3}]})");
+    const auto effect = [](const Json& report) {
+        for (const Json& e : report["effects"])
+            if (e["name"] == "shadows") return e;
+        return Json();
+    };
+    const Json own = render({"--lights", "lights.json"}, "own.png");
+    EXPECT_EQ(own["shadows"]["casting_lights"], Json({0}));
+    EXPECT_EQ(own["shadows"]["of_lights"], 2);
+    EXPECT_EQ(own["shadows"]["map_size"], 2048);
+    EXPECT_EQ(own["shadows"]["bytes"], 4 * 2048 * 2048);
+    EXPECT_GE(own["shadows"]["draw_ms"].get<double>(), 0);
+    EXPECT_EQ(effect(own)["on"], true);
+    EXPECT_THAT(effect(own)["why"].get<std::string>(), HasSubstr("1 of 2 lights casts; folds are tested"));
+    const Json all = render({"--lights", "lights.json", "--shadows"}, "all.png");
+    EXPECT_EQ(all["shadows"]["casting_lights"], Json({0, 1}));
+    const Json none = render({"--lights", "lights.json", "--no-shadows"}, "none.png");
+    EXPECT_FALSE(none.contains("shadows"));
+    EXPECT_EQ(effect(none)["on"], false);
+    EXPECT_THAT(effect(none)["why"].get<std::string>(), HasSubstr("no light casts a shadow"));
+    const Outcome without = run({"render", "ball.vdt", "-o", "o.png", "--shadows"});
+    EXPECT_EQ(without.status, 1);
+    EXPECT_THAT(without.err, HasSubstr("--shadows needs lights"));
+    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lit.ply", "--lights", "lights.json", "--shadows"}).status, 0);
+    const Outcome sheet = run({"sheet", "ball.vdt", "-o", "sheet.png", "--lights", "lights.json"});
+    EXPECT_EQ(sheet.status, 1);
+    EXPECT_THAT(sheet.err, HasSubstr("--no-shadows"));
+}
+
 TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
     const auto complaint = [&](const std::string& text) {
         write_text(path("bad.json"), text);

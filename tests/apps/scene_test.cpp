@@ -209,7 +209,8 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
         {"extensions": {"KHR_lights_punctual": {"light": 1}}, "translation": [0, 5, 0]}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1}}],
         "extensions": {"KHR_lights_punctual": {"lights": [
-            {"type": "directional", "intensity": 1000}, {"type": "point", "intensity": 10}]}}})")
+            {"type": "directional", "intensity": 1000, "extras": {"casts_shadow": true}},
+            {"type": "point", "intensity": 10}]}}})")
                           .add(body())
                           .glb());
     ASSERT_TRUE(scene) << scene.error().message;
@@ -218,6 +219,7 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
     EXPECT_EQ(&scene->backdrop[0].tree.data(), &scene->objects[0].tree.data());
     ASSERT_TRUE(scene->lights);
     EXPECT_EQ(scene->lights->description(), "1 directional, 1 point, ambient 0.15");
+    EXPECT_EQ(scene->lights->casting(), std::vector<std::size_t>{0});
     auto lighting = scene->lights->at(0, scene->objects[0].tree, {}, {});
     ASSERT_EQ(lighting.lights.size(), 2u);
     EXPECT_NEAR(lighting.lights[0].intensity, 0.85, 0.01) << "white that faces the light is as bright as can be";

@@ -131,5 +131,36 @@ TEST_F(LightRigTest, NeverCrashesOnMutatedFiles) {
     });
 }
 
+TEST_F(LightRigTest, LightsCastShadowsWhereTheySaySo) {
+    const auto light = [](const char* more) {
+        return std::string(R"({"type": "directional", "direction": [0, 0, 2], "intensity": 0.7)") + more + "}";
+    };
+    const auto of = [](const std::string& lights) { return "{\"lights\": [" + lights + "]}"; };
+    const std::string casts = light(R"(, "shadow": true)"), head = R"({"type": "headlight", "intensity": 0.3})";
+    auto rig = LightRig::read(write(of(light("") + "," + casts + "," + head)));
+    ASSERT_TRUE(rig) << rig.error().message;
+    EXPECT_EQ(rig->light_count(), 3u);
+    EXPECT_EQ(rig->casting(), std::vector<std::size_t>{1});
+    EXPECT_FALSE(at(*rig, 0).lights[0].casts_shadow);
+    EXPECT_TRUE(at(*rig, 0).lights[1].casts_shadow);
+    ASSERT_TRUE(rig->set_shadows(true));
+    EXPECT_EQ(rig->casting(), (std::vector<std::size_t>{0, 1})) << "a headlight's shadows are behind what casts them";
+    ASSERT_TRUE(rig->set_shadows(false));
+    EXPECT_TRUE(rig->casting().empty());
+
+    std::string many = casts;
+    for (int i = 0; i < 4; ++i) many += "," + casts;
+    EXPECT_NE(complaint(of(many)).find("5 lights that cast shadows, but at most 4"), std::string::npos);
+    EXPECT_NE(complaint(of(light(R"(, "shadow": 1)"))).find("shadow"), std::string::npos);
+    EXPECT_NE(complaint(of(R"({"type": "headlight", "intensity": 0.3, "shadow": true})")).find("shadow"),
+              std::string::npos);
+    std::string five = light("");
+    for (int i = 0; i < 4; ++i) five += "," + light("");
+    auto full = LightRig::read(write(of(five)));
+    ASSERT_TRUE(full);
+    EXPECT_FALSE(full->set_shadows(true));
+    EXPECT_TRUE(full->casting().empty());
+}
+
 } // namespace
 } // namespace unseen::calibration

@@ -243,6 +243,20 @@ const std::vector<Subject>& subjects() {
     return all;
 }
 
+// The first lights, as far as they may.
+Lighting casting(Lighting lighting, bool some) {
+    for (std::size_t i = 0; some && i < std::min(most_shadow_lights, lighting.lights.size()); ++i)
+        lighting.lights[i].casts_shadow = true;
+    return lighting;
+}
+
+// Without some of those that cast shadows.
+Lighting hiding(Lighting lighting, std::uint64_t hidden) {
+    for (std::size_t i = 0; i < lighting.lights.size(); ++i)
+        if (lighting.lights[i].casts_shadow && (hidden >> i & 1) != 0) lighting.lights[i].intensity = 0;
+    return lighting;
+}
+
 // All vertices that a fold of the node may show.
 std::vector<NodeId> vertices_of(const Subject& s, NodeId node) {
     std::vector<NodeId> vertices;
@@ -259,14 +273,15 @@ TEST(LightBounds, HoldEveryVertexOfRandomNodes) {
     std::mt19937_64 random(11);
     for (const Subject& s : subjects()) {
         for (int trial = 0; trial < 400; ++trial) {
-            const Lighting lighting = random_lighting(random, s.tree, trial % 3 == 0);
+            const Lighting lighting = casting(random_lighting(random, s.tree, trial % 3 == 0), trial % 4 == 0);
+            const Lighting left = hiding(lighting, static_cast<std::uint64_t>(trial / 4));
             const glm::dvec3 eye = random_eye(random, s.tree);
             const NodeId node = static_cast<NodeId>(random() % s.tree.interior_count());
             const LuminanceRange range = lit_range(lighting, s.bounds.cones()[node], s.tree.bounds()[node].ring, eye);
             for (const NodeId v : vertices_of(s, node)) {
                 if (s.tree.is_leaf(v) && s.neighbours[v - s.tree.interior_count()].empty())
                     continue; // drawn by no triangle
-                const double y = lit_luminance(lighting, glm::dvec3(s.tree.positions()[v]),
+                const double y = lit_luminance(left, glm::dvec3(s.tree.positions()[v]),
                                                glm::dvec3(glm::vec3(s.tree.normals()[v])), albedo_of(s.tree, v), eye);
                 ASSERT_GE(y, range.lo) << s.name << ", trial " << trial << ", node " << node;
                 ASSERT_LE(y, range.hi) << s.name << ", trial " << trial << ", node " << node;
@@ -351,7 +366,7 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
     for (const Subject& s : subjects()) {
         const double radius = s.tree.bounds()[0].ring.radius;
         for (int trial = 0; trial < 3000; ++trial) {
-            const Lighting from = random_lighting(random, s.tree, trial % 2 == 0);
+            const Lighting from = casting(random_lighting(random, s.tree, trial % 2 == 0), trial % 5 == 0);
             const glm::dvec3 eye = random_eye(random, s.tree);
             const double size = std::pow(random_unit(random), 3) * 0.6;
             Lighting to = from;
@@ -400,7 +415,43 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
     EXPECT_GT(moved, 50'000);
 }
 
+TEST(Lights, OfWhichTooManyCastShadowsAreRefused) {
+    Lighting lighting;
+    lighting.lights.assign(most_shadow_lights + 1, directional({0, 0, 1}));
+    EXPECT_TRUE(validate(lighting));
+    for (LightSource& light : lighting.lights) light.casts_shadow = true;
+    const auto valid = validate(lighting);
+    ASSERT_FALSE(valid);
+    EXPECT_NE(valid.error().message.find("5 of them cast shadows, but at most 4 can"), std::string::npos);
+    EXPECT_EQ(shadow_lights(lighting), 5u);
+    lighting.lights[2].casts_shadow = false;
+    EXPECT_TRUE(validate(lighting));
+}
+
 // ---- cuts
+
+TEST(Keeping, NodesNeverFoldFromWhereverTheyAreSeen) {
+    const VertexTree tree = std::move(*build_tree(shapes::icosphere(4).view()));
+    View view;
+    view.eye = {0, 0, 1e4};
+    const auto plain = extent_criterion(tree, view, 4);
+    ASSERT_TRUE(plain);
+    std::vector<std::uint64_t> none((tree.interior_count() + 63) / 64, 0), some = none;
+    const NodeId kept = tree.interior_count() / 2;
+    for (NodeId node = kept;; node = support::sound(tree).parents()[node]) {
+        some[node / 64] |= std::uint64_t{1} << (node % 64);
+        if (node == VertexTree::root()) break;
+    }
+    const Viewpoint viewpoint{.eye = eye_in_tree(tree, view, {})};
+    Cut cut(tree), with(tree), without(tree);
+    ASSERT_TRUE(cut.follow(*plain, viewpoint));
+    ASSERT_TRUE(without.follow(*keeping(tree, *plain, none), viewpoint));
+    ASSERT_TRUE(with.follow(*keeping(tree, *plain, some), viewpoint));
+    EXPECT_EQ(cut.triangle_count(), without.triangle_count());
+    EXPECT_LT(cut.triangle_count(), with.triangle_count());
+    EXPECT_LT(with.triangle_count(), tree.triangle_count());
+    EXPECT_FALSE(keeping(tree, *plain, std::span(none).first(1)));
+}
 
 // Reaches that grow with contrast and luminance, about like those of an eye.
 DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {

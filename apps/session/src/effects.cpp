@@ -151,10 +151,28 @@ Effect light_effect(const Sight& sight, const Decision& decision) {
             sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
 }
 
-Effect frustum_effect(const Decision& decision) {
+Effect shadow_effect(const Sight& sight, const Decision& decision) {
+    if (!casts_shadows(sight)) return {"shadows", false, "no light casts a shadow: no pass"};
+    const std::size_t casting = vdtree::shadow_lights(*sight.lighting), all = sight.lighting->lights.size();
+    std::string why =
+        std::to_string(casting) + " of " + std::to_string(all) + (casting == 1 ? " lights casts" : " lights cast");
+    if (is_full(decision)) return {"shadows", true, why};
+    if (!is_perceptual(decision))
+        return {"shadows", true,
+                why + "; the fold test " + name_of(decision.test) +
+                    " does not look at them, so their edges may move visibly"};
+    return {"shadows", true,
+            why + "; folds are tested with any of these hidden, and outlines that a light sees fold only where their "
+                  "shadows' edges move invisibly"};
+}
+
+constexpr const char* may_cast = "what is not seen may cast shadows that are";
+
+Effect frustum_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
     if (decision.request.purpose == Purpose::mesh)
         return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
+    if (casts_shadows(sight)) return {"frustum culling", false, may_cast};
     return {"frustum culling", true, "what lies outside of the window is folded"};
 }
 
@@ -197,6 +215,7 @@ Effect distance_effect(const Decision& decision, const std::optional<CutFacts>& 
 
 Effect back_face_effect(const Sight& sight, Purpose purpose) {
     if (purpose == Purpose::mesh) return {"back-face folding", false, "the mesh may be looked at from elsewhere"};
+    if (casts_shadows(sight)) return {"back-face folding", false, may_cast};
     if (culls_back_faces(sight)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
     if (sight.object.tree.closedness() == vdtree::Closedness::open)
         return {"back-face folding", false, "the surface is open"};
@@ -207,6 +226,7 @@ Effect back_face_effect(const Sight& sight, Purpose purpose) {
 Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const std::string name = "hidden folding";
     if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
+    if (casts_shadows(sight)) return {name, false, may_cast};
     if (folds_unseen(sight, decision))
         return {name, true, "what lies behind what this view shows is folded, by a picture of its depths"};
     if (!folds_hidden(sight, decision))
@@ -249,14 +269,14 @@ Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>
 
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const Purpose purpose = decision.request.purpose;
-    std::vector<Effect> effects = {fold_test_effect(sight, decision),  gaze_effect(sight, decision),
-                                   silhouette_effect(sight, decision), csf_effect(sight, decision),
-                                   motion_effect(sight, decision),     reach_effect(sight, decision),
-                                   chroma_effect(sight, decision),     translucency_effect(sight, decision),
-                                   texture_effect(sight, decision),    prelit_effect(sight),
-                                   light_effect(sight, decision),      frustum_effect(decision),
-                                   culling_effect(sight, purpose),     magnification_effect(sight, decision),
-                                   distance_effect(decision, facts)};
+    std::vector<Effect> effects = {fold_test_effect(sight, decision),     gaze_effect(sight, decision),
+                                   silhouette_effect(sight, decision),    csf_effect(sight, decision),
+                                   motion_effect(sight, decision),        reach_effect(sight, decision),
+                                   chroma_effect(sight, decision),        translucency_effect(sight, decision),
+                                   texture_effect(sight, decision),       prelit_effect(sight),
+                                   light_effect(sight, decision),         shadow_effect(sight, decision),
+                                   frustum_effect(sight, decision),       culling_effect(sight, purpose),
+                                   magnification_effect(sight, decision), distance_effect(decision, facts)};
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));
     effects.push_back(hidden_effect(sight, decision, facts));

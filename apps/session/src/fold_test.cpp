@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include "loaded_tree.h"
+#include "shadow_limit.h"
 
 namespace unseen::session {
 namespace {
@@ -128,6 +129,21 @@ Key key_of(const Sight& sight, const Decision& decision) {
     return key;
 }
 
+// What is left of the lights for each set of those that shadows may be of; not where nothing is.
+std::vector<vdtree::Lighting> without_hidden(const vdtree::Lighting& lighting) {
+    std::vector<vdtree::Lighting> all;
+    const std::size_t casting = vdtree::shadow_lights(lighting);
+    for (unsigned hidden = 1; hidden < 1u << casting; ++hidden) {
+        vdtree::Lighting left = lighting;
+        left.lights.clear();
+        unsigned number = 0;
+        for (const vdtree::LightSource& light : lighting.lights)
+            if (!light.casts_shadow || (hidden >> number++ & 1) == 0) left.lights.push_back(light);
+        if (vdtree::validate(left)) all.push_back(std::move(left));
+    }
+    return all;
+}
+
 Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decision& decision, const Key& key) {
     const vdtree::VertexTree& tree = sight.object.tree;
     const vdtree::View& view = sight.view;
@@ -154,12 +170,39 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (!sight.lighting) return by_errors(tree);
     const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
     if (!lit) return lit.error();
-    return by_errors(*lit);
+    if (!casts_shadows(sight)) return by_errors(*lit);
+    std::vector<perception::TreeAsLit> all;
+    all.push_back({lit->share(), *sight.lighting});
+    for (vdtree::Lighting& left : without_hidden(*sight.lighting)) {
+        const auto darker = sight.cache.lit_folds->under(tree, left);
+        if (!darker) return darker.error();
+        all.push_back({darker->share(), std::move(left)});
+    }
+    return decision.masking
+               ? perception::masked_error_distances(all, sight.object.placement, *decision.masking, view, options)
+               : perception::error_distances(all, view, options);
+}
+
+Result<std::optional<perception::ShadowEdges>> edges_of(const Sight& sight, const Decision& decision, const Key& key) {
+    if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::optional<perception::ShadowEdges>();
+    perception::FoldTestOptions options = test_options(sight, decision.request);
+    if (key.farthest_gaze_px)
+        options.gaze_px = glm::dvec2(sight.view.width * 0.5 + *key.farthest_gaze_px, sight.view.height * 0.5);
+    // A highlight may be all there is on what is otherwise black.
+    const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
+    auto made = perception::ShadowEdges::create(sight.view, options, ambient);
+    if (!made) return made.error();
+    return std::optional(std::move(*made));
+}
+
+FrameBall in_frame(const WorldSphere& sphere, const Object& object) {
+    return {object.placement.to_mesh(sphere.centre) - object.tree.origin(), sphere.radius / object.placement.scale};
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
-    const bool window_only = decision.request.purpose == Purpose::picture && !is_wholly_in_window(sight);
+    const bool window_only =
+        decision.request.purpose == Purpose::picture && !casts_shadows(sight) && !is_wholly_in_window(sight);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
@@ -174,7 +217,7 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
     vdtree::FollowOptions options;
     options.threshold = static_cast<float>(request.threshold);
     options.milliseconds = request.milliseconds;
-    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
+    options.cull_back_faces = request.purpose == Purpose::picture && !casts_shadows(sight) && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {
         options.triangle_budget = request.goal.triangles;
         options.fill_budget = request.goal.fill;
@@ -193,7 +236,47 @@ bool is_same(const vdtree::View& a, const vdtree::View& b) {
 struct KeptCriterion {
     Key key;
     vdtree::DistanceCriterion criterion;
+    std::optional<perception::ShadowEdges> edges; // where lights cast shadows
 };
+
+bool casts_shadows(const Sight& sight) { return sight.lighting && vdtree::shadow_lights(*sight.lighting) > 0; }
+
+namespace {
+
+// Outlines whose shadows would move visibly, as of now in the sight's state. Whether they are others than before.
+bool find_shadowing_outlines(const Sight& sight, const std::shared_ptr<const KeptCriterion>& base, double threshold) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const vdtree::DistanceCriterion::Parts& parts = base->criterion.parts();
+    const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
+    const auto still = is_measured ? sight.lighting : nullptr;
+    ShadowState& state = sight.shadow;
+    const bool is_new = state.of != base || state.lighting != still;
+    if (is_new) {
+        state = {base, still, {}, 0, nullptr};
+        state.shifts = is_measured ? outline_shifts(tree, parts.silhouette_lengths, parts.facing, still.get())
+                                   : outline_shifts(tree, tree.displacement(), {}, nullptr);
+    }
+    const WorldSphere all = sphere_of_all(sight.object, sight.cache);
+    const double unseen = threshold * unseen_shift(*sight.lighting, *base->edges, in_frame(all, sight.object),
+                                                   in_frame(sight.scene_sphere, sight.object),
+                                                   vdtree::eye_in_tree(tree, sight.view, sight.object.placement));
+    const double before = state.limit;
+    state.limit = steady_limit(unseen, before);
+    return is_new || state.limit != before;
+}
+
+// The criterion, and outlines kept whose shadows would move visibly.
+Result<std::shared_ptr<const vdtree::DistanceCriterion>>
+keep_outlines(const Sight& sight, const std::shared_ptr<const KeptCriterion>& base, double threshold) {
+    ShadowState& state = sight.shadow;
+    if (!find_shadowing_outlines(sight, base, threshold) && state.criterion) return state.criterion;
+    auto kept = vdtree::keeping(sight.object.tree, base->criterion, beyond(state.shifts, state.limit));
+    if (!kept) return kept.error();
+    state.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*kept));
+    return state.criterion;
+}
+
+} // namespace
 
 Result<Decision> decide(const Sight& sight, const Request& request, std::size_t object) {
     if (request.shown && !is_same(request.shown->view(), sight.view))
@@ -242,7 +325,7 @@ bool culls_back_faces(const Sight& sight) {
 }
 
 bool is_out_of_sight(const Sight& sight, const Decision& decision) {
-    if (decision.request.purpose != Purpose::picture) return false;
+    if (decision.request.purpose != Purpose::picture || casts_shadows(sight)) return false;
     const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
     const glm::dvec3 away = sphere.centre - sight.view.eye;
     // Far more than planes and spheres in single floats are off by.
@@ -254,7 +337,8 @@ bool is_out_of_sight(const Sight& sight, const Decision& decision) {
 
 // Extent and displacement look at supports, which do not contain all that a fold changes.
 bool folds_hidden(const Sight& sight, const Decision& decision) {
-    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && culls_back_faces(sight);
+    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && !casts_shadows(sight) &&
+           culls_back_faces(sight);
 }
 
 bool folds_unseen(const Sight& sight, const Decision& decision) {
@@ -269,16 +353,30 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     if (decision.masking || !last || !(last->key == key)) {
         auto made = make_criterion(sight, decision, key);
         if (!made) return made.error();
+        auto edges = edges_of(sight, decision, key);
+        if (!edges) return edges.error();
         (decision.masking ? masked : last) =
-            std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
+            std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
     }
     const auto& kept = decision.masking ? masked : last;
     CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
-    if (!folds_unseen(sight, decision)) return recipe;
+    if (!folds_unseen(sight, decision)) {
+        if (!kept->edges) return recipe;
+        auto with_outlines = keep_outlines(sight, kept, decision.request.threshold);
+        if (!with_outlines) return with_outlines.error();
+        recipe.criterion = std::move(*with_outlines);
+        return recipe;
+    }
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
     if (!hidden) return hidden.error();
     auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
     if (!without) return without.error();
+    if (kept->edges) { // what is hidden may cast shadows that are not
+        find_shadowing_outlines(sight, kept, decision.request.threshold);
+        sight.shadow.criterion.reset();
+        without = vdtree::keeping(sight.object.tree, *without, beyond(sight.shadow.shifts, sight.shadow.limit));
+        if (!without) return without.error();
+    }
     recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));
     return recipe;
 }

@@ -18,6 +18,8 @@ bool is_perceptual(const Decision& decision);
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision);
 
 // Why recipes are what they are.
+// Shadows of what is not seen may be: nothing folds for that then.
+bool casts_shadows(const Sight& sight);
 bool is_translucent(const Sight& sight);
 bool culls_back_faces(
     const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside

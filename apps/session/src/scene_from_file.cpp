@@ -198,6 +198,7 @@ vdtree::LightSource source_of(const meshio::SceneLight& light, double exposure, 
     using Kind = vdtree::LightSource::Kind;
     vdtree::LightSource source;
     source.intensity = light.intensity * exposure; // of candelas: at a metre
+    source.casts_shadow = light.casts_shadow;
     if (light.kind == meshio::SceneLight::Kind::directional) {
         source.direction = -light.direction;
         return source;

@@ -115,8 +115,15 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
-      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()) {
+      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
+      shadows_(scene.objects.size()) {
     share_caches();
+    bool is_first = true;
+    for (const std::vector<Object>* all : {&scene.objects, &scene.backdrop})
+        for (const Object& object : *all) {
+            sphere_ = is_first ? world_sphere(object) : united(sphere_, world_sphere(object));
+            is_first = false;
+        }
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;
     for (const Object& object : scene.objects) nodes += object.tree.interior_count();
@@ -252,7 +259,7 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], observer, view,
+        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], shadows_[i], sphere_, observer, view,
                           scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
@@ -279,6 +286,7 @@ Result<void> Session::State::measure(std::size_t object) {
         scene.objects[i].tree = with_errors->share();
         caches[i].reset();
         lit_criteria_[i].reset();
+        shadows_[i] = {};
         ++tree_count[i];
     }
     share_caches();

@@ -28,10 +28,21 @@ struct ObjectCache {
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
+// Of an object whose lights cast shadows.
+struct ShadowState {
+    std::shared_ptr<const KeptCriterion> of = {};                    // what all of this is of
+    std::shared_ptr<const vdtree::Lighting> lighting = {};           // likewise, where lights stand still
+    std::vector<float> shifts = {};                                  // see outline_shifts()
+    double limit = 0;                                                // mesh units: outlines that move farther are kept
+    std::shared_ptr<const vdtree::DistanceCriterion> criterion = {}; // that keeps them
+};
+
 struct Sight {
     const Object& object;
     ObjectCache& cache;
     std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
+    ShadowState& shadow;                                 // likewise
+    const WorldSphere& scene_sphere;                     // of all objects and of the backdrop
     const Observer& observer;
     const vdtree::View& view;
     const calibration::LightRig* lights;              // null: the tree's own light

@@ -2,7 +2,7 @@
 //
 //   {"ambient": 0.1, "material": {"specular": 0.04, "shininess": 40},
 //    "lights": [{"type": "directional", "direction": [0.4, 0.7, 0.6], "intensity": 0.7,
-//                "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}},
+//                "shadow": true, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}},
 //               {"type": "point", "position": [1, 2, 3], "intensity": 0.5, "distance": 3,
 //                "keyframes": [{"time_s": 0, "position": [1, 2, 3]}, {"time_s": 2, "position": [-1, 2, 3]}]},
 //               {"type": "spot", "position": [0, 3, 0], "direction": [0, -1, 0],
@@ -13,7 +13,8 @@
 // "ambient" and "material" may be missing (0: no ambient light, no highlights); of a light everything is wanted that
 // its type has, but for "orbit" or "keyframes". Positions and distances in world units (metres); "direction" leads
 // towards a directional light, and to where a spot shines. "intensity" is the relative luminance of white that faces
-// the light: at "distance", where the light has a position. A headlight shines from the camera's direction. An orbit
+// the light: at "distance", where the light has a position. With "shadow": true it casts shadows; without, and headlights
+// always, it shines through everything. A headlight shines from the camera's direction. An orbit
 // turns position and direction about an axis through "centre" (default: the model's). Keyframes give any of position,
 // direction and intensity, all the same ones, at ascending times; in between, positions and intensities go straight and
 // directions along the shorter arc; before and after, they stay.
@@ -37,9 +38,16 @@ public:
     // messages. Fails where vdtree::validate() does.
     static Result<LightRig> of(vdtree::Lighting lighting, std::filesystem::path file);
 
+    // From now on all lights but headlights cast shadows, or none does. Fails on more that could than
+    // vdtree::most_shadow_lights; then all stays.
+    Result<void> set_shadows(bool cast);
+
     // Where the lights are, in the frame of a tree.
     vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                         const vdtree::Similarity& placement) const;
+
+    std::size_t light_count() const noexcept { return lights_.size(); }
+    std::vector<std::size_t> casting() const; // the numbers of those that cast shadows
 
     bool moves() const noexcept { return moves_; } // with time
     bool follows_camera() const noexcept { return follows_camera_; }

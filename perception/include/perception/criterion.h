@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <glm/vec2.hpp>
@@ -121,6 +122,18 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // Measured, not proven: see docs/evidence.md for where it fails. Open and irregular rings are silhouettes. Cost: as
 // luebke_hallen_distances().
 Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                  const FoldTestOptions& options);
+
+// The same under lights of which some cast shadows: whichever of these are hidden from a node, and with their shadows'
+// edges across it. `as_lit`: the tree under all lights (LitFolds::under()), and then without each set of those that may
+// be hidden, each with the lights that are left. An edge of a shadow moves with the surface that it falls on, by what that moves times the
+// tangent to the light, and takes E times the cosine of the light: the product counts as a change of the ring's light.
+// What the node's own outline does to shadows is not looked at: see ShadowEdges. Cost: as often as there are trees.
+struct TreeAsLit {
+    vdtree::VertexTree tree;
+    vdtree::Lighting lighting;
+};
+Result<vdtree::DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, const vdtree::View& view,
                                                   const FoldTestOptions& options);
 
 // Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside

@@ -63,5 +63,10 @@ Result<vdtree::DistanceCriterion> masked_error_distances(const vdtree::VertexTre
                                                          const vdtree::Similarity& placement,
                                                          const MaskingPicture& masking, const vdtree::View& view,
                                                          const FoldTestOptions& options);
+// The same under lights that cast shadows, as error_distances() has them.
+Result<vdtree::DistanceCriterion> masked_error_distances(std::span<const TreeAsLit> as_lit,
+                                                         const vdtree::Similarity& placement,
+                                                         const MaskingPicture& masking, const vdtree::View& view,
+                                                         const FoldTestOptions& options);
 
 } // namespace unseen::perception

@@ -8,6 +8,10 @@
 #include <string>
 #include <vector>
 
+#include <glm/geometric.hpp>
+
+#include <perception/shadow_edges.h>
+
 #include "fold/error_distances.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
@@ -486,11 +490,12 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
-// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
-// not suffice.
-bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const FoldTestOptions& options,
-                const Levels& levels, const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances,
-                std::vector<Shown>& patches, std::vector<Shown>& strips) {
+// What nodes show, no less than their children: patches, and strips where they are outlines. Of several trees, which
+// are one under different lights, whatever shows more. False where the rows do not suffice.
+bool find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& options, const Levels& levels,
+                const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances, std::vector<Shown>& patches,
+                std::vector<Shown>& strips) {
+    const vdtree::SoundTree& tree = *as_lit.front().tree; // what does not depend on the light is the same in all
     const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
@@ -499,14 +504,16 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
                               summation_gain(CyclesPerDegree(highest_cpd), disc(180), csf.samples().summation);
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
-    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
-        const vdtree::LuminanceRange range = tree.ring_luminance()[node];
+    const auto patch_of = [&](const LitErrors& lit, NodeId node) {
+        const std::span<const FoldError> errors = lit.errors;
+        const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
+        const double edge = levels.difference_in_cdm2(lit.edge_of_shadow(node)), moved = std::max(hi - lo, edge);
         const auto change = [&](float luminance, double distance) {
             if (tree.bounds()[node].flags & vdtree::translucent_ring)
                 return brightest - darkest; // anything may show through
-            return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
+            return levels.difference_in_cdm2(luminance) + moved * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
         };
         Shown patch;
         patch.pattern.luminance = levels.luminance_level(middle);
@@ -527,9 +534,12 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         }
         patch.pattern = switch_distances.simplified(patch.pattern);
         patch.row = switch_distances.row(patch.pattern);
-        cover(switch_distances, patch, patches[node]); // the children's
-        patches[node] = patch;
-
+        return patch;
+    };
+    const auto strip_of = [&](const LitErrors& lit, NodeId node) {
+        const std::span<const FoldError> errors = lit.errors;
+        const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
+        const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi);
         Shown strip;
         for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
             const double mean = (bright + dark) / 2;
@@ -543,6 +553,16 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
                                : tree.bounds()[node].flags & vdtree::irregular_ring ? Course::as_made
                                                                                     : Course::to_and_fro;
         strip.row = switch_distances.row(strip.pattern);
+        return strip;
+    };
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        Shown patch = patch_of(as_lit.front(), node), strip = strip_of(as_lit.front(), node);
+        for (const LitErrors& lit : as_lit.subspan(1)) {
+            cover(switch_distances, patch, patch_of(lit, node));
+            cover(switch_distances, strip, strip_of(lit, node));
+        }
+        cover(switch_distances, patch, patches[node]); // the children's
+        patches[node] = patch;
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
         if (node > 0) {
@@ -575,10 +595,26 @@ void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> er
 
 } // namespace
 
-DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const FoldErrors& measured,
+double LitErrors::edge_of_shadow(NodeId node) const {
+    double sum = 0;
+    for (const vdtree::LightSource& light : casting) {
+        double most = light.intensity;
+        if (light.kind != vdtree::LightSource::Kind::directional) {
+            const vdtree::Sphere ring = tree->bounds()[node].ring;
+            const double nearest =
+                glm::length(light.position - glm::dvec3(ring.centre)) - static_cast<double>(ring.radius);
+            most = nearest > 0 ? most * (light.distance / nearest) * (light.distance / nearest) : 1;
+        }
+        sum += most;
+    }
+    return std::min(sum * largest_albedo, 1.0); // luminances end there
+}
+
+DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std::span<const FoldStage> measured_stages,
                                          const vdtree::View& view, const FoldTestOptions& options,
                                          const BandElevation& masking) {
-    const std::span<const FoldError> errors = measured.of_nodes;
+    const vdtree::SoundTree& tree = *as_lit.front().tree;
+    const std::span<const FoldError> errors = as_lit.front().errors;
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
@@ -595,12 +631,12 @@ DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const Fo
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const Surround surround = surround_of(tree, options);
     SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking, parts.eccentricity_bins,
-                                     measured.stages.size());
+                                     measured_stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
+    while (!find_shown(as_lit, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
     const std::vector<float> distances =
-        stage_distances(tree, measured.stages, screen, options, masking, parts.eccentricity_bins);
+        stage_distances(tree, measured_stages, screen, options, masking, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
@@ -623,7 +659,8 @@ DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const Fo
 
 Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
                                        const vdtree::View& view, const FoldTestOptions& options) {
-    return DistanceCriterion::create(tree, criterion_parts(tree, measured, view, options, {}));
+    const LitErrors own{&tree, measured.of_nodes};
+    return DistanceCriterion::create(tree, criterion_parts({&own, 1}, measured.stages, view, options, {}));
 }
 
 double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
@@ -663,6 +700,92 @@ Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const 
     const auto errors = fold_errors_of(*sound, options.model);
     if (!errors) return errors.error();
     return criterion_of(*sound, *errors, view, options);
+}
+
+Result<DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, const vdtree::View& view,
+                                          const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    if (const auto valid = validate(options.model); !valid) return valid.error();
+    const auto trees = LitTrees::of(as_lit, options.model);
+    if (!trees) return trees.error();
+    return DistanceCriterion::create(trees->tree(),
+                                     criterion_parts(trees->as_lit(), trees->stages(), view, options, {}));
+}
+
+Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel& model) {
+    if (trees.empty()) return Error{ErrorCode::invalid_argument, "fold test: there is no tree under lights to look at"};
+    double albedo = 0;
+    const vdtree::VertexTree& first = trees.front().tree;
+    for (NodeId node = 0; node < first.node_count(); ++node)
+        albedo = std::max(albedo, static_cast<double>(vdtree::albedo_of(first, node)));
+    LitTrees all;
+    all.sound_.reserve(trees.size()), all.errors_.reserve(trees.size()); // they are referred to
+    for (const TreeAsLit& one : trees) {
+        if (one.tree.interior_count() != first.interior_count())
+            return Error{ErrorCode::invalid_argument, "fold test: the trees under lights are not of one tree"};
+        auto tree = vdtree::SoundTree::of(one.tree);
+        if (!tree) return tree.error();
+        all.sound_.push_back(std::move(*tree));
+        auto measured = fold_errors_of(all.sound_.back(), model);
+        if (!measured) return measured.error();
+        all.errors_.push_back(std::move(*measured));
+        all.lit_.push_back({&all.sound_.back(), all.errors_.back().of_nodes, {}, albedo});
+        for (const vdtree::LightSource& light : one.lighting.lights)
+            if (light.casts_shadow) all.lit_.back().casting.push_back(light);
+    }
+    return all;
+}
+
+namespace {
+
+// Of illuminances from a four-thousandth of white to white; more light than that is cut off.
+constexpr int illuminance_octaves = 12, illuminances_per_octave = 4;
+double illuminance_at(int i) {
+    return std::exp2(static_cast<double>(i) / illuminances_per_octave - illuminance_octaves);
+}
+
+} // namespace
+
+Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTestOptions& options, double ambient) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    if (const auto valid = validate(options.model); !valid) return valid.error();
+    if (!(ambient >= 0 && ambient <= 1))
+        return Error{ErrorCode::invalid_argument, "fold test: the ambient light must be from 0 to 1"};
+    const Screen screen(view, options);
+    const Levels levels(options.display);
+    const CsfTable& csf = csf_of(options);
+    const Bands bands(screen.highest_cpd, options.model, csf.samples().summation);
+    std::map<int, Eye> eyes; // by luminance
+    // Strips that are lit by `own`, whatever the angle: all that is below the illuminance occurs.
+    std::vector<double> widest;
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= illuminance_octaves * illuminances_per_octave; ++i) {
+        const double own = illuminance_at(i), before = i > 0 ? illuminance_at(i - 1) : 0;
+        const double mean = levels.in_cdm2(ambient + own / 2);
+        const int luminance = levels.luminance_level(mean);
+        auto eye = eyes.find(luminance);
+        if (eye == eyes.end()) {
+            const double cdm2 = levels.luminance(luminance);
+            const Surround none{cdm2, 1}; // strips are not dimmed
+            const Dimming dimming(bands, none, cdm2, screen.highest_cpd, options.model);
+            eye = eyes.emplace(luminance, Eye(csf, 0, cdm2, screen, bands, dimming, options.model)).first;
+        }
+        const int contrast = levels.contrast_level(levels.difference_in_cdm2(own), mean);
+        const double needed_widths =
+            contrast == no_contrast ? 0 : eye->second.strip_distance(Levels::contrast(contrast), Course::one_way);
+        // Between the last one's light and this one's, the widest is no less than this. Below the first, taken as there.
+        const double from = i > 0 ? before : own;
+        if (needed_widths > 0) least = std::min(least, from / needed_widths);
+        widest.push_back(least);
+    }
+    return ShadowEdges(std::move(widest));
+}
+
+double ShadowEdges::widest_unseen(double illuminance) const {
+    if (!(illuminance > 0)) return illuminance <= 0 ? std::numeric_limits<double>::infinity() : 0;
+    const double place = std::ceil((std::log2(illuminance) + illuminance_octaves) * illuminances_per_octave);
+    const double last = static_cast<double>(widest_.size() - 1);
+    return widest_[static_cast<std::size_t>(std::clamp(place, 0.0, last))] / illuminance;
 }
 
 } // namespace unseen::perception

@@ -167,27 +167,36 @@ std::vector<float> shares_left(const DistanceCriterion::Parts& unmasked,
 Result<DistanceCriterion> masked_error_distances(const vdtree::VertexTree& tree, const vdtree::Similarity& placement,
                                                  const MaskingPicture& masking, const vdtree::View& view,
                                                  const FoldTestOptions& options) {
+    const TreeAsLit own{tree.share(), {}};
+    return masked_error_distances({&own, 1}, placement, masking, view, options);
+}
+
+Result<DistanceCriterion> masked_error_distances(std::span<const TreeAsLit> as_lit, const vdtree::Similarity& placement,
+                                                 const MaskingPicture& masking, const vdtree::View& view,
+                                                 const FoldTestOptions& options) {
     if (masking.view().width != view.width || masking.view().height != view.height)
         return Error{ErrorCode::invalid_argument, "masking: the picture is of another window than the view"};
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     if (const auto valid = validate(options.model); !valid) return valid.error();
-    const auto sound = vdtree::SoundTree::of(tree);
-    if (!sound) return sound.error();
-    const auto errors = fold_errors_of(*sound, options.model);
-    if (!errors) return errors.error();
+    const auto trees = LitTrees::of(as_lit, options.model);
+    if (!trees) return trees.error();
+    const vdtree::SoundTree& tree = trees->tree();
     const auto footprints = vdtree::find_footprints(tree, placement, masking.view());
     if (!footprints) return footprints.error();
 
     const std::vector<Way> of_nodes = ways_of_nodes(masking, *footprints), chosen = choose_ways(of_nodes);
-    const std::vector<std::uint8_t> assigned = assign_ways(of_nodes, chosen, sound->parents());
-    DistanceCriterion::Parts unmasked = criterion_parts(*sound, *errors, view, options, {});
+    const std::vector<std::uint8_t> assigned = assign_ways(of_nodes, chosen, tree.parents());
+    const auto parts_under = [&](const BandElevation& elevation) {
+        return criterion_parts(trees->as_lit(), trees->stages(), view, options, elevation);
+    };
+    DistanceCriterion::Parts unmasked = parts_under({});
     std::vector<DistanceCriterion::Parts> masked(chosen.size()); // none of the first
     for (std::size_t way = 1; way < chosen.size(); ++way)
         if (std::ranges::find(assigned, way) != assigned.end())
-            masked[way] = criterion_parts(*sound, *errors, view, options, elevation_of(chosen[way], masking.bands()));
+            masked[way] = parts_under(elevation_of(chosen[way], masking.bands()));
     std::vector<float> shares[std::size(kinds)];
     for (std::size_t kind = 0; kind < std::size(kinds); ++kind)
-        shares[kind] = shares_left(unmasked, masked, kinds[kind], assigned, sound->parents());
+        shares[kind] = shares_left(unmasked, masked, kinds[kind], assigned, tree.parents());
     for (std::size_t kind = 0; kind < std::size(kinds); ++kind)
         for (NodeId node = 0; node < tree.interior_count(); ++node)
             (unmasked.*kinds[kind].lengths)[node] *= shares[kind][node];

@@ -14,6 +14,8 @@
 
 namespace unseen::render {
 
+class Shadows; // see shadows.h
+
 constexpr float default_background = 0.19597990f; // relative luminance; 20 cd/m2 on the default display
 
 enum class Shading {
@@ -39,6 +41,12 @@ struct Camera {
     glm::dvec2 point = glm::dvec2(0.5); // of each pixel, from its top left, that is drawn
     std::optional<double> near_plane =
         {}; // distance, world units; none: just before the items. One for draws that share depth.
+    // Of the lights that cast some, as of their last update; null: none are drawn. They outlive the draw.
+    const Shadows* shadows = nullptr;
+    // The attachment that how much of each casting light comes to a pixel is drawn to, in the same pass: 0 to 1, the
+    // first light in r, and so on; 1 of what is not lit, of lights that there are not, and where no item is. It is of
+    // ColourFormat::shares8 or in floats, and not the attachment of the colours. None: it is not drawn.
+    std::optional<int> shadow_mask = {};
 };
 
 // What a draw begins with.

@@ -22,6 +22,7 @@
 #include <render/overlay.h>
 #include <render/renderer.h>
 #include <render/sample_sum.h>
+#include <render/shadows.h>
 #include <render/stage_times.h>
 #include <render/target.h>
 #include <render/test_pattern.h>

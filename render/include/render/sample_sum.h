@@ -21,6 +21,9 @@ struct Sampling {
     int samples = 16;                      // N-rooks samples a pixel, 1..256
     std::uint32_t seed = 1;                // of the sample pattern: equal for images that are compared
     float background = default_background; // relative luminance, grey, 0..1
+    // As of a Camera. With several samples, the maps are drawn anew for each of them, with their texels elsewhere: so
+    // edges of shadows are as good as those of surfaces, and not those of texels. They keep their last casters for that.
+    Shadows* shadows = nullptr;
 };
 
 // Two targets in 32-bit float: one that samples are drawn into, and one that they are added up in. What is added up are

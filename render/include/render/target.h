@@ -15,6 +15,7 @@ enum class ColourFormat {
     rgba32f, // linear RGB and relative luminance in a; 16 bytes a pixel
     rgba16f, // the same in half floats
     srgb8,   // for displays: encoded as sRGB, a is 1
+    shares8, // four numbers from 0 to 1, in steps of a 255th: for masks of shadows
 };
 
 // 32-bit float depth is 1 at the near plane and 0 at infinity.

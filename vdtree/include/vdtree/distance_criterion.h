@@ -117,6 +117,12 @@ private:
     ObjectId object_id_;
 };
 
+// The criterion with nodes that never fold: a bit each, of whole words, lowest first; so a parent of one should be one.
+// The cut of a criterion with lights must not be one of a viewpoint that shows nothing at all: there, only outlines keep
+// their nodes. Fails where sizes are not the tree's. Cost: a copy of the criterion.
+Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,
+                                  std::span<const std::uint64_t> kept);
+
 // A half space: points with normal . x + offset >= 0, in the tree's frame.
 struct Plane {
     glm::dvec3 normal = glm::dvec3(0); // unit, pointing inward

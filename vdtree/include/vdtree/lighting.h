@@ -1,7 +1,8 @@
 // Lights that may move, and what they make of a tree: the luminance of its vertices, and bounds of it by node.
 //
 // Surfaces are matt (Lambert) with a highlight (Blinn and Phong, normalised so that a sharper highlight is a brighter
-// one), and cast no shadows. The relative luminance of a vertex at x with the normal n and the albedo a, lit from the
+// one). Shadows are no part of the formula: what draws takes the share of a light that casts_shadow away where the light
+// is hidden. The relative luminance of a vertex at x with the normal n and the albedo a, lit from the
 // directions l and seen from v:
 //     ambient a + sum over lights of E max(0, n.l) (a + specular (shininess + 8) / 8 max(0, n.h)^shininess),
 //     h = (l + v) / |l + v|,
@@ -33,6 +34,7 @@ struct LightSource {
     glm::dvec3 position = glm::dvec3(0);        // of a point or spot light
     double distance = 1;                        // likewise
     double inner_cosine = 1, outer_cosine = 0;  // of a spot: full light within the inner, none beyond the outer angle
+    bool casts_shadow = false;                  // what is behind something, seen from the light, is not lit by it
     bool operator==(const LightSource&) const = default;
 };
 
@@ -44,11 +46,16 @@ struct Lighting {
     bool operator==(const Lighting&) const = default;
 };
 inline constexpr std::size_t most_lights = 16;
+inline constexpr std::size_t most_shadow_lights =
+    4; // that cast shadows: each has maps of its own, and its own share of
+       // every vertex's light
 inline constexpr double most_shininess = 1024;
 
 // Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles
-// in order, not all dark. The error names the field, as in "lights[2].distance".
+// in order, not all dark, and at most most_shadow_lights that cast shadows. The error names the field, as in "lights[2].distance".
 Result<void> validate(const Lighting& lighting);
+
+std::size_t shadow_lights(const Lighting& lighting); // how many lights cast shadows
 
 // validate(), and no light at a vertex, where its direction is not defined, or within a closed surface, of which it can
 // light nothing that is seen. Cost: of a light within the bounding sphere, a descent and three rays through the tree.
@@ -110,7 +117,8 @@ private:
     std::vector<float> radii_;
 };
 
-// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger
+// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone, whichever of the lights
+// that cast shadows are hidden from it. Larger for larger
 // spheres and cones without boxes. Cost: some ten nanoseconds a light.
 LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const Sphere& sphere, glm::dvec3 eye);
 

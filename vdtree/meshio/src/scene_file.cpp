@@ -154,6 +154,14 @@ private:
         return array[i];
     }
 
+    bool says_casts_shadow(const json& of, const std::string& where) const {
+        const json* extras = object_at(&of, "extras");
+        const json* said = extras != nullptr ? member(*extras, "casts_shadow") : nullptr;
+        if (said == nullptr) return false;
+        if (!said->is_boolean()) fail(where + ": extras.casts_shadow should be true or false; correct it.");
+        return said->get<bool>();
+    }
+
     void add_light(const json& node, const glm::dmat4& to_world, const std::string& of_node) {
         const json* index = light_of(node);
         if (index == nullptr) return;
@@ -196,6 +204,7 @@ private:
             if (!(read.inner_radians < read.outer_radians))
                 fail(where + ": its innerConeAngle should be less than its outerConeAngle; correct it.");
         }
+        read.casts_shadow = says_casts_shadow(light, where) || says_casts_shadow(node, of_node);
         contents_.lights.push_back(std::move(read));
     }
 

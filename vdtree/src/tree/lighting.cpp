@@ -131,11 +131,20 @@ Result<void> validate(const Lighting& lighting) {
         if (auto valid = validate(lighting.lights[i], "lights[" + std::to_string(i) + "]"); !valid) return valid;
         sum += lighting.lights[i].intensity;
     }
+    if (const std::size_t casting = shadow_lights(lighting); casting > most_shadow_lights)
+        return Error{ErrorCode::invalid_argument,
+                     "lights: " + std::to_string(casting) + " of them cast shadows, but at most " +
+                         std::to_string(most_shadow_lights) + " can: let the weaker ones cast none."};
     if (!(sum > 0))
         return Error{
             ErrorCode::invalid_argument,
             "The scene is black: ambient and lights[].intensity are all 0. Give one of them a positive value."};
     return {};
+}
+
+std::size_t shadow_lights(const Lighting& lighting) {
+    return static_cast<std::size_t>(std::count_if(lighting.lights.begin(), lighting.lights.end(),
+                                                  [](const LightSource& light) { return light.casts_shadow; }));
 }
 
 Result<void> check_lights(const VertexTree& tree, const Lighting& lighting) {
@@ -200,7 +209,7 @@ double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye
     for (std::size_t i = 0; i < from.lights.size(); ++i) {
         const LightSource &a = from.lights[i], &b = to.lights[i];
         if (a.kind != b.kind || a.distance != b.distance || a.inner_cosine != b.inner_cosine ||
-            a.outer_cosine != b.outer_cosine)
+            a.outer_cosine != b.outer_cosine || a.casts_shadow != b.casts_shadow)
             return infinity;
         double motion = 0;
         if (a.kind != LightSource::Kind::point && a.direction != b.direction)

@@ -33,7 +33,8 @@ struct SceneNode {
     bool is_background = false;
 };
 
-// KHR_lights_punctual; colours count by their luminance, and ranges do not count.
+// KHR_lights_punctual; colours count by their luminance, and ranges do not count. The extras of a light, or of its node,
+// may say {"casts_shadow": true}.
 struct SceneLight {
     enum class Kind : std::uint8_t { directional, point, spot };
     Kind kind = Kind::directional;
@@ -42,6 +43,7 @@ struct SceneLight {
     glm::dvec3 position = glm::dvec3(0);         // in the world
     glm::dvec3 direction = glm::dvec3(0, 0, 1);  // unit; where it shines
     double inner_radians = 0, outer_radians = 0; // of a spot: half angles, inner < outer <= pi / 2
+    bool casts_shadow = false;
 };
 
 // Perspective.

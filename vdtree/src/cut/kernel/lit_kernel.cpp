@@ -206,8 +206,9 @@ UNSEEN_INLINE LitFacing facing_of(const LitBatch& b, std::size_t i, const Direct
 }
 
 // The matt surface: I (n.l)+ r.
-UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, LitBatch& b, std::size_t i) {
-    const float largest_albedo = b.largest_albedo[i], least_albedo = b.least_albedo[i], moves = facing.moves;
+UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, float least_albedo, LitBatch& b,
+                            std::size_t i) {
+    const float largest_albedo = b.largest_albedo[i], moves = facing.moves;
     b.hi[i] += beam.most * facing.most * largest_albedo;
     b.lo[i] += beam.least * facing.least * least_albedo;
     const float rise = beam.growth * beam.most * largest_albedo * moves + beam.most_rate * beam.most * largest_albedo +
@@ -238,7 +239,8 @@ UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, LitBatch&
 // The highlight: I (n.l)+ k (n.h)+^e. Its steps have no rates: as far as the cap allows them, they are part of the
 // jump.
 UNSEEN_INLINE void add_highlight(const KernelLights& all, const Beam& beam, const LitFacing& facing,
-                                 const float (&centre)[3], float radius, LitBatch& b, std::size_t i) {
+                                 const float (&centre)[3], float radius, float least_share, LitBatch& b,
+                                 std::size_t i) {
     const Direction& l = beam.to;
     const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
     float near_eye, far_eye;
@@ -264,7 +266,7 @@ UNSEEN_INLINE void add_highlight(const KernelLights& all, const Beam& beam, cons
         return base > 0 ? std::pow(base, all.shininess) : 0.0f;
     };
     b.hi[i] += all.specular * beam.most * facing.most * highlight(chords, true);
-    b.lo[i] += all.specular * beam.least * facing.least * highlight(chords, false);
+    b.lo[i] += least_share * all.specular * beam.least * facing.least * highlight(chords, false);
     const float all_moves = facing.moves + v.turn + v.widen;
     const float window_cap =
         v.sine > steepest_sine
@@ -280,10 +282,12 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     const float centre[3] = {b.centre[0][i], b.centre[1][i], b.centre[2][i]};
     const float at_centre = std::abs(centre[0]) + std::abs(centre[1]) + std::abs(centre[2]);
     const float radius = b.radius[i] + position_rounding * (at_centre + b.radius[i]);
-    const Beam beam = beam_of<kind>(all, light, centre, radius, b.largest_albedo[i], b.least_albedo[i]);
+    // What may be hidden from a light may have none of it, as if nothing were reflected.
+    const float least_albedo = light.casts_shadow ? 0.0f : b.least_albedo[i];
+    const Beam beam = beam_of<kind>(all, light, centre, radius, b.largest_albedo[i], least_albedo);
     const LitFacing facing = facing_of(b, i, beam.to);
-    add_matt(beam, facing, b, i);
-    if constexpr (shines) add_highlight(all, beam, facing, centre, radius, b, i);
+    add_matt(beam, facing, least_albedo, b, i);
+    if constexpr (shines) add_highlight(all, beam, facing, centre, radius, light.casts_shadow ? 0.0f : 1.0f, b, i);
 }
 
 template <bool shines>
@@ -359,6 +363,7 @@ KernelLights::KernelLights(const Lighting& lighting, glm::dvec3 eye_, double tre
     for (const LightSource& from : lighting.lights) {
         Light light{};
         light.kind = from.kind;
+        light.casts_shadow = from.casts_shadow;
         for (int k = 0; k < 3; ++k) {
             light.direction[k] = static_cast<float>(from.direction[k]);
             light.position[k] = static_cast<float>(from.position[k]);

@@ -14,6 +14,7 @@ namespace unseen::vdtree {
 struct KernelLights {
     struct Light {
         LightSource::Kind kind;
+        bool casts_shadow; // and so may be hidden
         float direction[3], position[3];
         float intensity, distance;              // of point lights and spots: at that distance
         float inner_cosine, outer_cosine, fade; // of a spot; most change of its step in a radian

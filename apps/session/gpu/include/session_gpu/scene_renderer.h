@@ -8,9 +8,10 @@
 #include <vector>
 
 #include <render/renderer.h>
+#include <render/shadows.h>
 #include <session/session.h>
 
-namespace unseen::app {
+namespace unseen::session {
 
 // A cut an object, and the geomorph that is drawn instead, or null.
 struct DrawnCut {
@@ -18,14 +19,22 @@ struct DrawnCut {
     const vdtree::Geomorph* geomorph = nullptr;
 };
 std::vector<DrawnCut> drawn_cuts(std::span<const vdtree::Cut> cuts);
-std::vector<DrawnCut> drawn_cuts(const session::Follower& follower, std::size_t objects);
+std::vector<DrawnCut> drawn_cuts(const Follower& follower, std::size_t objects);
+
+// What there is to draw.
+struct SceneItems {
+    std::vector<render::Item>
+        items; // objects, but for those without triangles where there are several, then the backdrop
+    std::vector<std::size_t> objects;   // by item, of the first ones: which object it is
+    render::Shadows* shadows = nullptr; // the renderer's own, as of these items; null: no light casts any
+};
 
 // Trees are on the GPU once, however many objects share them. A scene of one object is drawn as render::Renderer does,
 // to the bit. Move-only; refers to the session, whose trees must be those that it has when this is made (see
 // Session::prepare()).
 class SceneRenderer {
 public:
-    static Result<SceneRenderer> create(const render::Context& context, const session::Session& session);
+    static Result<SceneRenderer> create(const render::Context& context, const Session& session);
     SceneRenderer(SceneRenderer&&) noexcept;
     SceneRenderer& operator=(SceneRenderer&&) noexcept;
     ~SceneRenderer();
@@ -36,7 +45,14 @@ public:
     Result<void> draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                 const render::DrawOptions& options);
 
+    // For passes of others, until the next call: what draw() draws. `view`: for lights that go with the camera.
+    Result<SceneItems> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
+                             const render::DrawOptions& options = {});
+
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
+
+    // Of the last draw; nothing where no light casts shadows. Waits for the GPU.
+    std::optional<render::ShadowFacts> shadows() const;
 
 private:
     struct Impl;
@@ -44,4 +60,4 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-} // namespace unseen::app
+} // namespace unseen::session

@@ -1,0 +1,367 @@
+// Maps of depth from the lights. Depth is reversed, as everywhere: 1 near the light, 0 at its farthest.
+#include "shadows_impl.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include <vdtree/internal/errors.h>
+
+#include "gl.h"
+#include "surface_pass.h"
+
+namespace unseen::render {
+namespace {
+
+using Kind = vdtree::LightSource::Kind;
+
+constexpr int least_size = 16;
+constexpr unsigned maps_unit = 2; // as in surface.frag
+// Texels at a map's border that looks from within reach over: a look takes two on each side.
+constexpr int border_texels = 4;
+// Spots wider than this, from their axis, have six maps like point lights: one would be too coarse in its middle.
+constexpr double widest_spot = std::numbers::pi / 3; // radians
+// What is nearer to a light with a place, in radii of the ball, casts no shadow.
+constexpr double near_plane_share = 1e-4;
+// Places are rounded to single floats: the ball is so much larger than what it is around.
+constexpr double ball_margin = 1e-3;
+// Lights are the same for two items where they differ by no more than rounding from frame to frame, in radii of the ball
+// and in radians.
+constexpr double same_light = 1e-5;
+constexpr std::uint64_t texel_bytes = 4;
+constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
+
+bool is_wide(const CastingLight& light) {
+    return light.kind == Kind::point || (light.kind == Kind::spot && light.outer_cosine < std::cos(widest_spot));
+}
+
+int layers_of(const CastingLight& light) { return is_wide(light) ? 6 : 1; }
+
+// A frame that looks along -back. Depends on the direction alone.
+glm::dmat3 looking_along(glm::dvec3 back) {
+    const glm::dvec3 helper = std::abs(back.y) < 0.9 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+    const glm::dvec3 right = glm::normalize(glm::cross(helper, back));
+    return {right, glm::cross(back, right), back};
+}
+
+double window_share(int size) { return static_cast<double>(size) / (size - 2 * border_texels); }
+
+glm::dmat4 directional(const CastingLight& light, double radius, int size) {
+    const glm::dmat4 turned(glm::transpose(looking_along(light.direction)));
+    const double side = radius * window_share(size), depth = radius * (1 + ball_margin);
+    glm::dmat4 clip(0);
+    clip[0][0] = clip[1][1] = 1 / side;
+    clip[2][2] = 1 / (2 * depth); // towards the light
+    clip[3][2] = 0.5;
+    clip[3][3] = 1;
+    return clip * turned;
+}
+
+// `tangent`: of half the field.
+glm::dmat4 perspective(glm::dvec3 from, glm::dvec3 back, double tangent, double near_plane) {
+    const glm::dmat4 turned(glm::transpose(looking_along(back)));
+    glm::dmat4 clip(0);
+    clip[0][0] = clip[1][1] = 1 / tangent;
+    clip[2][3] = -1;
+    clip[3][2] = near_plane;
+    return clip * turned * glm::translate(glm::dmat4(1), -from);
+}
+
+double tangent_of(const CastingLight& light, int size) {
+    if (light.kind == Kind::directional) return 0;
+    return window_share(size) * (is_wide(light) ? 1 : std::tan(std::acos(std::clamp(light.outer_cosine, 0.0, 1.0))));
+}
+
+bool is_same(const CastingLight& a, const CastingLight& b, const Ball& ball) {
+    if (a.kind != b.kind || std::abs(a.outer_cosine - b.outer_cosine) > same_light) return false;
+    if (a.kind != Kind::point && !(glm::length(a.direction - b.direction) <= same_light)) return false;
+    const double scale = ball.radius + glm::length(a.position - ball.centre);
+    return a.kind == Kind::directional || glm::length(a.position - b.position) <= same_light * scale;
+}
+
+} // namespace
+
+std::vector<CastingLight> casting_lights(const Item& item) {
+    std::vector<CastingLight> lights;
+    if (!item.lighting) return lights;
+    const vdtree::VertexTree& tree = item.cut.tree().tree();
+    for (const vdtree::LightSource& light : item.lighting->lights)
+        if (light.casts_shadow)
+            lights.push_back({light.kind, glm::normalize(item.placement.rotation * light.direction),
+                              item.placement.to_world(tree.origin() + light.position), light.outer_cosine});
+    return lights;
+}
+
+Ball ball_around(std::span<const Item> items) {
+    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+    std::vector<glm::dvec3> corners;
+    for (const Item& item : items) {
+        const GpuTree::Impl& tree = item.cut.tree().impl();
+        const Box& box = item.cut.impl().box;
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
+                                corner & 4 ? box.high.z : box.low.z);
+            corners.push_back(item.placement.to_world(tree.tree.origin() + tree.frame.centre + tree.frame.unit * at));
+            low = glm::min(low, corners.back()), high = glm::max(high, corners.back());
+        }
+    }
+    Ball ball;
+    if (corners.empty()) return ball;
+    ball.centre = (low + high) * 0.5;
+    for (const glm::dvec3& corner : corners) ball.radius = std::max(ball.radius, glm::length(corner - ball.centre));
+    ball.radius *= 1 + ball_margin;
+    return ball;
+}
+
+bool Shadows::Impl::Caster::is_same(const Caster& other) const {
+    return &cut.impl() == &other.cut.impl() && changes == other.changes && glides == other.glides &&
+           placement.scale == other.placement.scale && placement.rotation == other.placement.rotation &&
+           placement.translation == other.placement.translation;
+}
+
+Result<void> Shadows::Impl::reserve(std::size_t wanted) {
+    if (wanted <= map_count && wanted > 0) return {};
+    maps = {};
+    map_count = 0;
+    if (wanted == 0) {
+        framebuffer = {};
+        return {};
+    }
+    GLint most_layers = 0;
+    glGetIntegerv(GL_MAX_ARRAY_TEXTURE_LAYERS, &most_layers);
+    if (wanted > static_cast<std::size_t>(most_layers))
+        return unsupported("The lights that cast shadows need " + std::to_string(wanted) +
+                           " maps, and this OpenGL holds at most " + std::to_string(most_layers) +
+                           ": let fewer lights cast shadows.");
+    maps = Texture2dArray::create("shadow maps");
+    glTextureStorage3D(maps.id(), 1, GL_DEPTH_COMPONENT32F, options.size, options.size, static_cast<GLsizei>(wanted));
+    if (glGetError() == GL_OUT_OF_MEMORY) {
+        maps = {};
+        return unsupported("The graphics memory does not hold the " + std::to_string(wanted) + " shadow maps of " +
+                           std::to_string(options.size) + " texels a side: choose smaller ones, or fewer lights.");
+    }
+    const GLfloat nothing[] = {0, 0, 0, 0}; // infinitely far
+    glTextureParameterfv(maps.id(), GL_TEXTURE_BORDER_COLOR, nothing);
+    for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+        glTextureParameteri(maps.id(), wrap, GL_CLAMP_TO_BORDER);
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+        glTextureParameteri(maps.id(), filter, GL_NEAREST);
+    framebuffer = FramebufferObject::create("shadow maps");
+    glNamedFramebufferDrawBuffer(framebuffer.id(), GL_NONE);
+    glNamedFramebufferReadBuffer(framebuffer.id(), GL_NONE);
+    if (!begun) begun = Timestamp::create("shadow maps begun"), ended = Timestamp::create("shadow maps drawn");
+    map_count = wanted;
+    return {};
+}
+
+void Shadows::Impl::aim() {
+    layers.clear();
+    first_layers.clear();
+    const double near_distance = near_plane_share * reach;
+    for (const CastingLight& light : lights) {
+        first_layers.push_back(static_cast<int>(layers.size()));
+        const glm::dvec3 from = light.position - ball.centre;
+        const double tangent = tangent_of(light, options.size);
+        if (light.kind == Kind::directional) {
+            layers.push_back({directional(light, reach, options.size)});
+        } else if (!is_wide(light)) {
+            layers.push_back({perspective(from, -light.direction, tangent, near_distance)});
+        } else {
+            for (int axis = 0; axis < 3; ++axis)
+                for (const double side : {-1.0, 1.0}) {
+                    glm::dvec3 back(0);
+                    back[axis] = -side;
+                    layers.push_back({perspective(from, back, tangent, near_distance)});
+                }
+        }
+    }
+}
+
+void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
+    glNamedFramebufferTextureLayer(framebuffer.id(), GL_DEPTH_ATTACHMENT, maps.id(), 0, static_cast<GLint>(layer));
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer.id());
+    const GLfloat infinitely_far = 0;
+    glClearNamedFramebufferfv(framebuffer.id(), GL_DEPTH, 0, &infinitely_far);
+    program.use();
+    for (const Caster& caster : drawn) {
+        GpuCut::Impl& cut = caster.cut.impl();
+        GpuTree::Impl& tree = cut.tree.impl();
+        if (cut.indices.count() == 0) continue;
+        cut.uploaded_bytes += tree.put(cut.glides);
+        program.use(); // putting vertices takes another one
+        glm::dmat4 ball_from_unit(glm::mat3_cast(caster.placement.rotation) *
+                                  (caster.placement.scale * tree.frame.unit));
+        ball_from_unit[3] =
+            glm::dvec4(caster.placement.to_world(tree.tree.origin() + tree.frame.centre) - ball.centre, 1);
+        const glm::dmat4 shifted = glm::translate(glm::dmat4(1), glm::dvec3(shift, 0));
+        program.set(0, glm::mat4(shifted * layers[layer].clip_from_ball * ball_from_unit));
+        glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
+        glBindVertexArray(tree.arrays.id());
+        for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call)
+            glDrawElements(GL_TRIANGLES,
+                           static_cast<GLsizei>(std::min(most_indices_a_call, cut.indices.count() - first)),
+                           GL_UNSIGNED_INT,
+                           reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
+    }
+    glBindVertexArray(0);
+}
+
+void Shadows::Impl::draw(const Program& program) {
+    glQueryCounter(begun.id(), GL_TIMESTAMP);
+    glViewport(0, 0, options.size, options.size);
+    glDepthRange(0, 1);
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glDepthMask(GL_TRUE);
+    for (const GLenum off : {GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_RASTERIZER_DISCARD, GL_DEPTH_CLAMP,
+                             GL_POLYGON_OFFSET_FILL, GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND})
+        glDisable(off);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER); // depth is reversed
+    for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(program, layer);
+    glQueryCounter(ended.id(), GL_TIMESTAMP);
+}
+
+Result<void> Shadows::Impl::shift_texels(glm::dvec2 by) {
+    const glm::dvec2 wanted = (by - 0.5) * (2.0 / options.size);
+    if (lights.empty() || wanted == shift) return {};
+    const auto program = context.impl().programs.surface({.output = Output::depth});
+    if (!program) return program.error();
+    shift = wanted;
+    draw(**program);
+    return {};
+}
+
+Result<void> Shadows::Impl::update(std::span<const Item> casters) {
+    std::vector<Caster> now;
+    now.reserve(casters.size());
+    std::optional<std::vector<CastingLight>> found; // of the first item that is lit
+    const Ball around = options.bounds ? *options.bounds : ball_around(casters);
+    if (!(around.radius >= 0 && std::isfinite(around.radius)))
+        return invalid_argument("Shadows need a scene of a finite size.");
+    for (const Item& item : casters) {
+        if (&item.cut.tree().context().impl() != &context.impl())
+            return invalid_argument("The cut belongs to another OpenGL context than the shadows.");
+        const GpuCut::Impl& cut = item.cut.impl();
+        now.push_back({item.cut, cut.indices.changes(), cut.glides.version, item.placement});
+        if (!item.lighting) continue;
+        if (auto valid = vdtree::validate(*item.lighting); !valid) return valid;
+        std::vector<CastingLight> own = casting_lights(item);
+        if (!found) {
+            found = std::move(own);
+            continue;
+        }
+        if (!std::equal(own.begin(), own.end(), found->begin(), found->end(),
+                        [&](const CastingLight& a, const CastingLight& b) { return is_same(a, b, around); }))
+            return invalid_argument(
+                "Lights that cast shadows must be at the same places for all objects: give lights in orbit a centre.");
+    }
+    std::vector<CastingLight> lit = found.value_or(std::vector<CastingLight>());
+    const bool is_known = lit == lights && around.centre == ball.centre && around.radius == ball.radius &&
+                          std::equal(now.begin(), now.end(), drawn.begin(), drawn.end(),
+                                     [](const Caster& a, const Caster& b) { return a.is_same(b); });
+    if (is_known) return shift_texels(glm::dvec2(0.5));
+    lights.clear(); // until it is done
+    drawn.clear();
+    int wanted = 0;
+    for (const CastingLight& light : lit) wanted += layers_of(light);
+    if (auto reserved = reserve(static_cast<std::size_t>(wanted)); !reserved) return reserved;
+    lights = std::move(lit);
+    ball = around;
+    reach = ball.radius > 0 ? ball.radius : 1; // all in one point
+    aim();
+    if (lights.empty()) return {};
+    const auto program = context.impl().programs.surface({.output = Output::depth});
+    if (!program) return lights.clear(), program.error();
+    drawn = std::move(now);
+    shift = glm::dvec2(0);
+    draw(**program);
+    ++redraws;
+    return {};
+}
+
+Result<void> Shadows::Impl::check(const Item& item) const {
+    if (&context.impl() != &item.cut.tree().context().impl())
+        return invalid_argument("The shadows belong to another OpenGL context than the cut.");
+    const std::vector<CastingLight> own = casting_lights(item);
+    if (own.empty() || std::equal(own.begin(), own.end(), lights.begin(), lights.end(),
+                                  [&](const CastingLight& a, const CastingLight& b) { return is_same(a, b, ball); }))
+        return {};
+    return invalid_argument("The shadows are of other lights than the item's: update them before drawing.");
+}
+
+ShadowUniforms Shadows::Impl::uniforms_of(const Item& item) const {
+    const GpuTree::Impl& tree = item.cut.tree().impl();
+    const double unit = item.placement.scale * tree.frame.unit;
+    glm::dmat4 ball_from_unit(glm::mat3_cast(item.placement.rotation) * unit);
+    const glm::dvec3 middle = item.placement.to_world(tree.tree.origin() + tree.frame.centre);
+    ball_from_unit[3] = glm::dvec4(middle - ball.centre, 1);
+    ShadowUniforms uniforms;
+    uniforms.world_from_unit = glm::mat4(glm::dmat4(glm::mat3_cast(item.placement.rotation)));
+    const glm::dmat3 unit_from_world = glm::transpose(glm::mat3_cast(item.placement.rotation));
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const CastingLight& light = lights[i];
+        const bool has_place = light.kind != Kind::directional;
+        for (int layer = first_layers[i]; layer < first_layers[i] + layers_of(light); ++layer)
+            uniforms.layers.emplace_back(layers[static_cast<std::size_t>(layer)].clip_from_ball * ball_from_unit);
+        uniforms.lights.emplace_back(unit_from_world * (light.position - middle) / unit, first_layers[i]);
+        uniforms.kinds.emplace_back(
+            is_wide(light), has_place,
+            has_place ? tangent_of(light, options.size) : window_share(options.size) / (2 * (1 + ball_margin)), 0);
+    }
+    return uniforms;
+}
+
+void Shadows::Impl::bind() const {
+    glBindTextureUnit(maps_unit, maps.id());
+    glBindSampler(maps_unit, 0);
+}
+
+Result<Shadows> Shadows::create(const Context& context, const ShadowOptions& options) {
+    auto impl = std::make_unique<Impl>(context, options);
+    auto made = in_context(context, "Making shadows", [&]() -> Result<void> {
+        const int most = largest_target_side();
+        if (options.size < least_size || options.size > most)
+            return unsupported("Shadow maps of " + std::to_string(options.size) +
+                               " texels a side cannot be drawn: this OpenGL draws from " + std::to_string(least_size) +
+                               " to " + std::to_string(most) + ".");
+        if (options.bounds && !(options.bounds->radius >= 0 && std::isfinite(options.bounds->radius)))
+            return invalid_argument("The ball that shadows reach over must have a finite radius, 0 or more.");
+        return {};
+    });
+    if (!made) return made.error();
+    return Shadows(std::move(impl));
+}
+
+Shadows::Shadows(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Shadows::Shadows(Shadows&&) noexcept = default;
+Shadows& Shadows::operator=(Shadows&&) noexcept = default;
+Shadows::~Shadows() = default;
+
+Result<void> Shadows::update(std::span<const Item> casters) {
+    return in_context(impl_->context, "Drawing shadow maps", [&] { return impl_->update(casters); });
+}
+
+ShadowFacts Shadows::facts() const {
+    ShadowFacts facts;
+    facts.lights = static_cast<int>(impl_->lights.size());
+    facts.maps = static_cast<int>(impl_->layers.size());
+    facts.size = impl_->options.size;
+    const auto side = static_cast<std::uint64_t>(impl_->options.size);
+    facts.bytes = texel_bytes * side * side * impl_->map_count;
+    facts.redraws = impl_->redraws;
+    if (impl_->redraws == 0 || !impl_->context.make_current()) return facts;
+    GLuint64 begun = 0, ended = 0; // ns
+    glGetQueryObjectui64v(impl_->begun.id(), GL_QUERY_RESULT, &begun);
+    glGetQueryObjectui64v(impl_->ended.id(), GL_QUERY_RESULT, &ended);
+    facts.draw_ms = static_cast<double>(ended - begun) * 1e-6;
+    return facts;
+}
+
+} // namespace unseen::render

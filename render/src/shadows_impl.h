@@ -1,0 +1,86 @@
+// What shadows hold, and what the surface's shader wants to know of them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
+
+#include <render/shadows.h>
+
+#include "context_impl.h"
+#include "gl_object.h"
+#include "gpu_tree_impl.h"
+
+namespace unseen::render {
+
+// In the world.
+struct CastingLight {
+    vdtree::LightSource::Kind kind = vdtree::LightSource::Kind::directional;
+    glm::dvec3 direction = glm::dvec3(0, 0, 1); // as of vdtree::LightSource
+    glm::dvec3 position = glm::dvec3(0);
+    double outer_cosine = 0;
+    bool operator==(const CastingLight&) const = default;
+};
+
+// The item's lights that cast shadows, in their order.
+std::vector<CastingLight> casting_lights(const Item& item);
+
+// For an item's draw: see surface.frag.
+struct ShadowUniforms {
+    std::vector<glm::mat4> layers;
+    std::vector<glm::vec4> lights, kinds; // by light
+    glm::mat4 world_from_unit = glm::mat4(1);
+};
+
+struct Shadows::Impl {
+    Impl(const Context& context_, const ShadowOptions& options_) : context(context_), options(options_) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+
+    // What was drawn, which need not be drawn again.
+    struct Caster {
+        GpuCut cut;
+        std::uint64_t changes = 0, glides = 0;
+        vdtree::Similarity placement;
+        bool is_same(const Caster& other) const;
+    };
+    struct Layer {
+        glm::dmat4 clip_from_ball = glm::dmat4(1); // places relative to the ball's centre
+    };
+
+    Result<void> update(std::span<const Item> casters);
+    // Draws the maps of the last update's casters with their texels elsewhere, by so many in 0..1 of them; 0.5: as
+    // update() does. Needs a current context.
+    Result<void> shift_texels(glm::dvec2 by);
+    Result<void> reserve(std::size_t layers);
+    void aim();
+    void draw(const Program& program);
+    void draw_layer(const Program& program, std::size_t layer);
+
+    // Fails where the item has other lights that cast shadows than these are of.
+    Result<void> check(const Item& item) const;
+    ShadowUniforms uniforms_of(const Item& item) const;
+    void bind() const;
+
+    Context context; // first, and so gone last
+    ShadowOptions options;
+    Ball ball;
+    double reach = 1; // its radius, or 1 where that is 0
+    std::vector<CastingLight> lights;
+    std::vector<int> first_layers; // by light
+    std::vector<Layer> layers;
+    std::vector<Caster> drawn;
+    Texture2dArray maps;
+    std::size_t map_count = 0; // layers of the texture
+    FramebufferObject framebuffer;
+    Timestamp begun, ended;
+    std::uint64_t redraws = 0;
+    glm::dvec2 shift = glm::dvec2(0); // of the maps' windows, in their coordinates
+};
+
+} // namespace unseen::render

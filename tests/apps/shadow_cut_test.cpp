@@ -1,0 +1,190 @@
+// Cuts of scenes whose lights cast shadows: nobody tells their pictures from those of the full scene, with the shadows in
+// both.
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <perception/judge.h>
+#include <session/session.h>
+#include <session_gpu/scene_renderer.h>
+
+#include "built.h"
+#include "gl_test.h"
+#include "shapes.h"
+
+namespace unseen::app {
+namespace {
+
+using Kind = vdtree::LightSource::Kind;
+using vdtree::LightSource;
+
+constexpr int window_px = 256, samples = 64;
+
+LightSource sun(glm::dvec3 towards, double intensity) {
+    LightSource light;
+    light.direction = glm::normalize(towards);
+    light.intensity = intensity;
+    light.casts_shadow = true;
+    return light;
+}
+
+LightSource lamp(glm::dvec3 at, double intensity, double distance) {
+    LightSource light;
+    light.kind = Kind::point;
+    light.position = at;
+    light.intensity = intensity;
+    light.distance = distance;
+    light.casts_shadow = true;
+    return light;
+}
+
+LightSource torch(glm::dvec3 at, glm::dvec3 to, double intensity) {
+    LightSource light = lamp(at, intensity, glm::length(to - at));
+    light.kind = Kind::spot;
+    light.direction = glm::normalize(to - at);
+    light.inner_cosine = std::cos(0.4);
+    light.outer_cosine = std::cos(0.5);
+    return light;
+}
+
+// The plane y = 0, of squares.
+vdtree::Mesh floor(double half_side, int squares) {
+    vdtree::Mesh mesh;
+    for (int i = 0; i <= squares; ++i)
+        for (int j = 0; j <= squares; ++j)
+            mesh.positions.push_back({half_side * (2.0 * i / squares - 1), 0, half_side * (2.0 * j / squares - 1)});
+    const auto at = [&](int i, int j) { return static_cast<vdtree::Index>(i * (squares + 1) + j); };
+    for (int i = 0; i < squares; ++i)
+        for (int j = 0; j < squares; ++j) {
+            mesh.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j + 1)});
+            mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i + 1, j)});
+        }
+    return mesh;
+}
+
+struct Setting {
+    const char* name;
+    vdtree::Lighting lighting;
+    double radius = 0.5; // of the ball
+    glm::dvec3 at = {0, 0.6, 0};
+    glm::dvec3 eye = {0.6, 1.6, 2.6}, target = {-0.1, 0.35, 0};
+    double fov_y_degrees = 30;
+    float grey = 0.8f; // of the ball
+};
+
+vdtree::Lighting lit(std::vector<LightSource> lights, double specular = 0) {
+    vdtree::Lighting lighting;
+    lighting.lights = std::move(lights);
+    lighting.ambient = 0.2;
+    lighting.specular = specular;
+    return lighting;
+}
+
+std::vector<Setting> settings() {
+    std::vector<Setting> all;
+    all.push_back({"Sun", lit({sun({0.5, 1, 0.3}, 0.7)})});
+    all.push_back({"GrazingSun", lit({sun({1, 0.2, 0.2}, 0.7)})});
+    all.push_back({"SunAndLamp", lit({sun({0.5, 1, 0.3}, 0.4), lamp({-1.2, 1.8, 0.6}, 0.4, 1.5)})});
+    all.push_back({"Spot", lit({torch({1, 2.2, 0.3}, {0, 0.5, 0}, 0.7)})});
+    all.push_back({"SunWithHighlights", lit({sun({0.5, 1, 0.3}, 0.6)}, 0.05)});
+    // The ball is far above the eye, the light as far above the ball, and the edge of the shadow right before the eye.
+    // The ball is black, so that the eye sees nothing of it but its outline.
+    LightSource narrow = torch({0, 80, 0}, {0, 0, 0}, 0.7);
+    narrow.inner_cosine = std::cos(0.03);
+    narrow.outer_cosine = std::cos(0.04);
+    all.push_back({"NearShadow", lit({narrow}), 0.5, {0, 40, 0}, {1.5, 0.4, 0}, {1.05, 0, 0}, 45, 0.001f});
+    return all;
+}
+
+class ShadowCut : public render::testing::GlTest, public ::testing::WithParamInterface<std::size_t> {
+protected:
+    static session::Scene scene_of(const Setting& setting, const vdtree::VertexTree& ball,
+                                   const vdtree::VertexTree& ground, bool casts) {
+        session::Scene scene = session::Scene::of(ball.share(), setting.radius);
+        scene.objects[0].placement.translation = setting.at;
+        scene.backdrop.push_back({ground.share()});
+        vdtree::Lighting lighting = setting.lighting;
+        for (LightSource& light : lighting.lights) light.casts_shadow = casts;
+        scene.lights = *calibration::LightRig::of(lighting, "the test's lights");
+        return scene;
+    }
+
+    static vdtree::View view_of(const Setting& setting) {
+        vdtree::View view;
+        view.eye = setting.eye;
+        view.target = setting.target;
+        view.width = view.height = window_px;
+        view.fov_y_degrees = setting.fov_y_degrees;
+        return view;
+    }
+
+    static perception::Image image_of(session::SceneRenderer& renderer, const std::vector<vdtree::Cut>& cuts,
+                                      const vdtree::View& view, float background) {
+        render::DrawOptions options;
+        options.samples = samples;
+        options.background = background;
+        const auto frame = renderer.draw(session::drawn_cuts(cuts), view, options);
+        EXPECT_TRUE(frame) << frame.error().message;
+        perception::Image image{frame->width, frame->height, 1, frame->luminance};
+        for (float& value : image.values)
+            value = static_cast<float>(perception::to_luminance({}, static_cast<double>(value)).value());
+        return image;
+    }
+};
+
+TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
+    const Setting setting = settings()[GetParam()];
+    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(setting.grey), 1));
+    const vdtree::VertexTree ball = support::built(mesh), ground = support::built(floor(6, 48));
+    const vdtree::View view = view_of(setting);
+    auto session = session::Session::create(scene_of(setting, ball, ground, true));
+    ASSERT_TRUE(session) << session.error().message;
+    session::Request request;
+    request.purpose = session::Purpose::picture;
+    const auto cut = session->simplify(view, request);
+    ASSERT_TRUE(cut) << cut.error().message;
+    request.goal = session::Goal::full();
+    const auto full = session->simplify(view, request);
+    ASSERT_TRUE(full);
+    auto renderer = session::SceneRenderer::create(context(), *session);
+    ASSERT_TRUE(renderer) << renderer.error().message;
+    const auto judged = [&](const std::vector<vdtree::Cut>& cuts) {
+        const auto difference =
+            perception::judge_modern(image_of(*renderer, full->cuts, view, session->background()),
+                                     image_of(*renderer, cuts, view, session->background()),
+                                     {.csf = perception::CsfModel::castle, .gain = perception::default_person.gain});
+        EXPECT_TRUE(difference);
+        return *difference;
+    };
+    const perception::Judgement judgement = judged(cut->cuts);
+    EXPECT_EQ(judgement.visible_pixels, 0) << judgement.max_ratio;
+    // With highlights the test goes by what the lights can make of a node, hidden and not: from so near it keeps all.
+    if (setting.lighting.specular == 0) {
+        EXPECT_LT(cut->stats.triangles, full->stats.triangles);
+    }
+    RecordProperty("triangles", static_cast<int>(cut->stats.triangles));
+    RecordProperty("of", static_cast<int>(full->stats.triangles));
+    RecordProperty("ratio", std::to_string(judgement.max_ratio));
+    ASSERT_TRUE(renderer->shadows());
+    EXPECT_EQ(static_cast<std::size_t>(renderer->shadows()->lights), setting.lighting.lights.size());
+
+    // The cut for the eye alone does not do.
+    if (std::string(setting.name) != "NearShadow") return;
+    auto unaware = session::Session::create(scene_of(setting, ball, ground, false));
+    ASSERT_TRUE(unaware);
+    const auto for_eye = unaware->simplify(view, {.purpose = session::Purpose::mesh});
+    ASSERT_TRUE(for_eye);
+    EXPECT_LT(for_eye->stats.triangles, cut->stats.triangles);
+    const perception::Judgement seen = judged(for_eye->cuts);
+    RecordProperty("eye", static_cast<int>(for_eye->stats.triangles));
+    RecordProperty("eyeratio", std::to_string(seen.max_ratio));
+    EXPECT_GT(seen.visible_pixels, 0) << seen.max_ratio;
+}
+INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 6),
+                         [](const auto& of) { return std::string(settings()[of.param].name); });
+
+} // namespace
+} // namespace unseen::app
