@@ -515,8 +515,8 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
 // What nodes show, no less than their children: patches, and strips where they are outlines. Of several trees, which
 // are one under different lights, whatever shows more. False where the rows do not suffice.
 bool find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& options, const Levels& levels,
-                const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances,
-                std::vector<Shown>& patches, std::vector<Shown>& strips) {
+                const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances, std::vector<Shown>& patches,
+                std::vector<Shown>& strips) {
     const vdtree::SoundTree& tree = *as_lit.front().tree; // what does not depend on the light is the same in all
     const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
