@@ -206,8 +206,7 @@ UNSEEN_INLINE LitFacing facing_of(const LitBatch& b, std::size_t i, const Direct
 }
 
 // The matt surface: I (n.l)+ r.
-UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, float least_albedo, LitBatch& b,
-                            std::size_t i) {
+UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, float least_albedo, LitBatch& b, std::size_t i) {
     const float largest_albedo = b.largest_albedo[i], moves = facing.moves;
     b.hi[i] += beam.most * facing.most * largest_albedo;
     b.lo[i] += beam.least * facing.least * least_albedo;
