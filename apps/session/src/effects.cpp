@@ -226,9 +226,11 @@ Effect back_face_effect(const Sight& sight, Purpose purpose) {
 Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const std::string name = "hidden folding";
     if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
-    if (casts_shadows(sight)) return {name, false, may_cast};
     if (folds_unseen(sight, decision))
-        return {name, true, "what lies behind what this view shows is folded, by a picture of its depths"};
+        return {name, true,
+                std::string("what lies behind what this view shows is folded, by a picture of its depths") +
+                    (casts_shadows(sight) ? ", but for outlines whose shadows would move visibly" : "")};
+    if (casts_shadows(sight)) return {name, false, may_cast};
     if (!folds_hidden(sight, decision))
         return {name, false,
                 is_perceptual(decision) ? "nothing solid is looked at from outside"

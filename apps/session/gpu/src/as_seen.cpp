@@ -2,17 +2,16 @@
 #include <session_gpu/as_seen.h>
 
 #include <algorithm>
-#include <map>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include <perception/judge_tables.h>
 #include <render/depth.h>
-#include <render/gpu_tree.h>
 #include <render/layers.h>
 #include <render/sample_sum.h>
 #include <session_gpu/gpu_judge.h>
+#include <session_gpu/scene_renderer.h>
 
 namespace unseen::session {
 namespace {
@@ -21,60 +20,13 @@ namespace {
 // maskers count as for somebody who sees half as much: of the default observer, as for the median person.
 constexpr double maskers_gain = 0.5;
 
-// Everything of a scene on the GPU.
-class Drawn {
-public:
-    Drawn(const Session& session, const render::Context& context, const vdtree::View& view)
-        : session_(session), context_(context), view_(view) {}
-
-    Result<void> add(const std::vector<vdtree::Cut>& cuts) {
-        const Scene& scene = session_.scene();
-        for (std::size_t i = 0; i < cuts.size(); ++i) {
-            auto lighting = session_.lighting(view_, i);
-            if (!lighting) return lighting.error();
-            if (auto ok = add(cuts[i], session_.tree(i), scene.objects[i].placement, std::move(*lighting)); !ok)
-                return ok;
-        }
-        for (std::size_t i = 0; i < scene.backdrop.size(); ++i) {
-            auto lighting = session_.backdrop_lighting(view_, i);
-            if (!lighting) return lighting.error();
-            const Object& part = scene.backdrop[i];
-            vdtree::Cut whole(part.tree);
-            whole.unfold_all();
-            if (auto ok = add(whole, part.tree, part.placement, std::move(*lighting)); !ok) return ok;
-        }
-        return {};
-    }
-
-    std::span<const render::Item> all() const { return items_; }
-    std::vector<render::Item> without_layer(const std::vector<int>& layer_of, int layer) const {
-        std::vector<render::Item> rest;
-        for (std::size_t i = 0; i < items_.size(); ++i)
-            if (i >= layer_of.size() || layer_of[i] != layer) rest.push_back(items_[i]);
-        return rest;
-    }
-
-private:
-    Result<void> add(const vdtree::Cut& cut, const vdtree::VertexTree& tree, const vdtree::Similarity& placement,
-                     std::optional<vdtree::Lighting> lighting) {
-        auto known = trees_.find(&tree.data()); // objects share them
-        if (known == trees_.end()) {
-            auto made = render::GpuTree::create(context_, tree);
-            if (!made) return made.error();
-            known = trees_.emplace(&tree.data(), std::move(*made)).first;
-        }
-        render::GpuCut drawn(known->second);
-        if (auto followed = drawn.follow(cut); !followed) return followed;
-        items_.push_back({.cut = std::move(drawn), .placement = placement, .lighting = std::move(lighting)});
-        return {};
-    }
-
-    const Session& session_;
-    const render::Context& context_;
-    const vdtree::View& view_;
-    std::map<const vdtree::VertexTree::Data*, render::GpuTree> trees_;
-    std::vector<render::Item> items_; // objects first
-};
+// All but one layer's objects.
+std::vector<render::Item> without_layer(const SceneItems& scene, const std::vector<int>& layer_of, int layer) {
+    std::vector<render::Item> rest;
+    for (std::size_t i = 0; i < scene.items.size(); ++i)
+        if (i >= scene.objects.size() || layer_of[scene.objects[i]] != layer) rest.push_back(scene.items[i]);
+    return rest;
+}
 
 // What pictures of a view mask, for this observer.
 class Masks {
@@ -91,11 +43,13 @@ public:
         if (!tables) return tables.error();
         auto sum = render::SampleSum::create(context, view.width, view.height);
         if (!sum) return sum.error();
-        return Masks(context, view, {samples, 1, session.background()}, std::move(*tables), std::move(*sum), black,
-                     white);
+        return Masks(context, view, {.samples = samples, .background = session.background()}, std::move(*tables),
+                     std::move(*sum), black, white);
     }
 
-    Result<perception::Elevations> of(std::span<const render::Item> items) {
+    // Shadows are those of the whole scene, whatever is drawn.
+    Result<perception::Elevations> of(std::span<const render::Item> items, render::Shadows* shadows) {
+        sampling_.shadows = shadows;
         if (auto drawn = sum_.draw(items, view_, sampling_); !drawn) return drawn.error();
         render::LuminanceTexture picture = sum_.mean_luminance();
         picture.scale *= static_cast<float>(white_ - black_);
@@ -142,17 +96,17 @@ Result<render::LayerSplit> layers_of(const Session& session, const vdtree::View&
 
 // By object. What one layer masks is the same for all its objects.
 Result<std::vector<perception::MaskingPicture>> masking_of(const Session& session, const render::Context& context,
-                                                           const Drawn& drawn, const vdtree::View& view,
+                                                           const SceneItems& drawn, const vdtree::View& view,
                                                            const AsSeenOptions& options) {
     const auto split = layers_of(session, view, options.layers);
     if (!split) return split.error();
     auto masks = Masks::create(session, context, view, options.samples);
     if (!masks) return masks.error();
-    auto whole = masks->of(drawn.all());
+    auto whole = masks->of(drawn.items, drawn.shadows);
     if (!whole) return whole.error();
     std::vector<perception::MaskingPicture> by_layer;
     for (int layer = 0; layer < std::max(split->count, 1); ++layer) {
-        auto rest = masks->of(drawn.without_layer(split->layer_of, layer));
+        auto rest = masks->of(without_layer(drawn, split->layer_of, layer), drawn.shadows);
         if (!rest) return rest.error();
         const perception::Elevations both[] = {*whole, std::move(*rest)};
         auto masking = perception::MaskingPicture::create(view, both);
@@ -178,17 +132,19 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
                           (!session.scene().lights ||
                            std::ranges::all_of(all->fold_tests, [](FoldTest test) { return test == FoldTest::error; }));
     if (!can_tell || (!options.folds_hidden && options.masking == Masking::none)) return all;
-    Drawn drawn(session, context, view);
-    if (auto added = drawn.add(all->cuts); !added) return added.error();
+    auto renderer = SceneRenderer::create(context, session);
+    if (!renderer) return renderer.error();
+    const auto drawn = renderer->items(drawn_cuts(all->cuts), view);
+    if (!drawn) return drawn.error();
     if (options.folds_hidden) {
-        const auto depths = render::farthest_depth(context, drawn.all(), view, options.samples);
+        const auto depths = render::farthest_depth(context, drawn->items, view, options.samples);
         if (!depths) return depths.error();
         auto shown = vdtree::DepthPicture::create(view, *depths);
         if (!shown) return shown.error();
         request.shown = std::move(*shown);
     }
     if (options.masking == Masking::scene) {
-        auto masking = masking_of(session, context, drawn, view, options);
+        auto masking = masking_of(session, context, *drawn, view, options);
         if (!masking) return masking.error();
         request.masking = std::move(*masking);
     }
