@@ -420,13 +420,11 @@ Command scenes_command(CLI::App& app) {
     verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
-    verb->add_flag("--quick", a->quick,
-                   "Fewer samples a pixel, a short walk, and no search for levels that show nothing");
+    verb->add_flag("--quick", a->quick, "Fewer samples a pixel, and a short walk");
     add_report_options(*verb, a->report);
     verb->callback([a] {
         if (!a->quick) return;
         a->options.samples = 16, a->options.path_frames = 6;
-        a->options.searches = false;
     });
     verb->footer(
         "Examples:\n  unseen-bench scenes --quick\n  unseen-bench scenes mine.glb --window 1024 --json scenes.json");

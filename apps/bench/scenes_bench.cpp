@@ -33,7 +33,10 @@ struct Row {
     std::uint64_t visible = 0, second_visible = 0; // pixels, by both judges
     double v = 0, second_v = 0;
     double seconds = 0; // to choose, from nothing, without what is measured once
+    std::vector<session::PassEffect> passes = {};
 };
+
+constexpr const char* most_asked_for = "tree, masked, without what the picture hides";
 
 class JudgedScene {
 public:
@@ -77,7 +80,9 @@ public:
         const auto start = BenchClock::now();
         auto made = session::simplify_as_seen(*session_, context_, view_, {.purpose = session::Purpose::picture}, how);
         if (!made) return made.error();
-        return judge(std::move(method), made->cuts, seconds_since(start));
+        auto row = judge(std::move(method), made->cuts, seconds_since(start));
+        if (row) row->passes = std::move(made->passes);
+        return row;
     }
 
     // The cuts of a frame's levels; what is out of the window is not there.
@@ -178,7 +183,7 @@ Result<Row> without_visible_pixels(JudgedScene& scene, LevelControl& control, co
     return scene.judge(method, scene.cuts_of(control, *frame), 0);
 }
 
-Result<std::vector<Row>> rows_of(JudgedScene& scene, const ScenesBenchOptions& options) {
+Result<std::vector<Row>> rows_of(JudgedScene& scene) {
     using session::Masking;
     std::vector<Row> rows;
     std::optional<Error> error;
@@ -189,7 +194,7 @@ Result<std::vector<Row>> rows_of(JudgedScene& scene, const ScenesBenchOptions& o
     add(scene.as_seen("tree", {.folds_hidden = false}));
     add(scene.as_seen("tree, masked", {.folds_hidden = false, .masking = Masking::scene}));
     add(scene.as_seen("tree, without what the picture hides", {}));
-    add(scene.as_seen("tree, masked, without what the picture hides", {.masking = Masking::scene}));
+    add(scene.as_seen(most_asked_for, {.masking = Masking::scene}));
     if (error) return *error;
     const std::uint64_t least = rows.back().triangles;
     for (const auto& [recipe, name] : {std::pair{session::MapRecipe::modern, "levels by masking, modern maps"},
@@ -210,7 +215,7 @@ Result<std::vector<Row>> rows_of(JudgedScene& scene, const ScenesBenchOptions& o
         if (!frame) return frame.error();
         add(scene.judge(std::string(name) + ", as many triangles", scene.cuts_of(*control, *frame),
                         seconds_since(start)));
-        if (options.searches) add(without_visible_pixels(scene, *control, std::string(name) + ", where nothing shows"));
+        add(without_visible_pixels(scene, *control, std::string(name) + ", where nothing shows"));
     }
     if (error) return *error;
     return rows;
@@ -283,6 +288,19 @@ BenchTable table_of(const std::string& scene, const std::vector<Row>& rows, std:
                               rounded(100 * static_cast<double>(r.triangles) / static_cast<double>(all), 3) + "%",
                               grouped(r.visible), rounded(r.v, 2), grouped(r.second_visible), rounded(r.second_v, 2),
                               r.seconds > 0 ? rounded(r.seconds, 2) : std::string()});
+    return table;
+}
+
+// Of the last way by the tree, which asks for everything.
+BenchTable passes_table(const std::vector<std::pair<std::string, std::vector<session::PassEffect>>>& scenes) {
+    BenchTable table;
+    table.title = "What is drawn for a cut, and why";
+    table.rows.push_back({"scene", "effect", "", "why", "drawings", "passes", "textures, MB", "ms"});
+    for (const auto& [name, passes] : scenes)
+        for (const session::PassEffect& e : passes)
+            table.rows.push_back({name, e.name, e.on ? "on" : "off", e.why, std::to_string(e.surface_passes),
+                                  std::to_string(e.full_screen_passes),
+                                  rounded(static_cast<double>(e.texture_bytes) / 1e6, 3), rounded(e.milliseconds, 3)});
     return table;
 }
 
@@ -391,18 +409,23 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
     if (!context) return context.error();
     ScenesBenchResult result;
     std::vector<std::pair<std::string, Walk>> walks;
+    std::vector<std::pair<std::string, std::vector<session::PassEffect>>> passes;
     for (const std::string& file : files) {
         auto scene = JudgedScene::create(*context, file, options);
         if (!scene) return scene.error();
-        const auto rows = rows_of(*scene, options);
+        const auto rows = rows_of(*scene);
         if (!rows) return rows.error();
         result.tables.push_back(table_of(scene->name(), *rows, scene->session().triangle_count()));
-        for (const Row& row : *rows) result.rows.push_back(to_json(row, scene->name()));
+        for (const Row& row : *rows) {
+            result.rows.push_back(to_json(row, scene->name()));
+            if (row.method == most_asked_for) passes.emplace_back(scene->name(), row.passes);
+        }
         auto walked = walk(*scene, options.path_frames);
         if (!walked) return walked.error();
         result.walks.push_back(to_json(*walked, scene->name()));
         walks.emplace_back(scene->name(), std::move(*walked));
     }
+    result.tables.push_back(passes_table(passes));
     result.tables.push_back(renderings_table(walks));
     result.tables.push_back(times_table(walks));
     return result;

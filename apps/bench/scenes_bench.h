@@ -15,7 +15,6 @@ struct ScenesBenchOptions {
     int window_px = 512;
     int samples = 64;     // a pixel of what is judged
     int path_frames = 24; // of the walk that times and renderings are summed over
-    bool searches = true; // for the fewest triangles of levels by distance and area that show nothing: minutes
 };
 
 struct ScenesBenchResult {
