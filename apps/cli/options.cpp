@@ -432,7 +432,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     });
 }
 
-void add_visibility_option(CLI::App& verb, WhatOptions& o) {
+void add_visibility_option(CLI::App& verb, WhatOptions& o, bool adds_layers) {
     add_choice<Visibility, Visibility>(
         verb, "--visibility", o.visibility, {{"spheres", Visibility::spheres}, {"picture", Visibility::picture}},
         "What counts as hidden: what faces away or lies behind spheres inside solids (spheres; of 'unseen render' the "
@@ -441,6 +441,7 @@ void add_visibility_option(CLI::App& verb, WhatOptions& o) {
         verb, "--masking", o.masks, {{"none", false}, {"scene", true}},
         "Whether patterns of the scene mask what folds change (scene): bars before a statue, leaves, "
         "and the statue's own; default: none");
+    if (!adds_layers) return;
     verb.add_option(
             "--layers", o.layers,
             "With --masking scene: of depth, 1 to 16 (default: 5); objects are masked by what is in other layers")

@@ -99,7 +99,8 @@ void add_view_options(CLI::App& verb, ViewOptions& options);
 void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
-void add_visibility_option(CLI::App& verb, WhatOptions& options); // of verbs for one view
+// Of verbs for one view. Without `adds_layers` the verb has a --layers of its own.
+void add_visibility_option(CLI::App& verb, WhatOptions& options, bool adds_layers = true);
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
 // What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.

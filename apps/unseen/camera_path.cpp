@@ -61,6 +61,45 @@ std::vector<CameraPose> poses_of(const Orbit& orbit, const vdtree::View& first) 
     return poses;
 }
 
+// ---- walks
+
+constexpr std::string_view walk_name = "walk";
+constexpr double walk_frames_a_second = 60, fastest_walk = 1e6; // metres a second
+
+bool is_walk(const std::string& path) { return path == walk_name || path.starts_with(std::string(walk_name) + ":"); }
+
+Result<Walk> parse_walk(const std::string& path) {
+    Walk walk;
+    std::string_view rest = std::string_view(path).substr(walk_name.size());
+    const auto next = [&] {
+        rest.remove_prefix(1); // the colon
+        const std::string_view text = rest.substr(0, rest.find(':'));
+        rest.remove_prefix(text.size());
+        return text;
+    };
+    const bool has_speed =
+        rest.empty() || (parse(next(), walk.metres_a_second) && std::abs(walk.metres_a_second) <= fastest_walk);
+    const bool has_frames =
+        rest.empty() || (parse(next(), walk.frames) && walk.frames >= 1 && walk.frames <= most_path_frames);
+    if (!has_speed || !has_frames || !rest.empty())
+        return invalid_argument("'" + path + "' must be walk[:METRES_A_SECOND[:FRAMES]] with 1 to " +
+                                std::to_string(most_path_frames) + " frames.");
+    return walk;
+}
+
+std::vector<CameraPose> poses_of(const Walk& walk, const vdtree::View& first) {
+    const glm::dvec3 step = walk.metres_a_second / walk_frames_a_second * glm::normalize(first.target - first.eye);
+    std::vector<CameraPose> poses;
+    poses.reserve(static_cast<std::size_t>(walk.frames));
+    // The target goes along, so that the eye never comes to it.
+    for (int frame = 0; frame < walk.frames; ++frame)
+        poses.push_back({first.eye + static_cast<double>(frame) * step,
+                         first.target + static_cast<double>(frame) * step,
+                         first.up,
+                         {}});
+    return poses;
+}
+
 // ---- files
 
 enum Column { eye_x, eye_y, eye_z, target_x, target_y, target_z, up_x, up_y, up_z, gaze_x, gaze_y, column_count };
@@ -176,6 +215,10 @@ Result<CameraPath> CameraPath::read(const std::string& path, glm::dvec3 up) {
         const auto orbit = parse_orbit(path);
         return orbit ? Result(CameraPath(*orbit)) : orbit.error();
     }
+    if (is_walk(path)) {
+        const auto walk = parse_walk(path);
+        return walk ? Result(CameraPath(*walk)) : walk.error();
+    }
     auto poses = PathReader(path, up).read();
     return poses ? Result(CameraPath(std::move(*poses))) : poses.error();
 }
@@ -186,8 +229,9 @@ bool CameraPath::has_gaze() const {
 }
 
 std::vector<CameraPose> CameraPath::poses_from(const vdtree::View& first) const {
-    const Orbit* const orbit = std::get_if<Orbit>(&way_);
-    return orbit ? poses_of(*orbit, first) : std::get<std::vector<CameraPose>>(way_);
+    if (const Orbit* const orbit = std::get_if<Orbit>(&way_)) return poses_of(*orbit, first);
+    if (const Walk* const walk = std::get_if<Walk>(&way_)) return poses_of(*walk, first);
+    return std::get<std::vector<CameraPose>>(way_);
 }
 
 } // namespace unseen::app

@@ -27,10 +27,18 @@ struct Orbit {
     int frames = 1;
 };
 
+// Straight towards the first view's target, at 60 frames a second, and on if there are so many frames. The first frame is
+// the first view.
+struct Walk {
+    double metres_a_second = 1.5; // a walker's; negative: backwards
+    int frames = 60;
+};
+
 // What can be read before there is a view to begin with.
 class CameraPath {
 public:
     // "orbit:DEGREES[:FRAMES]": see Orbit; without a count, once around.
+    // "walk[:METRES_A_SECOND[:FRAMES]]": see Walk.
     // Otherwise the name of a CSV file: a header line that names the columns eye_x, eye_y, eye_z, target_x, target_y,
     // target_z and optionally up_x, up_y, up_z (default: `up`) and gaze_x, gaze_y (pixels), in any order; then one line
     // a frame. Empty lines are skipped. Errors name the file, line and column.
@@ -40,9 +48,10 @@ public:
     bool has_gaze() const; // the file says where the viewer looks
 
 private:
-    explicit CameraPath(std::variant<Orbit, std::vector<CameraPose>> way) : way_(std::move(way)) {}
+    using Way = std::variant<Orbit, Walk, std::vector<CameraPose>>;
+    explicit CameraPath(Way way) : way_(std::move(way)) {}
 
-    std::variant<Orbit, std::vector<CameraPose>> way_;
+    Way way_;
 };
 
 inline constexpr int most_path_frames = 1'000'000;

@@ -10,8 +10,8 @@
 #include <panel_plot.h>
 #include <perception/image.h>
 #include <session/follower.h>
-#include <vdtree/internal/atomic_file.h>
 #include <session_gpu/scene_renderer.h>
+#include <vdtree/internal/atomic_file.h>
 
 #include "camera_path.h"
 #include "cut_report.h"
@@ -208,6 +208,11 @@ void print(const session::Session& session, const std::vector<FrameRecord>& fram
                     ? ", and nothing was drawn"
                     : " and drawing " + middle_and_most(column(frames, [](auto& f) { return f.draw_ms; }))));
     print_line(visibility_text(last, session.observer(), display, "in the last frame"));
+    const auto is_shadowed = [](const session::Effect& effect) { return effect.name == "shadows" && effect.on; };
+    if (std::ranges::any_of(last.effects, is_shadowed))
+        print_line(
+            "that holds for shadows of pictures with many samples a pixel; with one, as in flights, their edges may "
+            "move by a texel");
     if (const auto seen = SeenChanges::of(frames)) print_line(to_text(*seen, !std::isnan(frames.back().gliding)));
 }
 
@@ -309,7 +314,8 @@ private:
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
-            frame = drawing->renderer.draw(session::drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
+            frame =
+                drawing->renderer.draw(session::drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
             record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());

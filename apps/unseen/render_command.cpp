@@ -147,9 +147,11 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
     group
         .add_option("--path", o.path,
                     "orbit:DEGREES[:FRAMES], around the target from VIEW on, so many degrees a frame (default: once "
-                    "around); or a CSV file with a header line and the columns eye_x, eye_y, eye_z, target_x, "
+                    "around); walk[:METRES_A_SECOND[:FRAMES]], from VIEW towards the target (default: 1.5 m/s for 60 "
+                    "frames; what a numbered -o takes where there is no --path); or a CSV file with a header line and "
+                    "the columns eye_x, eye_y, eye_z, target_x, "
                     "target_y, target_z, optionally up_x, up_y, up_z and gaze_x, gaze_y (pixels)")
-        ->type_name("orbit:D[:N]|FILE.csv");
+        ->type_name("orbit:D[:N]|walk[:V[:N]]|FILE.csv");
     group.add_option("--csv", o.csv, "One line a frame: triangles, changes, node tests, times, uploaded bytes")
         ->type_name("FILE.csv");
     group.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
@@ -267,7 +269,9 @@ void add_level_options(CLI::App& verb, RenderArguments& a) {
                     "Levels of each mesh at most, the whole one included (default: 6)")
         ->type_name("N")
         ->check(whole(1, session::most_levels));
-    group.add_option("--layers", control.layers, "Of perceptual: layers of depth at most (default: 5)")
+    group
+        .add_option("--layers", control.layers,
+                    "Of perceptual, and of --masking scene: layers of depth at most (default: 5)")
         ->type_name("N")
         ->check(whole(1, render::most_layers));
     add_choice<session::MapRecipe, session::MapRecipe>(
@@ -330,12 +334,17 @@ Command render_command(CLI::App& app) {
                                                  verb->get_option("--map-block"), verb->get_option("--half-floats"),
                                                  verb->get_option("--fade")};
     verb->callback([a, samples, frames_a_second, of_levels] {
+        a->what.layers = a->levels.control.layers;
+        const bool is_still = a->show.map || a->show.levels || !parse_pattern(a->out);
+        if (a->flight.path.empty() && !is_still) a->flight.path = "walk";
         const bool has_levels = a->method != Method::tree;
         for (std::size_t i = 0; i < of_levels.size(); ++i) {
             const bool is_of_all = i == 1 || i + 1 == of_levels.size();
-            const bool fits = i == 0      ? a->method == Method::distance || a->method == Method::area
-                              : is_of_all ? has_levels
-                                          : a->method == Method::perceptual;
+            const bool is_of_masking = i == 2 && a->what.masks;
+            const bool fits = is_of_masking ? true
+                              : i == 0      ? a->method == Method::distance || a->method == Method::area
+                              : is_of_all   ? has_levels
+                                            : a->method == Method::perceptual;
             if (!of_levels[i]->empty() && !fits)
                 refuse(of_levels[i]->get_name() + (i == 0      ? " needs --method distance or area."
                                                    : is_of_all ? " needs --method."
@@ -357,7 +366,7 @@ Command render_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what);
+    add_visibility_option(*verb, a->what, false);
     add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer(
         "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"

@@ -243,7 +243,11 @@ protected:
         return std::move(*made);
     }
 
-    vdtree::VertexTree tree = support::measured(support::built(shapes::bumpy_sphere(5, 0.02)));
+    static const vdtree::VertexTree& measured_ball() {
+        static const vdtree::VertexTree ball = support::measured(support::built(shapes::bumpy_sphere(5, 0.02)));
+        return ball;
+    }
+    vdtree::VertexTree tree = measured_ball().share();
     vdtree::View view = view_of(512);
     perception::FoldTestOptions options;
 };
@@ -326,7 +330,8 @@ Mesh rough_ball() {
 class MaskedSceneTest : public render::testing::GlTest {
 protected:
     static Session session_of(std::optional<Mesh> around) {
-        Scene scene = Scene::of(support::measured(support::built(rough_ball())));
+        static const vdtree::VertexTree ball = support::measured(support::built(rough_ball()), 0);
+        Scene scene = Scene::of(ball.share());
         if (around) scene.backdrop.push_back({support::built(*around, {.prelit = true})});
         return *Session::create(std::move(scene));
     }
@@ -391,8 +396,8 @@ TEST_F(MaskedSceneTest, DoesNotCountForGazesThatAreUnsure) {
     session.set_gaze(Gaze{{20, 20}, 1});
     const auto made = simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, masked);
     ASSERT_TRUE(made);
-    const auto effect = std::ranges::find(made->effects, "masking", &Effect::name);
-    ASSERT_NE(effect, made->effects.end());
+    const auto effect = std::ranges::find(made->passes, "masking", &PassEffect::name);
+    ASSERT_NE(effect, made->passes.end());
     EXPECT_FALSE(effect->on);
     EXPECT_THAT(effect->why, HasSubstr("not known for sure"));
     EXPECT_EQ(made->stats.triangles,
@@ -405,7 +410,7 @@ class PassesTest : public MaskedSceneTest {
 protected:
     // A second ball far behind, if wanted, and what stands around; lit by a sun, which casts shadows or none.
     static Session session_of(bool has_second, std::optional<Mesh> around, std::optional<bool> casts = {}) {
-        const vdtree::VertexTree ball = support::measured(support::built(shapes::bumpy_sphere(4, 0.01)));
+        static const vdtree::VertexTree ball = support::measured(support::built(shapes::bumpy_sphere(4, 0.01)));
         Scene scene = Scene::of(ball.share());
         if (has_second) scene.objects.push_back({ball.share(), {.translation = {1, 0, -60}}, "far"});
         if (around) scene.backdrop.push_back({support::built(*around, {.prelit = !casts.has_value()})});

@@ -116,6 +116,19 @@ TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
     }
 }
 
+TEST_F(RenderCommandTest, ANumberedPictureWithoutAPathIsAWalk) {
+    const Outcome still = run({"render", "ball.vdt", "--path", "walk:-600:5", "--no-draw", "--csv", "walk.csv"});
+    ASSERT_EQ(still.status, 0) << still.err;
+    const auto rows = numbers_of(read_text(path("walk.csv")));
+    ASSERT_EQ(rows.size(), 5u);
+    EXPECT_NE(rows[4][1], rows[0][1]) << "40 m farther away";
+    const Outcome numbered = run({"render", "ball.vdt", "-o", "walk/%02d.png", "--size", "24x24"});
+    ASSERT_EQ(numbered.status, 0) << numbered.err;
+    EXPECT_TRUE(std::filesystem::exists(path("walk/59.png")));
+    for (const char* none : {"walk:", "walk:x", "walk:1:0", "walk:1:2:3", "walk:nan"})
+        EXPECT_THAT(run({"render", "ball.vdt", "--path", none, "--no-draw"}).err, HasSubstr("METRES_A_SECOND")) << none;
+}
+
 TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
     const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
                                "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"});
