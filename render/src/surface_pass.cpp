@@ -31,8 +31,8 @@ enum UniformLocation {
     shadow_lights_location = 96,
     shadow_kinds_location = 100,
     world_from_unit_location = 104,
-    compared_location = 70,
-    stipple_location = 71,
+    compared_location = 110,
+    stipple_location = 111,
 };
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
