@@ -34,16 +34,31 @@ std::vector<std::pair<const session::Effect*, std::size_t>> merged(std::span<con
 Json to_json(const session::Report& s, double draw_ms) {
     const double cost = vdtree::is_unbounded(s.stats.max_fold_cost) ? std::numeric_limits<double>::infinity()
                                                                     : static_cast<double>(s.stats.max_fold_cost);
-    return {{"source_triangles", s.source_triangles},
-            {"triangles", s.stats.triangles},
-            {"dropped", s.dropped},
-            {"node_tests", s.stats.node_tests},
-            {"adapt_ms", number_or_null(s.adapt_ms)},
-            {"extract_ms", number_or_null(s.extract_ms)},
-            {"draw_ms", number_or_null(draw_ms)},
-            {"imperceptible_from_m", number_or_null(s.imperceptible_from_m)},
-            {"max_fold_cost", number_or_null(cost)},
-            {"effects", to_json(s.effects)}};
+    Json json = {{"source_triangles", s.source_triangles},
+                 {"triangles", s.stats.triangles},
+                 {"dropped", s.dropped},
+                 {"node_tests", s.stats.node_tests},
+                 {"adapt_ms", number_or_null(s.adapt_ms)},
+                 {"extract_ms", number_or_null(s.extract_ms)},
+                 {"draw_ms", number_or_null(draw_ms)},
+                 {"imperceptible_from_m", number_or_null(s.imperceptible_from_m)},
+                 {"max_fold_cost", number_or_null(cost)},
+                 {"effects", to_json(s.effects)}};
+    if (!s.passes.empty()) json["passes"] = to_json(s.passes);
+    return json;
+}
+
+Json to_json(std::span<const session::PassEffect> effects) {
+    Json list = Json::array();
+    for (const session::PassEffect& e : effects)
+        list.push_back({{"name", e.name},
+                        {"on", e.on},
+                        {"why", e.why},
+                        {"surface_passes", e.surface_passes},
+                        {"full_screen_passes", e.full_screen_passes},
+                        {"texture_bytes", e.texture_bytes},
+                        {"ms", e.milliseconds}});
+    return list;
 }
 
 void add_scene(Json& json, const session::Session& session, std::span<const vdtree::Cut> cuts) {
@@ -123,6 +138,14 @@ void print_details(const session::Report& s, double draw_ms) {
     print_table(rows);
     print_line("effects");
     print(s.effects);
+    if (s.passes.empty()) return;
+    print_line("pictures drawn for it");
+    for (const session::PassEffect& e : s.passes)
+        print_line("  " + e.name + (e.on ? ": on, " : ": off, ") + e.why +
+                   (e.surface_passes == 0
+                        ? std::string()
+                        : "; " + grouped(static_cast<std::uint64_t>(e.surface_passes)) + " drawings, " +
+                              file_size(e.texture_bytes) + ", " + duration(e.milliseconds)));
 }
 
 Json to_json(std::span<const session::Effect> effects) {

@@ -33,6 +33,7 @@ void add_scene(Json& json, const session::Session& session, std::span<const vdtr
 void print_scene(const session::Session& session);
 
 Json to_json(std::span<const session::Effect> effects);
+Json to_json(std::span<const session::PassEffect> effects);
 void print(std::span<const session::Effect> effects);
 
 } // namespace unseen::app

@@ -16,6 +16,8 @@ constexpr OptionName option_names[] = {
     {"observer.csf = ", "--csf "},
     {"request.fold_test", "--fold-test"},
     {"request.chroma", "--chroma"},
+    {"request.masking", "--masking scene"},
+    {"request.shown", "--visibility picture"},
     {"request.goal.triangles", "--triangles"},
     {"request.goal.pixels", "--pixels"},
     {"request.goal.fill", "--fill-budget"},

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <calibration/light_rig.h>
 #include <gmock/gmock.h>
 #include <perception/judge.h>
 #include <perception/judge_tables.h>
@@ -396,6 +397,128 @@ TEST_F(MaskedSceneTest, DoesNotCountForGazesThatAreUnsure) {
     EXPECT_THAT(effect->why, HasSubstr("not known for sure"));
     EXPECT_EQ(made->stats.triangles,
               simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, unmasked)->stats.triangles);
+}
+
+// ---- what is drawn for it
+
+class PassesTest : public MaskedSceneTest {
+protected:
+    // A second ball far behind, if wanted, and what stands around; lit by a sun, which casts shadows or none.
+    static Session session_of(bool has_second, std::optional<Mesh> around, std::optional<bool> casts = {}) {
+        const vdtree::VertexTree ball = support::measured(support::built(shapes::bumpy_sphere(4, 0.01)));
+        Scene scene = Scene::of(ball.share());
+        if (has_second) scene.objects.push_back({ball.share(), {.translation = {1, 0, -60}}, "far"});
+        if (around) scene.backdrop.push_back({support::built(*around, {.prelit = !casts.has_value()})});
+        if (casts) {
+            vdtree::LightSource sun;
+            sun.direction = glm::normalize(glm::dvec3(0.3, 0.5, 1));
+            sun.intensity = 0.7;
+            sun.casts_shadow = *casts;
+            scene.lights = *calibration::LightRig::of({.lights = {sun}, .ambient = 0.2}, "a sun");
+        }
+        return *Session::create(std::move(scene));
+    }
+    std::vector<PassEffect> passes(Session& session, AsSeenOptions options = {.masking = Masking::scene}) {
+        options.samples = 4;
+        const auto made = simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, options);
+        EXPECT_TRUE(made) << made.error().message;
+        for (const PassEffect& effect : made->passes) {
+            EXPECT_FALSE(effect.why.empty()) << effect.name;
+            const bool was_drawn = effect.surface_passes > 0;
+            EXPECT_EQ(was_drawn, effect.texture_bytes > 0) << effect.name;
+            EXPECT_EQ(was_drawn, effect.milliseconds > 0) << effect.name;
+        }
+        return made->passes;
+    }
+    static const PassEffect& of(const std::vector<PassEffect>& passes, const char* name) {
+        return *std::ranges::find(passes, name, &PassEffect::name);
+    }
+    static constexpr std::uint64_t pixels = side * side;
+};
+
+TEST_F(PassesTest, OfOneObjectAloneAreThoseOfItsDepths) {
+    Session session = session_of(false, std::nullopt);
+    const auto all = passes(session);
+    EXPECT_TRUE(of(all, "occlusion").on);
+    EXPECT_EQ(of(all, "occlusion").surface_passes, 4);
+    EXPECT_EQ(of(all, "occlusion").texture_bytes, 4 * pixels);
+    for (const char* off : {"layers", "masking", "shadows"}) {
+        EXPECT_FALSE(of(all, off).on) << off;
+        EXPECT_EQ(of(all, off).surface_passes + of(all, off).full_screen_passes, 0) << off;
+    }
+    EXPECT_THAT(of(all, "masking").why, HasSubstr("nothing around"));
+}
+
+TEST_F(PassesTest, AreNoneWhereNothingIsAskedFor) {
+    Session session = session_of(true, grate(12, 1.5), true);
+    EXPECT_THAT(passes(session, {.folds_hidden = false}), ::testing::IsEmpty());
+}
+
+TEST_F(PassesTest, OfMaskingAreTwoPicturesALayerLess) {
+    for (const bool has_second : {false, true}) { // one layer, and two
+        Session session = session_of(has_second, grate(12, 1.5));
+        const auto all = passes(session);
+        EXPECT_EQ(of(all, "layers").on, has_second);
+        EXPECT_TRUE(of(all, "masking").on);
+        EXPECT_EQ(of(all, "masking").surface_passes, has_second ? 12 : 8);
+        EXPECT_GT(of(all, "masking").full_screen_passes, 10);
+        EXPECT_FALSE(of(all, "shadows").on);
+    }
+}
+
+TEST_F(PassesTest, GoByTheGazeWithTheSamePictures) {
+    Session session = session_of(false, grate(12, 1.5));
+    const int without = of(passes(session), "masking").full_screen_passes;
+    session.set_gaze(Gaze{{20, 20}, 0});
+    EXPECT_EQ(of(passes(session), "masking").full_screen_passes, without);
+    session.set_gaze(Gaze{{20, 20}, 2});
+    EXPECT_THAT(of(passes(session), "masking").why, HasSubstr("not known for sure"));
+    EXPECT_EQ(of(passes(session), "masking").surface_passes, 0);
+}
+
+TEST_F(PassesTest, MaskNothingOfWhatMovesOverTheRetina) {
+    Session session = session_of(false, grate(12, 1.5));
+    session.set_velocity(perception::DegreesPerSecond(5));
+    const auto all = passes(session);
+    EXPECT_FALSE(of(all, "masking").on);
+    EXPECT_EQ(of(all, "masking").surface_passes, 0);
+    EXPECT_THAT(of(all, "masking").why, HasSubstr("over the retina"));
+}
+
+TEST_F(PassesTest, OfShadowsAreThereWhereALightCastsSome) {
+    Session dark = session_of(false, grate(12, 1.5), false), cast = session_of(false, grate(12, 1.5), true);
+    const auto without = passes(dark), with = passes(cast);
+    EXPECT_FALSE(of(without, "shadows").on);
+    EXPECT_EQ(of(without, "shadows").texture_bytes, 0u);
+    EXPECT_TRUE(of(with, "shadows").on);
+    EXPECT_EQ(of(with, "shadows").surface_passes, 1);
+    EXPECT_GT(of(with, "shadows").texture_bytes, 0u);
+}
+
+TEST_F(PassesTest, AllOfThemWhereAllIsCalledFor) {
+    Session session = session_of(true, grate(12, 1.5), true);
+    for (const PassEffect& effect : passes(session)) EXPECT_TRUE(effect.on) << effect.name << ": " << effect.why;
+}
+
+TEST_F(PassesTest, AreDrawnOnceForACameraThatStandsStill) {
+    Session session = session_of(true, grate(12, 1.5), true);
+    const auto made = session.simplify(view(), {.purpose = Purpose::picture});
+    auto renderer = SceneRenderer::create(context(), session);
+    render::DrawOptions options;
+    options.samples = 1;
+    for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(renderer->draw(drawn_cuts(made->cuts), view(), options));
+    EXPECT_EQ(renderer->shadows()->redraws, 1u);
+    Follower follower(session);
+    ASSERT_TRUE(follower.follow(view(), {.purpose = Purpose::picture}));
+    EXPECT_EQ(follower.follow(view(), {.purpose = Purpose::picture})->stats.node_tests, 0u);
+}
+
+TEST_F(PassesTest, MaskingThatIsNotWorthItLeavesTheFoldTestAlone) {
+    Session session = session_of(false, shapes::placed(shapes::cube(4), 30, {0, 0, -50})); // an even wall far behind
+    const auto all = passes(session);
+    EXPECT_FALSE(of(all, "masking").on);
+    EXPECT_GT(of(all, "masking").surface_passes, 0); // to find that out
+    EXPECT_THAT(of(all, "masking").why, HasSubstr("too little"));
 }
 
 } // namespace

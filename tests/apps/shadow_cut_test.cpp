@@ -175,7 +175,7 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     if (std::string(setting.name) != "NearShadow") return;
     auto unaware = session::Session::create(scene_of(setting, ball, ground, false));
     ASSERT_TRUE(unaware);
-    const auto for_eye = unaware->simplify(view, {.purpose = session::Purpose::mesh});
+    const auto for_eye = unaware->simplify(view, {.purpose = session::Purpose::picture});
     ASSERT_TRUE(for_eye);
     EXPECT_LT(for_eye->stats.triangles, cut->stats.triangles);
     const perception::Judgement seen = judged(for_eye->cuts);

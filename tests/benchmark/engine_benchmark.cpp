@@ -56,8 +56,8 @@ private:
         return test;
     }
     vdtree::DistanceCriterion make(bool by_errors) const {
-        return *(by_errors ? perception::error_distances : perception::luebke_hallen_distances)(tree, orbit(tree, 0),
-                                                                                                options);
+        return by_errors ? *perception::error_distances(tree, orbit(tree, 0), options)
+                         : *perception::luebke_hallen_distances(tree, orbit(tree, 0), options);
     }
 };
 

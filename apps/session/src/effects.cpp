@@ -215,8 +215,10 @@ Effect distance_effect(const Decision& decision, const std::optional<CutFacts>& 
 
 Effect back_face_effect(const Sight& sight, Purpose purpose) {
     if (purpose == Purpose::mesh) return {"back-face folding", false, "the mesh may be looked at from elsewhere"};
-    if (casts_shadows(sight)) return {"back-face folding", false, may_cast};
-    if (culls_back_faces(sight)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
+    if (culls_back_faces(sight))
+        return {"back-face folding", true,
+                casts_shadows(sight) ? "what faces away is folded, but for outlines whose shadows would move visibly"
+                                     : "what faces away is not drawn, so it is folded"};
     if (sight.object.tree.closedness() == vdtree::Closedness::open)
         return {"back-face folding", false, "the surface is open"};
     if (is_translucent(sight)) return {"back-face folding", false, "what faces away may show through"};

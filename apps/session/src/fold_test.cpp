@@ -217,7 +217,7 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
     vdtree::FollowOptions options;
     options.threshold = static_cast<float>(request.threshold);
     options.milliseconds = request.milliseconds;
-    options.cull_back_faces = request.purpose == Purpose::picture && !casts_shadows(sight) && culls_back_faces(sight);
+    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {
         options.triangle_budget = request.goal.triangles;
         options.fill_budget = request.goal.fill;

@@ -257,13 +257,18 @@ Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterio
     const std::size_t rows = parts.switch_distance.size() / parts.eccentricity_bins;
     constexpr std::size_t most_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
     if (rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
+    if (parts.facing.empty())
+        for (NodeId node = 0; node < nodes; ++node) parts.facing.push_back(tree.bounds()[node].slabs);
     parts.classes.resize(nodes); // empty: the first row for all
     parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
                                  DistanceCriterion::always_visible);
     if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
     const auto everywhere = static_cast<std::uint16_t>(rows);
     for (NodeId node = 0; node < nodes; ++node)
-        if (is_kept(node)) parts.classes[node] = {everywhere, everywhere};
+        if (is_kept(node)) { // whatever faces the eye
+            parts.classes[node] = {everywhere, everywhere};
+            parts.facing[node] = NormalSlabs::everything();
+        }
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

@@ -1,122 +1,127 @@
-// One drawing for the depths, and one for each picture that masks: of the scene, and of it without each layer's objects.
+// Decides what a view calls for, draws that, and simplifies by it.
 #include <session_gpu/as_seen.h>
 
 #include <algorithm>
-#include <span>
+#include <chrono>
 #include <utility>
-#include <vector>
 
-#include <perception/judge_tables.h>
+#include <perception/motion.h>
 #include <render/depth.h>
-#include <render/layers.h>
-#include <render/sample_sum.h>
-#include <session_gpu/gpu_judge.h>
 #include <session_gpu/scene_renderer.h>
+
+#include "scene_masks.h"
 
 namespace unseen::session {
 namespace {
 
-// People differ in how much they see of a masker, too, and models of sight do. Changes are looked for by the observer, and
-// maskers count as for somebody who sees half as much: of the default observer, as for the median person.
-constexpr double maskers_gain = 0.5;
+// Where thresholds rise in a smaller share of all cells and bands than this, a fold test by them keeps about as many
+// triangles, and is not made.
+constexpr float least_masked_share = 0.02f;
 
-// All but one layer's objects.
-std::vector<render::Item> without_layer(const SceneItems& scene, const std::vector<int>& layer_of, int layer) {
-    std::vector<render::Item> rest;
-    for (std::size_t i = 0; i < scene.items.size(); ++i)
-        if (i >= scene.objects.size() || layer_of[scene.objects[i]] != layer) rest.push_back(scene.items[i]);
-    return rest;
+using Clock = std::chrono::steady_clock;
+double ms_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-// What pictures of a view mask, for this observer.
-class Masks {
-public:
-    static Result<Masks> create(const Session& session, const render::Context& context, const vdtree::View& view,
-                                int samples) {
-        const perception::Display& display = session.observer().display;
-        const double black = perception::to_luminance(display, 0).value(),
-                     white = perception::to_luminance(display, 1).value();
-        perception::JudgeOptions judging = judge_options(session.observer());
-        judging.gain *= maskers_gain;
-        auto tables = perception::judge_tables(view.width, view.height, static_cast<float>(black),
-                                               static_cast<float>(white), judging);
-        if (!tables) return tables.error();
-        auto sum = render::SampleSum::create(context, view.width, view.height);
-        if (!sum) return sum.error();
-        return Masks(context, view, {.samples = samples, .background = session.background()}, std::move(*tables),
-                     std::move(*sum), black, white);
-    }
+// Why pictures tell nothing about the folds of a simplification; null where they do.
+const char* why_pictures_tell_nothing(const Session& session, const Request& request, const Simplification& made) {
+    if (request.goal.kind == Goal::Kind::full) return "nothing is folded in the full model";
+    if (made.fold_tests.empty()) return "there is no object";
+    if (!is_perceptual(made.fold_tests.front())) return "the fold test counts pixels, seen or not";
+    if (session.scene().lights &&
+        std::ranges::any_of(made.fold_tests, [](FoldTest test) { return test != FoldTest::error; }))
+        return "under lights only the fold test error goes by pictures";
+    return nullptr;
+}
 
-    // Shadows are those of the whole scene, whatever is drawn.
-    Result<perception::Elevations> of(std::span<const render::Item> items, render::Shadows* shadows) {
-        sampling_.shadows = shadows;
-        if (auto drawn = sum_.draw(items, view_, sampling_); !drawn) return drawn.error();
-        render::LuminanceTexture picture = sum_.mean_luminance();
-        picture.scale *= static_cast<float>(white_ - black_);
-        picture.offset = static_cast<float>(black_ + static_cast<double>(picture.offset) * (white_ - black_));
-        if (!passes_) {
-            auto made = render::VisibilityPasses::create(context_, visibility_tables(tables_), picture);
-            if (!made) return made.error();
-            passes_ = std::move(*made);
-        } else if (auto set = passes_->set_reference(picture); !set) {
-            return set.error();
-        }
-        if (auto mapped = passes_->map_elevations(); !mapped) return mapped.error();
-        auto grid = passes_->read_elevations();
-        if (!grid) return grid.error();
-        perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
-        for (const perception::JudgeTables::Band& band : tables_.bands) elevations.bands.push_back(band.nominal);
-        return elevations;
+const char* why_nothing_masks(const Session& session, const Simplification& made, const AsSeenOptions& options) {
+    if (options.masking == Masking::none) return "it is not asked for";
+    if (std::ranges::none_of(made.fold_tests, [](FoldTest test) { return test == FoldTest::error; }))
+        return "only the fold test error knows it";
+    const Observer& observer = session.observer();
+    if (observer.gaze && observer.gaze->margin_deg > 0) return "the gaze is not known for sure";
+    if (observer.velocity > perception::least_velocity) return "what moves over the retina masks otherwise";
+    if (session.scene().objects.size() == 1 && session.scene().backdrop.empty())
+        return "there is one object, and nothing around it";
+    return nullptr;
+}
+
+PassEffect shadow_effect(SceneRenderer& renderer) {
+    const auto facts = renderer.shadows();
+    if (!facts) return {"shadows", false, "no light casts a shadow"};
+    return {"shadows",     true, std::to_string(facts->lights) + (facts->lights == 1 ? " light casts" : " lights cast"),
+            facts->maps,   0,    facts->bytes,
+            facts->draw_ms};
+}
+
+// What pictures of one simplification say, for the next one.
+class Pictures {
+public:
+    Pictures(Session& session, const render::Context& context, const vdtree::View& view, const AsSeenOptions& options)
+        : session_(session), context_(context), view_(view), options_(options) {}
+
+    // Fills in what the request is to go by.
+    Result<void> draw(const Simplification& made, Request& request) {
+        auto renderer = SceneRenderer::create(context_, session_);
+        if (!renderer) return renderer.error();
+        const auto scene = renderer->items(drawn_cuts(made.cuts), view_);
+        if (!scene) return scene.error();
+        if (auto found = find_hidden(*scene, request); !found) return found;
+        if (auto found = find_masked(made, *scene, request); !found) return found;
+        effects_.push_back(shadow_effect(*renderer));
+        return {};
     }
+    std::vector<PassEffect> take_effects() { return std::move(effects_); }
 
 private:
-    Masks(const render::Context& context, const vdtree::View& view, const render::Sampling& sampling,
-          perception::JudgeTables tables, render::SampleSum sum, double black, double white)
-        : context_(context), view_(view), sampling_(sampling), tables_(std::move(tables)), sum_(std::move(sum)),
-          black_(black), white_(white) {}
+    Result<void> find_hidden(const SceneItems& scene, Request& request) {
+        if (!options_.folds_hidden) {
+            effects_.push_back({"occlusion", false, "it is not asked for"});
+            return {};
+        }
+        const auto start = Clock::now();
+        const auto depths = render::farthest_depth(context_, scene.items, view_, options_.samples);
+        if (!depths) return depths.error();
+        auto shown = vdtree::DepthPicture::create(view_, *depths);
+        if (!shown) return shown.error();
+        request.shown = std::move(*shown);
+        constexpr std::uint64_t depth_bytes = 4;
+        effects_.push_back({"occlusion", true, "what lies behind what the view shows is folded", options_.samples, 0,
+                            depth_bytes * depths->size(), ms_since(start)});
+        return {};
+    }
 
+    Result<void> find_masked(const Simplification& made, const SceneItems& scene, Request& request) {
+        if (const char* why = why_nothing_masks(session_, made, options_)) {
+            effects_.push_back({"layers", false, "nothing is masked"});
+            effects_.push_back({"masking", false, why});
+            return {};
+        }
+        const auto start = Clock::now();
+        const auto split = split_objects(session_, view_, options_.layers);
+        if (!split) return split.error();
+        const bool has_layers = split->count > 1;
+        auto masks = find_masks(session_, context_, scene, view_, *split, options_.samples);
+        if (!masks) return masks.error();
+        const bool is_worth_it = masks->largest_share >= least_masked_share;
+        if (is_worth_it) request.masking = std::move(masks->of_objects);
+        effects_.push_back({"layers", has_layers,
+                            has_layers ? "objects are in " + std::to_string(split->count) + " layers of depth"
+                                       : "all objects are in one layer"});
+        // The maps are what was drawn to find out, also where they turn out to be of no use.
+        effects_.push_back({"masking", is_worth_it,
+                            is_worth_it ? "the scene raises thresholds of what folds change"
+                                        : "the scene masks too little to be worth another fold test",
+                            masks->surface_passes, masks->full_screen_passes, masks->texture_bytes, ms_since(start)});
+        return {};
+    }
+
+    Session& session_;
     const render::Context& context_;
     const vdtree::View& view_;
-    render::Sampling sampling_;
-    perception::JudgeTables tables_;
-    render::SampleSum sum_;
-    std::optional<render::VisibilityPasses> passes_ = {};
-    double black_, white_; // cd/m2
+    const AsSeenOptions& options_;
+    std::vector<PassEffect> effects_;
 };
-
-Result<render::LayerSplit> layers_of(const Session& session, const vdtree::View& view, int layers) {
-    std::vector<glm::dvec3> centres;
-    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) {
-        const vdtree::VertexTree& tree = session.tree(i);
-        centres.push_back(
-            session.scene().objects[i].placement.to_world(tree.origin() + glm::dvec3(tree.bounding_sphere().centre)));
-    }
-    return render::split_into_layers(centres, view, layers);
-}
-
-// By object. What one layer masks is the same for all its objects.
-Result<std::vector<perception::MaskingPicture>> masking_of(const Session& session, const render::Context& context,
-                                                           const SceneItems& drawn, const vdtree::View& view,
-                                                           const AsSeenOptions& options) {
-    const auto split = layers_of(session, view, options.layers);
-    if (!split) return split.error();
-    auto masks = Masks::create(session, context, view, options.samples);
-    if (!masks) return masks.error();
-    auto whole = masks->of(drawn.items, drawn.shadows);
-    if (!whole) return whole.error();
-    std::vector<perception::MaskingPicture> by_layer;
-    for (int layer = 0; layer < std::max(split->count, 1); ++layer) {
-        auto rest = masks->of(without_layer(drawn, split->layer_of, layer), drawn.shadows);
-        if (!rest) return rest.error();
-        const perception::Elevations both[] = {*whole, std::move(*rest)};
-        auto masking = perception::MaskingPicture::create(view, both);
-        if (!masking) return masking.error();
-        by_layer.push_back(std::move(*masking));
-    }
-    std::vector<perception::MaskingPicture> of_objects;
-    for (const int layer : split->layer_of) of_objects.push_back(by_layer[static_cast<std::size_t>(layer)]);
-    return of_objects;
-}
 
 } // namespace
 
@@ -127,28 +132,20 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.masking.clear();
     auto all = session.simplify(view, request);
     if (!all) return all;
-    const bool can_tell = request.goal.kind != Goal::Kind::full && !all->fold_tests.empty() &&
-                          is_perceptual(all->fold_tests.front()) &&
-                          (!session.scene().lights ||
-                           std::ranges::all_of(all->fold_tests, [](FoldTest test) { return test == FoldTest::error; }));
-    if (!can_tell || (!options.folds_hidden && options.masking == Masking::none)) return all;
-    auto renderer = SceneRenderer::create(context, session);
-    if (!renderer) return renderer.error();
-    const auto drawn = renderer->items(drawn_cuts(all->cuts), view);
-    if (!drawn) return drawn.error();
-    if (options.folds_hidden) {
-        const auto depths = render::farthest_depth(context, drawn->items, view, options.samples);
-        if (!depths) return depths.error();
-        auto shown = vdtree::DepthPicture::create(view, *depths);
-        if (!shown) return shown.error();
-        request.shown = std::move(*shown);
+    if (const char* why = why_pictures_tell_nothing(session, request, *all)) {
+        for (const char* effect : {"occlusion", "layers", "masking", "shadows"})
+            all->passes.push_back({effect, false, why});
+        return all;
     }
-    if (options.masking == Masking::scene) {
-        auto masking = masking_of(session, context, *drawn, view, options);
-        if (!masking) return masking.error();
-        request.masking = std::move(*masking);
+    Pictures pictures(session, context, view, options);
+    if (options.folds_hidden || options.masking != Masking::none)
+        if (const auto drawn = pictures.draw(*all, request); !drawn) return drawn.error();
+    if (request.shown || !request.masking.empty()) {
+        all = session.simplify(view, request);
+        if (!all) return all;
     }
-    return session.simplify(view, request);
+    all->passes = pictures.take_effects();
+    return all;
 }
 
 } // namespace unseen::session

@@ -3,12 +3,24 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <session/plan.h>
 #include <vdtree/cut.h>
 
 namespace unseen::session {
+
+// Something that pictures are drawn for: whether it was called for, why, and what it took. What was not has no pass and
+// no texture.
+struct PassEffect {
+    std::string name;
+    bool on = false;
+    std::string why = {};
+    int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, a sample each; of planes
+    std::uint64_t texture_bytes = 0;                // on the GPU, at most at a time
+    double milliseconds = 0;                        // of wall-clock time
+};
 
 // Of all objects together.
 struct Report {
@@ -20,6 +32,7 @@ struct Report {
     double imperceptible_from_m = 0; // infinite: from nowhere; NaN: the fold test does not know
     std::vector<FoldTest> fold_tests = {}; // by object
     std::vector<Effect> effects = {};
+    std::vector<PassEffect> passes = {}; // of simplify_as_seen() of <session_gpu/as_seen.h>
     // With geomorphs.
     std::optional<vdtree::Index> drawn_triangles = {}; // those that wait to be folded included
     std::size_t gliding = 0;                           // vertices that are on their way

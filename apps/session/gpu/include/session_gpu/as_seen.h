@@ -23,6 +23,10 @@ struct AsSeenOptions {
 // The simplification of a picture of this view, and of no other. The session's own simplification is drawn first, for
 // what it shows. `request.purpose` counts as picture.
 //
+// What the view does not call for is not drawn: Report::passes says what was, why, and what it took. Nothing is masked
+// where there is one object and nothing around it, for gazes that are not known for sure, and where everything moves over
+// the retina; where the scene masks too little, no other fold test is made.
+//
 // It is the session's own simplification for the full model, by tests that count pixels, and under lights by other tests
 // than `error`. Cost: two simplifications, so many drawings, with masking as many more for each layer, and the trees on
 // the GPU meanwhile. Fails as Session::simplify() and drawing do.
