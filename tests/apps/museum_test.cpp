@@ -1,7 +1,9 @@
 // What bars mask: a statue in a museum, behind a gate of bars or in the shadow of bars in a window. Levels by the pipeline
 // of Drettakis and others (their figure 1), and cuts of the vertex tree.
 #include <cstdint>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -29,10 +31,10 @@ protected:
         vdtree::View view;
     };
 
-    static Museum museum(MuseumBars bars, double bars_per_metre) {
+    static Museum museum(MuseumBars bars, double bars_per_metre, std::uint64_t triangles = 20'000) {
         const support::TempFolder folder;
         const auto file = folder / "museum.glb";
-        EXPECT_TRUE(app::make_scene(file, {.triangles = 20'000, .bars_per_metre = bars_per_metre, .bars = bars}));
+        EXPECT_TRUE(app::make_scene(file, {.triangles = triangles, .bars_per_metre = bars_per_metre, .bars = bars}));
         auto scene = Scene::load(file, {.as = LoadAs::scene});
         EXPECT_TRUE(scene);
         Museum made{*Session::create(std::move(*scene)), {}};
@@ -43,6 +45,12 @@ protected:
 
     // The statue's level, of 0 to 5, by rpg99's maps.
     int level(MuseumBars bars, double bars_per_metre = 8) {
+        static std::map<std::pair<MuseumBars, double>, int> known; // two tests ask for some
+        const auto [found, is_new] = known.try_emplace({bars, bars_per_metre}, 0);
+        if (is_new) found->second = settled_level(bars, bars_per_metre);
+        return found->second;
+    }
+    int settled_level(MuseumBars bars, double bars_per_metre) {
         Museum in = museum(bars, bars_per_metre);
         auto control = LevelControl::create(context(), in.session, in.view, {.maps = MapRecipe::rpg99});
         EXPECT_TRUE(control) << control.error().message;
@@ -67,28 +75,24 @@ protected:
         return image;
     }
 
-    // Triangles of the statue's cut, of which nobody sees anything, with the scene's masking and without.
+    // Triangles of the statue's cut for a picture, of which nobody sees anything.
     struct Kept {
-        std::uint64_t masked = 0, unmasked = 0;
+        double masked = 0, unmasked = 0;
     };
-    Kept kept(MuseumBars bars, double bars_per_metre = 8) {
-        Museum in = museum(bars, bars_per_metre);
-        Kept result;
-        const auto full = in.session.simplify(in.view, {.goal = Goal::full(), .purpose = Purpose::picture});
-        EXPECT_TRUE(full) << full.error().message;
-        const perception::Image whole = picture(in, full->cuts);
-        for (const Masking masking : {Masking::none, Masking::scene}) {
-            const auto made = simplify_as_seen(in.session, context(), in.view, {.purpose = Purpose::picture},
-                                               {.folds_hidden = false, .masking = masking});
-            EXPECT_TRUE(made) << made.error().message;
-            (masking == Masking::none ? result.unmasked : result.masked) = made->stats.triangles;
-            const auto judged = perception::judge_modern(
-                whole, picture(in, made->cuts),
-                {.display = in.session.observer().display, .gain = in.session.observer().person.gain});
-            EXPECT_TRUE(judged);
-            EXPECT_EQ(judged->visible_pixels, 0u) << judged->max_ratio << " at " << bars_per_metre << " bars a metre";
-        }
-        return result;
+    Kept kept(MuseumBars bars, double bars_per_metre) {
+        Museum in = museum(bars, bars_per_metre, 100'000);
+        const auto unmasked = in.session.simplify(in.view, {.purpose = Purpose::picture});
+        const auto masked = simplify_as_seen(in.session, context(), in.view, {.purpose = Purpose::picture},
+                                             {.folds_hidden = false, .masking = Masking::scene});
+        EXPECT_TRUE(unmasked && masked);
+        std::vector<vdtree::Cut> full;
+        full.emplace_back(in.session.tree(0)).unfold_all();
+        const auto judged = perception::judge_modern(
+            picture(in, full), picture(in, masked->cuts),
+            {.display = in.session.observer().display, .gain = in.session.observer().person.gain});
+        EXPECT_TRUE(judged);
+        EXPECT_EQ(judged->visible_pixels, 0u) << judged->max_ratio << " at " << bars_per_metre << " bars a metre";
+        return {static_cast<double>(masked->stats.triangles), static_cast<double>(unmasked->stats.triangles)};
     }
 };
 
@@ -96,7 +100,7 @@ TEST_F(MuseumTest, TheFinerTheBarsBeforeTheStatueTheCoarserItsLevel) {
     const int without = level(MuseumBars::none);
     int before = level(MuseumBars::gate, 1);
     EXPECT_EQ(before, without);
-    for (const double bars_per_metre : {4.0, 12.0, 32.0}) {
+    for (const double bars_per_metre : {12.0, 32.0}) {
         const int now = level(MuseumBars::gate, bars_per_metre);
         EXPECT_GE(now, before) << bars_per_metre;
         before = now;
@@ -108,7 +112,7 @@ TEST_F(MuseumTest, TheFinerTheBarsShadowsTheCoarserTheLevel) {
     const int without = level(MuseumBars::none);
     int before = level(MuseumBars::window, 1);
     EXPECT_EQ(before, without);
-    for (const double bars_per_metre : {4.0, 12.0, 32.0}) {
+    for (const double bars_per_metre : {8.0, 32.0}) {
         const int now = level(MuseumBars::window, bars_per_metre);
         EXPECT_GE(now, before) << bars_per_metre;
         before = now;
@@ -119,12 +123,18 @@ TEST_F(MuseumTest, TheFinerTheBarsShadowsTheCoarserTheLevel) {
 }
 
 TEST_F(MuseumTest, CutsBehindBarsNeedFewerTriangles) {
-    const Kept open = kept(MuseumBars::none), coarse = kept(MuseumBars::gate, 1), finer = kept(MuseumBars::gate, 12),
-               finest = kept(MuseumBars::gate, 32), shadows = kept(MuseumBars::window, 12);
-    RecordProperty("triangles", std::to_string(open.masked) + " " + std::to_string(coarse.masked) + " " +
-                                    std::to_string(finer.masked) + " " + std::to_string(finest.masked) + " " +
-                                    std::to_string(shadows.masked));
-    std::printf("open %d/%d coarse %d/%d finer %d/%d finest %d/%d shadows %d/%d\n", (int)open.masked, (int)open.unmasked, (int)coarse.masked, (int)coarse.unmasked,(int)finer.masked, (int)finer.unmasked,(int)finest.masked, (int)finest.unmasked,(int)shadows.masked, (int)shadows.unmasked);
+    const Kept coarse = kept(MuseumBars::gate, 1), fine = kept(MuseumBars::gate, 32),
+               shadows = kept(MuseumBars::window, 32);
+    EXPECT_EQ(fine.unmasked, coarse.unmasked);
+    EXPECT_LT(coarse.unmasked, 100'000);
+    // What masks a little at any frequency is the room, and the statue's own pattern.
+    EXPECT_GT(coarse.masked, 0.99 * coarse.unmasked);
+    EXPECT_LE(coarse.masked, coarse.unmasked);
+    EXPECT_LT(fine.masked, 0.99 * coarse.masked);
+    // A cut holds what it promises wherever the shadows are: theirs take nothing from it, and add nothing.
+    EXPECT_LE(shadows.masked, shadows.unmasked);
+    RecordProperty("triangles", std::to_string(coarse.unmasked) + " " + std::to_string(coarse.masked) + " " +
+                                    std::to_string(fine.masked) + " " + std::to_string(shadows.masked));
 }
 
 } // namespace
