@@ -276,6 +276,9 @@ Json to_json(const session::Session& session, const LevelControl& control, const
                     {"layers", frame.layers},
                     {"surface_passes", frame.surface_passes},
                     {"full_screen_passes", frame.full_screen_passes},
+                    {"masked_layers", frame.masked_layers},
+                    {"shadow_maps", frame.shadow_maps},
+                    {"shadow_passes", frame.shadow_passes},
                     {"texture_bytes", frame.texture_bytes},
                     {"tests", std::move(tests)}};
         row["ms"] = frame.times.empty() ? Json() : to_json(frame.times.front());

@@ -4,7 +4,8 @@
 layout(binding = 0) uniform sampler2DArray colours; // slice 0: the background
 layout(binding = 1) uniform sampler2DArray depths;  // 1 at the near plane, 0 at infinity
 #ifdef MASKED
-layout(binding = 2) uniform sampler2DArray masks;
+layout(binding = 2) uniform sampler2D mask;        // of the layer that is left out: the share of their light ...
+layout(binding = 3) uniform sampler2D mask_depths; // ... that its surfaces get, which are here
 #endif
 layout(location = 0) uniform ivec4 layers; // how many, the one that is left out (-1: none), pixels of a block's side
 layout(location = 1) uniform ivec2 size;   // of the layers
@@ -23,12 +24,15 @@ vec4 nearest_at(ivec2 at) {
             chosen = i;
         }
     }
-    if (texelFetch(depths, ivec3(at, 0), 0).r > nearest)
+    float behind = texelFetch(depths, ivec3(at, 0), 0).r;
+    if (behind > nearest) {
+        nearest = behind;
         chosen = 0;
+    }
     vec4 colour = texelFetch(colours, ivec3(at, chosen), 0);
 #ifdef MASKED
-    if (layers.y >= 0)
-        colour *= texelFetch(masks, ivec3(at, 1 + layers.y), 0).r;
+    if (texelFetch(mask_depths, at, 0).r > nearest) // what is before the layer's surfaces hides their shadows
+        colour *= texelFetch(mask, at, 0).r;
 #endif
     return colour;
 }

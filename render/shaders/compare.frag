@@ -1,7 +1,7 @@
 // After the surface's own shader, whose main() is surface_main() here: drops the pixels that look like a picture.
 layout(binding = 14) uniform sampler2D compared_picture;
 layout(binding = 15) uniform sampler2D compared_thresholds; // cd/m2
-layout(location = 70) uniform vec4 compared;                // channel, cd/m2 of a luminance of 1, block's side
+layout(location = 110) uniform vec4 compared;                // channel, cd/m2 of a luminance of 1, block's side
 
 void main() {
     surface_main();

@@ -1,5 +1,6 @@
 // The surface's shade, with the triangles' edges drawn over it (WIREFRAME). DISPLAY: for displays, opaque
-// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it.
+// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it. SHARE: instead of it, which share of its
+// light shadows leave it.
 #ifdef FLAT
 layout(location = 0) flat in vec4 surface_shade;
 #else
@@ -186,10 +187,20 @@ void main() {
 #endif
 #ifdef CASTING
     vec4 visible = visibilities();
+#ifdef SHARE
+    vec4 unhidden = result;
+    for (int i = 0; i < CASTING; ++i)
+        unhidden += bounded(surface_cast[i]);
+#endif
     for (int i = 0; i < CASTING; ++i)
         result += visible[i] * bounded(surface_cast[i]);
 #ifdef TEXTURED
     vec4 cast_highlights = max(surface_cast_highlights, 0.0);
+#ifdef SHARE
+    unhidden.a += highlight;
+    for (int i = 0; i < CASTING; ++i)
+        unhidden.a += cast_highlights[i];
+#endif
     for (int i = 0; i < CASTING; ++i)
         highlight += visible[i] * cast_highlights[i];
 #else
@@ -198,6 +209,16 @@ void main() {
 #ifdef MASK
     mask = visible;
 #endif
+#ifdef SHARE
+    // Of what a picture shows, which is cut off at white. What has no light loses none.
+    float shown = min(unhidden.a, 1.0);
+    pixel = vec4(shown > 0.0 ? min(result.a + highlight, shown) / shown : 1.0);
+    return;
+#endif
+#endif
+#ifdef SHARE
+    pixel = vec4(1.0);
+    return;
 #endif
 #ifdef TEXTURED
     result = textured(result, highlight);

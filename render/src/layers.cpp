@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <vdtree/internal/errors.h>
@@ -93,22 +94,27 @@ struct LayerPasses::Impl {
 
     Result<void> need_slices(int count);
     Result<void> draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& clear);
-    Result<void> put_together(int left_out, int block, const Target& to);
+    Result<void> draw_mask(int left_out, const Shadows& cast_by_others);
+    Result<void> put_together(int left_out, int block, const Target& to, const Target* mask = nullptr);
 
     Context context; // first, and so gone last
     LayerOptions options;
     Target composite, combination;
-    Texture2d colours, depths, masks;
-    std::vector<Slice> slices; // the background, then layers
+    Texture2d colours, depths;
+    std::optional<Target> mask; // made when a combination first has one
+    std::vector<Slice> slices;  // the background, then layers
     const Program *combine = nullptr, *combine_masked = nullptr;
     VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
 
     // Of the last draw.
     Camera camera;
-    std::vector<Item> behind; // the background, for combinations of scenes without layers
+    std::vector<Item> objects; // for masks
+    std::vector<int> layer_of; // by object
+    std::vector<Item> behind;  // the background, for combinations of scenes without layers
     glm::vec4 clear = glm::vec4(0);
     int layer_count = 0, combinations = 0;
     bool has_background = false; // in its slice
+    bool is_masked = false;      // the last combination
     LayerCounts done;
 };
 
@@ -122,16 +128,11 @@ Result<void> LayerPasses::Impl::need_slices(int count) {
     const GLenum format = options.format == ColourFormat::rgba32f ? GL_RGBA32F : GL_RGBA16F;
     glTextureStorage3D(colours.id(), 1, format, width, height, count);
     glTextureStorage3D(depths.id(), 1, GL_DEPTH_COMPONENT32F, width, height, count);
-    if (options.has_masks) {
-        masks = array_texture("masks of layers");
-        glTextureStorage3D(masks.id(), 1, GL_R16F, width, height, count);
-    }
     for (int i = 0; i < count; ++i) {
         FramebufferObject framebuffer = FramebufferObject::create(i == 0 ? "background" : "layer");
         const GLuint id = framebuffer.id();
         glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT0, colours.id(), 0, i);
         glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, depths.id(), 0, i);
-        if (masks) glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT1, masks.id(), 0, i);
         if (glCheckNamedFramebufferStatus(id, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
             slices.clear();
             return unsupported(
@@ -151,23 +152,39 @@ Result<void> LayerPasses::Impl::need_slices(int count) {
 
 Result<void> LayerPasses::Impl::draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& cleared) {
     Target& target = slices[slice].target;
-    if (masks) {
-        const float lit = 1;
-        glClearTexSubImage(masks.id(), 0, 0, 0, static_cast<GLint>(slice), target.width(), target.height(), 1, GL_RED,
-                           GL_FLOAT, &lit);
-    }
     ++done.surface_passes;
     return render::draw(items, camera, target, {.colour = cleared});
 }
 
-Result<void> LayerPasses::Impl::put_together(int left_out, int block, const Target& to) {
+// Which share of its light comes to each of the layer's surfaces, and where these are.
+Result<void> LayerPasses::Impl::draw_mask(int left_out, const Shadows& cast_by_others) {
+    if (!mask) {
+        auto made = Target::create(context, composite.width(), composite.height(),
+                                   {.colours = {options.format}, .label = "mask of shadows"});
+        if (!made) return made.error();
+        mask = std::move(*made);
+    }
+    std::vector<Item> items;
+    for (std::size_t i = 0; i < objects.size(); ++i)
+        if (layer_of[i] == left_out) items.push_back(objects[i]);
+    Camera own = camera;
+    own.shadows = &cast_by_others;
+    own.shadow_mask.reset();
+    const auto pass = SurfacePass::prepare(items, own, mask->impl(), 0, SurfacePass::Use::share_of_light);
+    if (!pass) return pass.error();
+    pass->draw(mask->impl(), own.point, {.colour = glm::vec4(1)});
+    ++done.surface_passes;
+    ++done.mask_passes;
+    return {};
+}
+
+Result<void> LayerPasses::Impl::put_together(int left_out, int block, const Target& to, const Target* masked_by) {
     const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
                                     {ShaderSource::Stage::fragment, shaders::combine_frag}};
-    const bool is_masked = masks && left_out >= 0;
-    const Program*& program = is_masked ? combine_masked : combine;
+    const Program*& program = masked_by ? combine_masked : combine;
     if (!program) {
         const std::string_view masked[] = {"MASKED"};
-        auto found = is_masked ? context.impl().programs.named("combine masked", sources, masked)
+        auto found = masked_by ? context.impl().programs.named("combine masked", sources, masked)
                                : context.impl().programs.named("combine", sources);
         if (!found) return found.error();
         program = *found;
@@ -180,14 +197,17 @@ Result<void> LayerPasses::Impl::put_together(int left_out, int block, const Targ
     to.impl().bind(0);
     glBindTextureUnit(0, colours.id());
     glBindTextureUnit(1, depths.id());
-    if (is_masked) glBindTextureUnit(2, masks.id());
+    if (masked_by) {
+        glBindTextureUnit(2, masked_by->colour_texture());
+        glBindTextureUnit(3, masked_by->depth_texture());
+    }
     glProgramUniform4i(program->id(), layers_location, layer_count, left_out, block, 0);
     program->set(size_location, glm::ivec2(composite.width(), composite.height()));
     program->use();
     glBindVertexArray(no_arrays.id());
     glDrawArrays(GL_TRIANGLES, 0, 3);
     glBindVertexArray(0);
-    for (GLuint unit = 0; unit < 3; ++unit) glBindTextureUnit(unit, 0);
+    for (GLuint unit = 0; unit < 4; ++unit) glBindTextureUnit(unit, 0);
     ++done.full_screen_passes;
     return {};
 }
@@ -218,7 +238,7 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
     Impl& own = *impl_;
     own.done = {};
     own.layer_count = own.combinations = 0;
-    own.has_background = false;
+    own.has_background = own.is_masked = false;
     if (split.layer_of.size() != objects.size())
         return invalid_argument("The layers are of " + std::to_string(split.layer_of.size()) + " objects, not of " +
                                 std::to_string(objects.size()) + ".");
@@ -236,6 +256,8 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
         own.camera.near_plane = *near;
     }
     own.behind.assign(background.begin(), background.end());
+    own.objects.assign(objects.begin(), objects.end());
+    own.layer_of = split.layer_of;
     own.clear = clear;
     return in_context(own.context, "Drawing layers", [&]() -> Result<void> {
         if (split.count == 0) {
@@ -260,7 +282,7 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
     });
 }
 
-Result<void> LayerPasses::combine(int left_out) {
+Result<void> LayerPasses::combine(int left_out, const Shadows* cast_by_others) {
     Impl& own = *impl_;
     if (left_out < 0 || left_out >= own.combinations)
         return invalid_argument("There is no layer " + std::to_string(left_out) + " to leave out, only " +
@@ -271,7 +293,13 @@ Result<void> LayerPasses::combine(int left_out) {
             if (auto drawn = own.draw_slice(0, own.behind, own.clear); !drawn) return drawn;
             own.has_background = true;
         }
-        return own.put_together(own.layer_count == 0 ? -1 : left_out, own.options.block, own.combination);
+        own.is_masked = false;
+        if (cast_by_others) {
+            if (auto drawn = own.draw_mask(left_out, *cast_by_others); !drawn) return drawn;
+            own.is_masked = true;
+        }
+        return own.put_together(own.layer_count == 0 ? -1 : left_out, own.options.block, own.combination,
+                                own.is_masked ? &*own.mask : nullptr);
     });
 }
 
@@ -291,7 +319,7 @@ const Target* LayerPasses::background() const noexcept {
 
 unsigned LayerPasses::colour_array() const noexcept { return impl_->colours.id(); }
 unsigned LayerPasses::depth_array() const noexcept { return impl_->depths.id(); }
-unsigned LayerPasses::mask_array() const noexcept { return impl_->masks.id(); }
+const Target* LayerPasses::mask() const noexcept { return impl_->is_masked ? &*impl_->mask : nullptr; }
 
 LayerCounts LayerPasses::counts() const noexcept {
     LayerCounts counts = impl_->done;
@@ -302,8 +330,12 @@ LayerCounts LayerPasses::counts() const noexcept {
     counts.textures = 3;
     counts.texture_bytes = pixels(impl_->composite) * (colour + 4) + pixels(impl_->combination) * colour;
     if (!impl_->slices.empty()) {
-        counts.textures += impl_->masks ? 3 : 2;
-        counts.texture_bytes += impl_->slices.size() * pixels(impl_->composite) * (colour + 4 + (impl_->masks ? 2 : 0));
+        counts.textures += 2;
+        counts.texture_bytes += impl_->slices.size() * pixels(impl_->composite) * (colour + 4);
+    }
+    if (impl_->mask) {
+        counts.textures += 2;
+        counts.texture_bytes += pixels(*impl_->mask) * (colour + 4);
     }
     return counts;
 }

@@ -32,6 +32,7 @@ Result<Program> build_surface(const ProgramKey& key) {
     static_assert(std::size(casting) == vdtree::most_shadow_lights);
     if (key.casting > 0) defines.push_back(casting[key.casting - 1]);
     if (key.mask) defines.push_back("MASK");
+    if (key.share) defines.push_back("SHARE");
     return Program::build("surface", sources, defines);
 }
 

@@ -23,8 +23,9 @@ struct ProgramKey {
     Output output = Output::linear;
     bool compares = false; // drops pixels that look like a picture: compare.frag
     bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
-    int casting = 0;   // lights that cast shadows, and are drawn with them
-    bool mask = false; // writes the shadows' mask as well
+    int casting = 0;       // lights that cast shadows, and are drawn with them
+    bool mask = false;     // writes the shadows' mask as well
+    bool share = false;    // writes which share of its light comes to a surface, and nothing else
     auto operator<=>(const ProgramKey&) const = default;
 };
 

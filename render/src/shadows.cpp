@@ -348,7 +348,7 @@ Result<void> Shadows::update(std::span<const Item> casters) {
     return in_context(impl_->context, "Drawing shadow maps", [&] { return impl_->update(casters); });
 }
 
-ShadowFacts Shadows::facts() const {
+ShadowFacts Shadows::counts() const noexcept {
     ShadowFacts facts;
     facts.lights = static_cast<int>(impl_->lights.size());
     facts.maps = static_cast<int>(impl_->layers.size());
@@ -356,6 +356,11 @@ ShadowFacts Shadows::facts() const {
     const auto side = static_cast<std::uint64_t>(impl_->options.size);
     facts.bytes = texel_bytes * side * side * impl_->map_count;
     facts.redraws = impl_->redraws;
+    return facts;
+}
+
+ShadowFacts Shadows::facts() const {
+    ShadowFacts facts = counts();
     if (impl_->redraws == 0 || !impl_->context.make_current()) return facts;
     GLuint64 begun = 0, ended = 0; // ns
     glGetQueryObjectui64v(impl_->begun.id(), GL_QUERY_RESULT, &begun);

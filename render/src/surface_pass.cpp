@@ -31,8 +31,8 @@ enum UniformLocation {
     shadow_lights_location = 96,
     shadow_kinds_location = 100,
     world_from_unit_location = 104,
-    compared_location = 70,
-    stipple_location = 71,
+    compared_location = 110,
+    stipple_location = 111,
 };
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -188,7 +188,7 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
             camera.shadows && item.lighting ? static_cast<int>(vdtree::shadow_lights(*item.lighting)) : 0;
         const auto program = target.context.impl().programs.surface(
             {item.lighting.has_value(), tree.texture.has_value(), item.shading == Shading::flat, item.wireframe, output,
-             compares, is_stippled, casting, camera.shadow_mask.has_value()});
+             compares, is_stippled, casting, camera.shadow_mask.has_value(), use == Use::share_of_light});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
         PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};

@@ -39,8 +39,9 @@ class SurfacePass {
 public:
     // Checks everything that can be wrong, compiles what is missing and aims at each item. The pass keeps the items'
     // cuts. Of the camera's point nothing is taken.
-    // `use`: of a pass that compares, whose target has no colours, see compare().
-    enum class Use { drawing, comparison };
+    // `use`: of a pass that compares, whose target has no colours, see compare(); of one that draws no colours, but in
+    // all channels which share of its light the camera's shadows leave a surface.
+    enum class Use { drawing, comparison, share_of_light };
     static Result<SurfacePass> prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
                                        int attachment, Use use = Use::drawing);
 
@@ -68,7 +69,7 @@ private:
         bool is_lit = false;
         LightUniforms lights = {};
         std::optional<glm::vec2> stipple = {}; // none: all pixels
-        ShadowUniforms shadows = {}; // of layers, where its lights cast some
+        ShadowUniforms shadows = {};           // of layers, where its lights cast some
     };
 
     SurfacePass(const Camera& camera, int attachment, Output output)

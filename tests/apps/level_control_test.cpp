@@ -1,4 +1,4 @@
-// Levels of detail by what the rest of a picture masks: in scenes made for it, and in museums.
+// Levels of detail by what the rest of a picture masks: in scenes made for it. For museums see museum_test.cpp.
 #include <session_gpu/level_control.h>
 
 #include <algorithm>
@@ -8,14 +8,14 @@
 
 #include <gmock/gmock.h>
 
-#include <make_scene.h>
+#include <calibration/light_rig.h>
 #include <perception/judge.h>
 #include <render/renderer.h>
+#include <session_gpu/scene_renderer.h>
 
 #include "gl_test.h"
 #include "measured.h"
 #include "shapes.h"
-#include "temp_folder.h"
 
 namespace {
 
@@ -360,38 +360,91 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));
 }
 
-// ---- museums ----------------------------------------------------------------------------------------------------------
+// ---- shadows ----------------------------------------------------------------------------------------------------------
 
-// The statue's level behind a gate of so many bars a metre; 0: without one.
-int level_behind(const render::Context& context, double bars_per_metre) {
-    const support::TempFolder folder;
-    const auto file = folder / "museum.glb";
-    app::MakeSceneOptions options{.triangles = 20'000, .bars = app::MuseumBars::none};
-    if (bars_per_metre > 0) options.bars = app::MuseumBars::gate, options.bars_per_metre = bars_per_metre;
-    EXPECT_TRUE(app::make_scene(file, options));
-    auto scene = Scene::load(file, {.as = LoadAs::scene});
-    EXPECT_TRUE(scene);
-    auto session = Session::create(std::move(*scene));
-    vdtree::View view = *session->camera_view({});
-    view.width = view.height = 256;
-    auto control = LevelControl::create(context, *session, view, {.maps = MapRecipe::rpg99});
-    EXPECT_TRUE(control) << control.error().message;
-    const auto settled = control->settle(view);
-    EXPECT_TRUE(settled && control->is_settled());
-    return settled->levels[0];
+// Bodies in a sun from this direction.
+Session sunlit(const std::vector<glm::dvec3>& places, glm::dvec3 towards, bool casts) {
+    static const vdtree::VertexTree plain = support::built(shapes::bumpy_sphere(5, 0.02));
+    Scene scene;
+    for (const glm::dvec3& at : places)
+        scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
+    vdtree::Lighting lighting;
+    lighting.ambient = 0.2;
+    vdtree::LightSource& sun = lighting.lights.emplace_back();
+    sun.direction = glm::normalize(towards);
+    sun.intensity = 0.7;
+    sun.casts_shadow = casts;
+    scene.lights = *calibration::LightRig::of(lighting, "the test's lights");
+    return *Session::create(std::move(scene));
 }
 
-// The paper's figure 1, with bars before the statue.
-TEST_F(LevelControlTest, TheFinerTheBarsTheCoarserTheStatue) {
-    const int without = level_behind(context(), 0), coarse = level_behind(context(), 1);
-    EXPECT_EQ(coarse, without);
-    int before = coarse;
-    for (const double bars_per_metre : {4.0, 12.0, 32.0}) {
-        const int level = level_behind(context(), bars_per_metre);
-        EXPECT_GE(level, before) << bars_per_metre;
-        before = level;
+TEST_F(LevelControlTest, OnlyWhatOthersShadeHasMasks) {
+    const std::vector<glm::dvec3> places = {{-1.5, 0, -6}, {2.5, 0, -10}};
+    const auto first_frame = [&](glm::dvec3 towards, bool casts) {
+        Session session = sunlit(places, towards, casts);
+        auto control = LevelControl::create(context(), session, ahead(96), {.maps = MapRecipe::rpg99});
+        EXPECT_TRUE(control) << control.error().message;
+        const auto frame = control->draw(ahead(96));
+        EXPECT_TRUE(frame) << frame.error().message;
+        EXPECT_EQ(frame->layers, 2);
+        EXPECT_EQ(control->layers().mask() != nullptr, frame->masked_layers > 0 && control->layers().mask());
+        return *frame;
+    };
+    const LevelFrame without = first_frame({0, 0.3, 1}, false), above = first_frame({0.1, 1, 0.1}, true),
+                     along = first_frame({-4, 0, 4}, true);
+    // No light casts any: nothing is made.
+    EXPECT_EQ(without.shadow_maps, 0);
+    EXPECT_EQ(without.shadow_passes, 0);
+    EXPECT_EQ(without.masked_layers, 0);
+    // From above none falls on another body. Pictures and tests have shadows; masks have none.
+    EXPECT_EQ(above.shadow_maps, 1);
+    EXPECT_EQ(above.masked_layers, 0);
+    EXPECT_EQ(above.shadow_passes, 2);
+    EXPECT_EQ(above.surface_passes, without.surface_passes);
+    // Along the two, the near one's falls on the far one, and nothing falls on the near one.
+    EXPECT_EQ(along.masked_layers, 1);
+    EXPECT_EQ(along.shadow_passes, 3);
+    EXPECT_EQ(along.surface_passes, without.surface_passes + 1);
+    EXPECT_EQ(along.full_screen_passes, without.full_screen_passes);
+    constexpr std::uint64_t map_bytes = 4ull * 2048 * 2048, mask_bytes = 20ull * 96 * 96;
+    EXPECT_EQ(above.texture_bytes, without.texture_bytes + 2 * map_bytes);
+    EXPECT_EQ(along.texture_bytes, above.texture_bytes + mask_bytes);
+}
+
+// What is out of the window casts shadows into it, and a picture has those of SceneRenderer.
+TEST_F(LevelControlTest, PicturesHaveTheScenesShadows) {
+    Session session = sunlit({{0, 0, -6}, {4, 0, -2}}, {1, 0, 1}, true);
+    auto control = LevelControl::create(context(), session, ahead(96), {.method = LevelMethod::distance, .bias = 1e-6});
+    ASSERT_TRUE(control) << control.error().message;
+    const auto frame = control->draw(ahead(96));
+    ASSERT_TRUE(frame) << frame.error().message;
+    ASSERT_EQ(frame->levels[1], -1);
+    std::vector<vdtree::Cut> cuts;
+    for (std::size_t i = 0; i < 2; ++i)
+        cuts.push_back(control->chain(i).cut(i == 0 ? frame->levels[0] : control->chain(1).size() - 1));
+    auto renderer = SceneRenderer::create(context(), session);
+    const auto items = renderer->items(drawn_cuts(cuts), ahead(96));
+    ASSERT_TRUE(items) << items.error().message;
+    auto target = render::Target::create(context(), 96, 96);
+    ASSERT_TRUE(render::draw(std::span(items->items).first(1),
+                             {.view = ahead(96), .near_plane = control->layers().near_plane(), .shadows = items->shadows},
+                             *target, {.colour = glm::vec4(session.background())}));
+    EXPECT_EQ(*render::read_pixels(control->picture()), *render::read_pixels(*target));
+    // It is in the shadow: half of it is at the ambient light.
+    const auto dark = *render::read_luminance(control->picture());
+    EXPECT_GT(std::ranges::count_if(dark, [](float v) { return v < 0.17f; }), 200);
+}
+
+// A change of level fades under lights that cast shadows, and is tested again after it.
+TEST_F(LevelControlTest, LevelsFadeUnderShadows) {
+    Session session = sunlit({{-1.5, 0, -6}, {2.5, 0, -10}}, {-4, 0, 4}, true);
+    auto control = LevelControl::create(context(), session, ahead(96), {.fade_frames = 2});
+    ASSERT_TRUE(control);
+    for (int i = 0; i < 8; ++i) {
+        const auto frame = control->draw(ahead(96));
+        ASSERT_TRUE(frame) << frame.error().message;
+        ASSERT_TRUE(context().finish());
     }
-    EXPECT_GE(before, without + 2);
 }
 
 } // namespace

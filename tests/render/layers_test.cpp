@@ -1,15 +1,15 @@
 // Layers: where planes stand, that together they are the picture, and that without one they are the others'.
 #include "gl_test.h"
 #include "scenes.h"
+#include "shapes.h"
 
 #include <algorithm>
 #include <limits>
 
-#define GL_GLEXT_PROTOTYPES 1
-#include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
 #include <render/layers.h>
+#include <render/shadows.h>
 
 namespace {
 
@@ -149,7 +149,6 @@ TEST_F(LayersTest, ALayerHasItsObjectsAlone) {
     EXPECT_EQ(passes->layer(3), nullptr);
     EXPECT_NE(passes->colour_array(), 0u);
     EXPECT_NE(passes->depth_array(), 0u);
-    EXPECT_EQ(passes->mask_array(), 0u);
 }
 
 TEST_F(LayersTest, DrawsAtOnceWhatIsNotSplit) {
@@ -198,21 +197,84 @@ TEST_F(LayersTest, BlocksAreMeans) {
         }
 }
 
-TEST_F(LayersTest, AMaskDarkensTheCombinationWithoutItsLayer) {
-    const Strips strips(context());
-    const View view = ahead(16, 16);
-    auto passes = LayerPasses::create(context(), 16, 16, {.has_masks = true});
-    ASSERT_TRUE(passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
-    ASSERT_TRUE(passes->combine(1));
-    const auto before = *read_pixels(passes->combination());
-    const float half = 0.5f;
-    glClearTexSubImage(passes->mask_array(), 0, 0, 0, 2, 16, 16, 1, GL_RED, GL_FLOAT, &half);
-    ASSERT_TRUE(passes->combine(1));
-    const auto after = *read_pixels(passes->combination());
-    for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i], 0.5f * before[i]);
-    ASSERT_TRUE(passes->combine(0));
-    EXPECT_EQ(*read_pixels(passes->combination()),
-              drawn(context(), {strips.objects[0], strips.objects[2]}, strips.background, view));
+// A wall behind, a screen before it, and a board that the sun casts a shadow with, from the left. Luminance of the wall
+// where the screen was is what the board's shadow leaves of the screen's light, and the screen's own shadow is not in it.
+TEST_F(LayersTest, ShadowsOnALayerMaskWhatIsBehindItAndItsOwnDoNot) {
+    const auto lit = [](const Mesh& mesh) {
+        unseen::vdtree::LightSource sun;
+        sun.direction = glm::normalize(glm::dvec3(-1, 0, 1));
+        sun.intensity = 0.6;
+        sun.casts_shadow = true;
+        auto scene = std::make_unique<Scene>(mesh);
+        unseen::vdtree::Lighting lighting;
+        lighting.ambient = 0.2;
+        lighting.lights = {sun};
+        return std::pair{std::move(scene), lighting};
+    };
+    std::vector<std::unique_ptr<Scene>> scenes;
+    const auto item_of = [&](const Mesh& mesh) {
+        auto [scene, lighting] = lit(mesh);
+        GpuCut cut(*GpuTree::create(context(), scene->tree));
+        EXPECT_TRUE(cut.follow(scene->cut));
+        scenes.push_back(std::move(scene));
+        Item item{cut};
+        item.lighting = lighting;
+        return item;
+    };
+    // The board's shadow falls on the right half of the screen, and the screen's on the wall. A thorn of the screen's own
+    // stands before its upper left corner, and casts a shadow on it.
+    const Item wall = item_of(rectangle({-4, -4}, {4, 4}, -5, grey(0.5f)));
+    const Item screen = item_of(unseen::shapes::together(rectangle({-0.6, -0.6}, {0.6, 0.6}, -3, grey(0.8f)),
+                                                         rectangle({-0.9, 0.2}, {-0.7, 0.5}, -2.6, grey(0.8f))));
+    const Item board = item_of(rectangle({-1.2, -0.8}, {0.2, 0.1}, -1.8, grey(0.8f)));
+    const std::vector<Item> objects = {screen, board}, background = {wall}, all = {screen, board, wall},
+                            others = {board, wall};
+    const View view = ahead(64, 64);
+    auto shadows = Shadows::create(context(), {.size = 1024}), by_others = Shadows::create(context(), {.size = 1024});
+    ASSERT_TRUE(shadows->update(all) && by_others->update(others));
+    const auto at = [](const std::vector<glm::vec4>& pixels, double x, double y, double z) {
+        const double focal = 32 / std::tan(ahead(64, 64).fov_y_degrees * std::acos(-1.0) / 360);
+        const int column = static_cast<int>(32 + focal * x / -z), row = static_cast<int>(32 - focal * y / -z);
+        return pixels[static_cast<std::size_t>(row * 64 + column)].a;
+    };
+    for (const bool is_split : {true, false}) {
+        auto passes = LayerPasses::create(context(), 64, 64);
+        const LayerSplit split =
+            is_split ? LayerSplit{.layer_of = {1, 0}, .count = 2, .borders = {2}} : LayerSplit{.layer_of = {0}};
+        const auto shown = std::span(objects).first(is_split ? 2 : 1);
+        std::vector<Item> behind = background;
+        if (!is_split) behind.push_back(board);
+        ASSERT_TRUE(passes->draw(shown, behind, {.view = view, .shadows = &*shadows}, split));
+        ASSERT_EQ(passes->combination_count(), is_split ? 2 : 1);
+        const int layer = is_split ? 1 : 0;
+        ASSERT_TRUE(passes->combine(layer));
+        EXPECT_EQ(passes->mask(), nullptr);
+        EXPECT_EQ(passes->counts().mask_passes, 0);
+        const std::uint64_t bytes = passes->counts().texture_bytes;
+        const auto plain = *read_pixels(passes->combination());
+        const auto masked = passes->combine(layer, &*by_others);
+        ASSERT_TRUE(masked) << masked.error().message;
+        EXPECT_EQ(passes->counts().mask_passes, 1);
+        EXPECT_EQ(passes->counts().texture_bytes, bytes + 20 * 64 * 64);
+        const auto pixels = *read_pixels(passes->combination()), mask = *read_pixels(*passes->mask());
+        // Of the light 0.2 + 0.6 cos 45 degrees the ambient share is left.
+        const double hidden = 0.2 / (0.2 + 0.6 / std::sqrt(2.0));
+        EXPECT_NEAR(static_cast<double>(at(mask, 0.5, -0.3, -3)), hidden, 1e-4);
+        EXPECT_EQ(at(mask, 0.3, 0.5, -3), 1.0f);
+        EXPECT_EQ(at(mask, -0.45, 0.35, -3), 1.0f) << "the thorn's shadow is the layer's own";
+        EXPECT_LT(at(*read_pixels(passes->composite()), -0.45, 0.35, -3), 0.2f) << "and it is there";
+        EXPECT_EQ(at(mask, 1.5, 0, -3), 1.0f) << "nothing of the layer is there";
+        for (std::size_t i = 0; i < pixels.size(); ++i)
+            EXPECT_NEAR(pixels[i].a, plain[i].a * (pixels[i].a == plain[i].a ? 1 : mask[i].a), 1e-6f) << i;
+        EXPECT_LT(at(pixels, 0.5, -0.3, -3), 0.5f * at(plain, 0.5, -0.3, -3));
+        // Not on what stands before the layer: the board hides a part of the screen's shadow.
+        std::size_t before = 0;
+        for (std::size_t i = 0; i < pixels.size(); ++i) before += mask[i].a < 0.9f && pixels[i] == plain[i];
+        EXPECT_GT(before, 0u);
+        // The next one has none again.
+        ASSERT_TRUE(passes->combine(layer));
+        EXPECT_EQ(*read_pixels(passes->combination()), plain);
+    }
 }
 
 // Two cuts of one object on the way from one to the other.

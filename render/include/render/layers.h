@@ -42,14 +42,12 @@ struct LayerOptions {
     int most = default_layers;                   // layers; 1 to most_layers
     ColourFormat format = ColourFormat::rgba32f; // of pictures; or rgba16f
     int block = 1;                               // a combination's pixel is the mean of so many by so many, 1 to 16
-    // Each layer has a second colour, one channel that is 1 where nothing is drawn: which share of its light a surface
-    // gets. The combination without the layer is multiplied with it. No pass of this library draws it so far.
-    bool has_masks = false;
 };
 
 // What was done since the last draw() began, and what is kept.
 struct LayerCounts {
-    int surface_passes = 0;     // of items: a layer's, the background's, or the whole scene's
+    int surface_passes = 0;     // of items: a layer's, the background's, the whole scene's, or a mask's
+    int mask_passes = 0;        // of these, masks of shadows
     int full_screen_passes = 0; // combinations and composites
     int textures = 0;
     std::uint64_t texture_bytes = 0;
@@ -58,7 +56,8 @@ struct LayerCounts {
 // Move-only. Keeps a handle to its context. Nothing is read back, and nothing waits for the GPU.
 //
 // Memory, in bytes a pixel, with 32-bit floats (16-bit ones): 20 (12) for each of `most` layers and for the background,
-// made when a picture is first split, 20 (12) for the composite and 16 (8) for the combination.
+// made when a picture is first split, 20 (12) for the composite and 16 (8) for the combination; 20 (12) for the mask of
+// shadows, made when a combination first has one.
 class LayerPasses {
 public:
     // Fails on options out of range, on sizes as Target::create() does, and when memory runs out.
@@ -76,10 +75,15 @@ public:
     // Of the last draw(): the layers, or 1 where there are objects and no layers, or 0.
     int combination_count() const noexcept;
     // What all but one layer show: of objects that are in no layers the background. 0 to combination_count() - 1.
-    Result<void> combine(int left_out);
+    // `cast_by_others`: the shadows without those of the layer's own objects, or null. Where the picture shows the
+    // layer's surfaces, what is behind them is multiplied by the share of their light that these shadows leave them: a
+    // shadow masks what it falls on, and no object masks itself. One more pass over the layer's objects, in which the
+    // layer's colours cannot be drawn: they have all shadows.
+    Result<void> combine(int left_out, const Shadows* cast_by_others = nullptr);
 
     const Target& composite() const noexcept;   // all layers: the picture
     const Target& combination() const noexcept; // of the last combine()
+    const Target* mask() const noexcept;        // of the last combine(): the share, in all channels; null: it had none
     double near_plane() const noexcept;         // of the last draw(), for passes that share its depths
 
     // Of the last draw() into layers; null where there was none.
@@ -88,7 +92,6 @@ public:
     // Two-dimensional arrays: slice 0 is the background, 1 + i is layer i. 0 where there is none.
     unsigned colour_array() const noexcept;
     unsigned depth_array() const noexcept;
-    unsigned mask_array() const noexcept;
 
     LayerCounts counts() const noexcept;
 

@@ -57,7 +57,8 @@ public:
     // not, where draw() does, and where memory runs out.
     Result<void> update(std::span<const Item> casters);
 
-    ShadowFacts facts() const; // waits for the GPU
+    ShadowFacts facts() const;           // waits for the GPU
+    ShadowFacts counts() const noexcept; // the same without draw_ms; waits for nothing
 
     struct Impl; // the library's own
     Impl& impl() const noexcept { return *impl_; }

@@ -17,6 +17,7 @@
 #include <render/difference_count.h>
 #include <render/elevation.h>
 #include <render/gpu_tree.h>
+#include <render/shadows.h>
 #include <render/stage_times.h>
 #include <render/visibility.h>
 #include <session_gpu/gpu_judge.h>
@@ -66,6 +67,44 @@ bool is_in_sight(const Sphere& sphere, const vdtree::View& view) {
         return (std::abs(aside) - half * ahead) / std::sqrt(1 + half * half) > sphere.radius;
     };
     return !is_beyond(glm::dot(to, frame.right), half_right) && !is_beyond(glm::dot(to, frame.up), half_up);
+}
+
+// A light that casts shadows, in the world.
+struct Caster {
+    bool is_far = false;
+    glm::dvec3 direction = glm::dvec3(0, 0, 1); // towards it, where it is far
+    glm::dvec3 place = glm::dvec3(0);
+};
+
+std::vector<Caster> casting_lights(const vdtree::VertexTree& tree, const vdtree::Similarity& placement,
+                                   const vdtree::Lighting& lighting) {
+    std::vector<Caster> lights;
+    for (const vdtree::LightSource& light : lighting.lights)
+        if (light.casts_shadow)
+            lights.push_back({light.kind == vdtree::LightSource::Kind::directional,
+                              glm::normalize(placement.rotation * light.direction),
+                              placement.to_world(tree.origin() + light.position)});
+    return lights;
+}
+
+bool is_in_casting_light(const render::Item& item) {
+    return item.lighting && vdtree::shadow_lights(*item.lighting) > 0;
+}
+
+// Whether a shadow of what is in the one sphere may fall on what is in the other.
+bool may_shade(const Caster& light, const Sphere& from, const Sphere& to) {
+    const double both = from.radius + to.radius;
+    if (light.is_far) {
+        const glm::dvec3 off = from.centre - to.centre;
+        const double ahead = glm::dot(off, light.direction);
+        return ahead > -both && glm::length(off - ahead * light.direction) < both;
+    }
+    const glm::dvec3 a = from.centre - light.place, b = to.centre - light.place;
+    const double far_a = glm::length(a), far_b = glm::length(b);
+    if (!(far_a > from.radius && far_b > to.radius)) return true; // the light is within one of them
+    if (far_a - from.radius > far_b + to.radius) return false;
+    const double angle = std::acos(std::clamp(glm::dot(a, b) / (far_a * far_b), -1.0, 1.0));
+    return angle < std::asin(from.radius / far_a) + std::asin(to.radius / far_b);
 }
 
 // Of the sphere's outline, within the field that a flat window has at its middle.
@@ -135,6 +174,10 @@ struct LevelControl::Impl {
     Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
     render::LuminanceTexture luminance_of(const render::Target& target) const;
     Result<void> map(int left_out);
+    Result<void> combine(int left_out);
+    Result<void> cast(const std::vector<render::Item>& casters, std::optional<render::Shadows>& shadows) const;
+    std::vector<char> find_shaded(const render::LayerSplit& split, const std::vector<std::size_t>& in_sight) const;
+    std::uint64_t shadow_redraws() const;
     render::ThresholdTexture thresholds_texture(int left_out) const;
     Result<LevelFrame> draw(const vdtree::View& view);
     int passes_done() const;
@@ -145,6 +188,16 @@ struct LevelControl::Impl {
     std::map<const vdtree::VertexTree::Data*, Levels> trees;
     std::vector<Thing> things;
     std::vector<render::GpuCut> backdrop;
+    std::vector<Sphere> backdrop_spheres;
+    std::optional<render::Ball> reach; // of shadows: around all that there is
+    // Of the picture; and, one after the other, those that mask a layer and those that what is tested casts. Made when
+    // they are first drawn.
+    std::optional<render::Shadows> shadows, other_shadows;
+    // Of the last frame: what casts shadows, first the objects, and the layer that each is in, or -1; and by layer
+    // whether any may fall on it from elsewhere.
+    std::vector<render::Item> casters;
+    std::vector<int> caster_layers;
+    std::vector<char> is_shaded;
     std::optional<Passes> passes;
     render::StageTimes times;
     struct OpenTimes {
@@ -202,6 +255,7 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
             known = whole.emplace(&part.tree.data(), cut).first;
         }
         backdrop.push_back(known->second);
+        backdrop_spheres.push_back(sphere_of(part.tree, part.placement));
     }
     return {};
 }
@@ -276,6 +330,52 @@ Result<void> LevelControl::Impl::map(int left_out) {
     if (passes->rpg99) return passes->rpg99->map_thresholds(picture, left_out);
     if (auto set = passes->modern->set_reference(picture); !set) return set;
     return passes->modern->map_thresholds(left_out);
+}
+
+// ---- shadows
+
+Result<void> LevelControl::Impl::cast(const std::vector<render::Item>& from, std::optional<render::Shadows>& to) const {
+    if (!to) {
+        auto made = render::Shadows::create(context, {.bounds = reach});
+        if (!made) return made.error();
+        to = std::move(*made);
+    }
+    return to->update(from);
+}
+
+// By layer: whether anything that is not in it may cast a shadow on one of its objects.
+std::vector<char> LevelControl::Impl::find_shaded(const render::LayerSplit& split,
+                                                  const std::vector<std::size_t>& in_sight) const {
+    std::vector<char> shaded(static_cast<std::size_t>(std::max(split.count, 1)), 0);
+    const auto sphere_of_caster = [&](std::size_t i) {
+        return i < things.size() ? things[i].sphere : backdrop_spheres[i - things.size()];
+    };
+    for (std::size_t i = 0; i < in_sight.size(); ++i) {
+        const auto layer = static_cast<std::size_t>(split.layer_of[i]);
+        const Thing& thing = things[in_sight[i]];
+        if (shaded[layer] || !thing.lighting) continue;
+        for (const Caster& light : casting_lights(session.tree(in_sight[i]), thing.placement, *thing.lighting))
+            for (std::size_t from = 0; from < casters.size() && !shaded[layer]; ++from)
+                shaded[layer] =
+                    caster_layers[from] != split.layer_of[i] && may_shade(light, sphere_of_caster(from), thing.sphere);
+    }
+    return shaded;
+}
+
+std::uint64_t LevelControl::Impl::shadow_redraws() const {
+    return (shadows ? shadows->counts().redraws : 0) + (other_shadows ? other_shadows->counts().redraws : 0);
+}
+
+Result<void> LevelControl::Impl::combine(int left_out) {
+    const auto layer = static_cast<std::size_t>(left_out);
+    if (!shadows || left_out < 0 || layer >= is_shaded.size() || !is_shaded[layer])
+        return passes->layers.combine(left_out);
+    std::vector<render::Item> others;
+    for (std::size_t i = 0; i < casters.size(); ++i)
+        if (caster_layers[i] != left_out) others.push_back(casters[i]);
+    if (std::ranges::none_of(others, is_in_casting_light)) return passes->layers.combine(left_out);
+    if (auto drawn = cast(others, other_shadows); !drawn) return drawn;
+    return passes->layers.combine(left_out, &*other_shadows);
 }
 
 render::ThresholdTexture LevelControl::Impl::thresholds_texture(int left_out) const {
@@ -445,6 +545,23 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         made.lighting = std::move(*lighting);
     }
 
+    // What casts shadows: also what is out of the window, at the level that it would have.
+    casters.clear();
+    caster_layers.clear();
+    is_shaded.clear();
+    if (std::ranges::any_of(objects, is_in_casting_light) || std::ranges::any_of(background, is_in_casting_light)) {
+        for (std::size_t i = 0; i < things.size(); ++i) {
+            auto made = item(i, things[i].level, view);
+            if (!made) return made.error();
+            casters.push_back(std::move(*made));
+        }
+        casters.insert(casters.end(), background.begin(), background.end());
+        if (!reach) reach = render::ball_around(casters);
+    } else {
+        shadows.reset();
+        other_shadows.reset();
+    }
+
     // Layers.
     auto split = render::split_into_layers(centres, view, options.layers);
     if (!split) return split.error();
@@ -468,8 +585,18 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         frame.triangles += thing.levels->chain.triangles(thing.fading_from);
     }
     times.begin();
+    const std::uint64_t redraws_before = shadow_redraws();
+    if (!casters.empty()) {
+        caster_layers.assign(casters.size(), -1);
+        for (std::size_t i = 0; i < in_sight.size(); ++i) caster_layers[in_sight[i]] = split->layer_of[i];
+        if (is_perceptual) is_shaded = find_shaded(*split, in_sight);
+        if (auto drawn = cast(casters, shadows); !drawn) return drawn.error();
+        frame.shadow_maps = shadows->counts().maps;
+    }
+    const render::Shadows* picture_shadows = shadows ? &*shadows : nullptr;
     render::LayerPasses& layers = passes->layers;
-    if (auto drawn = layers.draw(shown, background, {.view = view}, split_of_shown, glm::vec4(session.background()));
+    if (auto drawn = layers.draw(shown, background, {.view = view, .shadows = picture_shadows}, split_of_shown,
+                                 glm::vec4(session.background()));
         !drawn)
         return drawn.error();
     times.end_stage();
@@ -498,7 +625,7 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     for (std::size_t layer = 0; is_perceptual && layer < tests.size(); ++layer) {
         if (tests[layer].empty() && !options.maps_all_layers) continue;
         const int number = static_cast<int>(layer);
-        if (auto combined = layers.combine(number); !combined) return combined.error();
+        if (auto combined = combine(number); !combined) return combined.error();
         times.end_stage();
         if (auto mapped = map(number); !mapped) return mapped.error();
         times.end_stage();
@@ -515,7 +642,18 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         }
         std::vector<render::Item> all = tested;
         all.insert(all.end(), background.begin(), background.end());
-        if (auto drawn = passes->counts.draw_depth(all, {.view = view, .near_plane = layers.near_plane()}); !drawn)
+        // Shadows are those of the better levels as well, or what a better level's surface has of a worse one's shadow on
+        // itself would count. All else casts its own.
+        if (!casters.empty()) {
+            std::vector<render::Item> better = casters;
+            for (std::size_t i = 0; i < in_sight.size(); ++i)
+                if (frame.tested_with[in_sight[i]] >= 0) better[in_sight[i]].cut = tested[i].cut;
+            if (auto drawn = cast(better, other_shadows); !drawn) return drawn.error();
+        }
+        if (auto drawn = passes->counts.draw_depth(all, {.view = view,
+                                                         .near_plane = layers.near_plane(),
+                                                         .shadows = casters.empty() ? nullptr : &*other_shadows});
+            !drawn)
             return drawn.error();
         ++frame.surface_passes;
     }
@@ -540,10 +678,13 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
 
     const render::LayerCounts counts = layers.counts();
     frame.surface_passes += counts.surface_passes;
+    frame.masked_layers = counts.mask_passes;
+    frame.shadow_passes = static_cast<int>(shadow_redraws() - redraws_before);
     frame.full_screen_passes = counts.full_screen_passes + passes_done() - maps_before;
     frame.texture_bytes = counts.texture_bytes + (passes->modern ? passes->modern->texture_bytes() : 0) +
                           (passes->rpg99 ? passes->rpg99->texture_bytes() : 0) +
-                          4 * static_cast<std::uint64_t>(view.width) * static_cast<std::uint64_t>(view.height);
+                          4 * static_cast<std::uint64_t>(view.width) * static_cast<std::uint64_t>(view.height) +
+                          (shadows ? shadows->counts().bytes : 0) + (other_shadows ? other_shadows->counts().bytes : 0);
     ++frames;
     return frame;
 }
@@ -652,13 +793,13 @@ Result<std::vector<int>> LevelControl::read_levels() {
 
 const render::Target& LevelControl::picture() const noexcept { return impl_->passes->layers.composite(); }
 const render::LayerPasses& LevelControl::layers() const noexcept { return impl_->passes->layers; }
-Result<void> LevelControl::combine(int left_out) { return impl_->passes->layers.combine(left_out); }
+Result<void> LevelControl::combine(int left_out) { return impl_->combine(left_out); }
 
 Result<std::vector<float>> LevelControl::thresholds(int left_out) {
     Impl& own = *impl_;
     if (!own.passes->modern && !own.passes->rpg99)
         return bad_option("only the method perceptual has maps of thresholds");
-    if (auto combined = own.passes->layers.combine(left_out); !combined) return combined.error();
+    if (auto combined = own.combine(left_out); !combined) return combined.error();
     if (auto mapped = own.map(left_out); !mapped) return mapped.error();
     return own.passes->rpg99 ? own.passes->rpg99->read_thresholds(left_out)
                              : own.passes->modern->read_thresholds(left_out);

@@ -11,6 +11,10 @@
 // and counts the pixels where that looks different by more. The counts of one frame decide in a later one: nothing is
 // read back, and nothing waits for the GPU.
 //
+// Pictures have the shadows of the scene's lights. What masks a layer's objects has those that all else casts on them: in
+// the combination without the layer, what is behind the objects is multiplied by the share of their light that these
+// shadows leave them.
+//
 // It is a baseline, not a promise: what it counts is how many pixels differ visibly, a few of which it allows; and what
 // lies behind an object counts as masking it. The fold tests of Session promise more, and Follower keeps that promise.
 #pragma once
@@ -80,7 +84,10 @@ struct LevelFrame {
     std::uint64_t triangles = 0;  // of objects
     int layers = 0;               // that hold objects; 0: one, which is drawn at once
     int surface_passes = 0, full_screen_passes = 0;
-    int changed = 0; // objects that have another level than in the frame before
+    int masked_layers = 0; // of those that were mapped, on whose objects others cast shadows; each is a surface pass
+    int shadow_maps = 0;   // of the picture; 0: no light casts any
+    int shadow_passes = 0; // that drew maps of shadows: for the picture, for masks, and for tests
+    int changed = 0;       // objects that have another level than in the frame before
     std::uint64_t texture_bytes = 0;
     // That became known since the frame before.
     std::vector<LevelTest> tests;
