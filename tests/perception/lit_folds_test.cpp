@@ -151,18 +151,20 @@ TEST(LitFolds, AreTheSameFromAFile) {
     }
 }
 
+// As files keep them.
+struct Folds {
+    using Component = float;
+    float values[40];
+};
+struct Albedo {
+    using Component = float;
+    float values[11];
+};
+
 // What a file says, or what somebody puts there: never a crash, and no number that is none.
 TEST(LitFolds, RefuseDamagedAttributes) {
     const VertexTree tree = support::built(shapes::with_attributes(shapes::bumpy_sphere(2, 0.04)));
     const VertexTree with = *LitFolds::measure(tree)->with_attributes(tree);
-    struct Folds {
-        using Component = float;
-        float values[40];
-    };
-    struct Albedo {
-        using Component = float;
-        float values[11];
-    };
     const std::size_t nodes = tree.interior_count();
     const auto folds = with.attribute<Folds>("lit_folds");
     const auto albedo = with.attribute<Albedo>("lit_albedo");
