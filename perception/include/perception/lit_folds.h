@@ -18,7 +18,7 @@ namespace unseen::perception {
 // luminance. So is what changes of a, for ambient light. Copies are cheap and share their data.
 class LitFolds {
 public:
-    // Fails where measure_folds() does. Cost: three times its, or four where there are colours.
+    // Fails where measure_folds() does. Cost: about that of it; all is measured at once.
     static Result<LitFolds> measure(const vdtree::VertexTree& tree, int threads = 0, const Progress& progress = {});
 
     // What with_attributes() has kept in a tree. Fails where the tree has none of it (invalid_argument), where other

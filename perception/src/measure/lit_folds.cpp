@@ -57,8 +57,7 @@ struct Shades {
 };
 static_assert(sizeof(Shades) == 11 * sizeof(float));
 
-// Of an interior node. Which neighbours are folded with it depends on the luminances, so each axis finds other lengths:
-// kept are the worst.
+// Of an interior node.
 struct LitRecord {
     using Component = float;
 
@@ -115,13 +114,6 @@ Error refused(const std::string& what) {
                                            " Measure it again, or build the tree again from its mesh."};
 }
 
-Result<MeasuredFolds> measure_shaded(const VertexTree& tree, const FunctionRef<float(NodeId)>& luminance, int threads,
-                                     const Progress& progress) {
-    const auto shaded = tree.shaded(luminance);
-    if (!shaded) return shaded.error();
-    return measure_records(*shaded, threads, progress);
-}
-
 // Of one light at a node.
 struct Reach {
     float most = 0;   // of white that faces it, in the ring
@@ -174,38 +166,28 @@ struct LitFolds::State {
 };
 
 Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Progress& progress) {
-    const bool is_painted = !tree.colours().empty();
-    const std::size_t passes = is_painted ? 4 : 3;
+    std::vector<Shading> shadings;
+    for (int axis = 0; axis < 3; ++axis)
+        shadings.push_back([&tree, axis](NodeId node) {
+            return (offset + albedo_of(tree, node) * glm::vec3(tree.normals()[node])[axis]) / scale;
+        });
+    if (!tree.colours().empty()) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
+    auto measured = measure_records(tree, shadings, threads, progress);
+    if (!measured) return measured.error();
     auto state = std::make_shared<State>();
-    for (std::size_t pass = 0; pass < passes; ++pass) {
-        const Progress told = [&](double share, const char* stage) {
-            return !progress || progress((static_cast<double>(pass) + share) / static_cast<double>(passes), stage);
-        };
-        const auto luminance = [&](NodeId node) {
-            const float albedo = albedo_of(tree, node);
-            if (pass == 3) return albedo;
-            return (offset + albedo * glm::vec3(tree.normals()[node])[static_cast<int>(pass)]) / scale;
-        };
-        auto records = measure_shaded(tree, luminance, threads, told);
-        if (!records) return records.error();
-        if (pass == 0) {
-            LitRecord none;
-            none.gap = std::numeric_limits<float>::infinity();
-            state->folds.assign(tree.interior_count(), none);
-            state->facing = records->facing;
+    const auto& axes = *measured;
+    LitRecord none;
+    none.gap = std::numeric_limits<float>::infinity();
+    state->folds.assign(tree.interior_count(), none);
+    state->facing = axes[0].facing;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            include(axes[axis].folds[node], state->folds[node]);
+            include(axes[axis].facing[node], state->facing[node]);
+            state->folds[node].of_axis[axis] = shades_of(axes[axis].folds[node]);
         }
-        if (pass == 3) state->albedo.resize(tree.interior_count());
-        for (NodeId node = 0; node < tree.interior_count(); ++node) {
-            const Shades shades = shades_of(records->folds[node]);
-            if (pass == 3) {
-                state->albedo[node] = shades;
-                continue;
-            }
-            include(records->folds[node], state->folds[node]);
-            include(records->facing[node], state->facing[node]);
-            state->folds[node].of_axis[pass] = shades;
-        }
-    }
+    if (axes.size() > 3)
+        for (const FoldRecord& fold : axes[3].folds) state->albedo.push_back(shades_of(fold));
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
     state->bounds = std::move(*bounds);
