@@ -41,6 +41,7 @@ constexpr OptionName option_names[] = {
     {"session::read_textured_mesh()", "unseen build"},
     {"vdtree::write_tree()", "'unseen build'"},
     {"session::measured()", "unseen build"},
+    {"session::measured_under_lights()", "unseen build --lit-fold-errors"},
     {"session::TreeCache", "unseen cache"},
 };
 

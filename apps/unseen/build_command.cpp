@@ -14,6 +14,7 @@
 #endif
 
 #include <perception/fold_measurement.h>
+#include <perception/lit_folds.h>
 #include <session/model_file.h>
 
 #include "build_team.h"
@@ -38,7 +39,7 @@ struct BuildArguments {
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
-    bool no_fold_errors = false, is_verbose = false;
+    bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
     TextureOptions texture;
 };
 
@@ -58,10 +59,15 @@ Json peak_bytes() {
 }
 
 Json to_json(const vdtree::VertexTree& tree, double seconds) {
-    return {{"vertices", tree.leaf_count()},       {"triangles", tree.triangle_count()},
-            {"dropped", tree.dropped_triangles()}, {"nodes", tree.node_count()},
-            {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)},
-            {"peak_bytes", peak_bytes()},          {"fold_errors", perception::has_fold_measurement(tree)},
+    return {{"vertices", tree.leaf_count()},
+            {"triangles", tree.triangle_count()},
+            {"dropped", tree.dropped_triangles()},
+            {"nodes", tree.node_count()},
+            {"bytes", tree.byte_size()},
+            {"build_seconds", number_or_null(seconds)},
+            {"peak_bytes", peak_bytes()},
+            {"fold_errors", perception::has_fold_measurement(tree)},
+            {"lit_fold_errors", perception::has_lit_folds(tree)},
             {"texture", texture_json(tree)}};
 }
 
@@ -170,6 +176,14 @@ Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&&
     return session::measured(tree, a.threads, std::ref(bar));
 }
 
+Result<vdtree::VertexTree> measure_under_lights(const BuildArguments& a, const vdtree::VertexTree& tree) {
+    if (!tree.texture().empty())
+        return Error{ErrorCode::unsupported, a.mesh + " has a texture, and what folds change of it under lights is not "
+                                                      "measured: leave out --lit-fold-errors, or add --no-texture."};
+    ProgressBar bar("measuring what folds change under lights");
+    return session::measured_under_lights(tree, a.threads, std::ref(bar));
+}
+
 // The first of a team, or the only one.
 Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     auto source = open_source(a, team);
@@ -189,6 +203,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (const std::string hint = session::hint_at_baked_light(*tree); !hint.empty())
         print_note(with_option_names(a.mesh + ": " + hint));
     if (!a.no_fold_errors) tree = measure(a, std::move(*tree));
+    if (tree && a.lit_fold_errors) tree = measure_under_lights(a, *tree);
     if (!tree) return tree.error();
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -262,6 +277,9 @@ Command build_command(CLI::App& app) {
             "The default, where there is no texture: measure what every fold changes, for the fold test 'error', "
             "and give proxies the luminance that keeps the surface's light")
         ->excludes(leave);
+    verb->add_flag("--lit-fold-errors", a->lit_fold_errors,
+                   "Measure also what every fold changes under lights, for scenes with lights that stand still; else "
+                   "the first of them measures it");
     add_texture_options(*verb, a->texture);
     verb->add_option("--memory", a->memory_gib,
                      "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")

@@ -86,7 +86,8 @@ Command cache_command(CLI::App& app) {
         "A mesh that is given in place of a tree is built and measured once. Its tree is kept in\n"
         "$UNSEEN_CACHE (off: nowhere), else $XDG_CACHE_HOME/unseen, else ~/.cache/unseen, and taken from there\n"
         "as long as the mesh, the files it refers to and the options are the same. At most $UNSEEN_CACHE_SIZE\n"
-        "is kept (default: 4G); what was not used for longest goes first.\n\n"
+        "is kept (default: 4G); what was not used for longest goes first. Kept, too, is what is measured of a\n"
+        "tree that is a file, and of any under lights (MESH+lights).\n\n"
         "Examples:\n  unseen cache\n  unseen cache --limit 500M\n  unseen cache --clear");
     return {verb, [a] { return run(*a); }};
 }

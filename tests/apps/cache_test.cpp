@@ -246,6 +246,78 @@ TEST_F(CacheTest, MeasurementsOfTreeFilesAreKept) {
     EXPECT_THAT(kept(), SizeIs(1));
 }
 
+TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKept) {
+    write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 2, 0.5],
+                                        "intensity": 0.8}]})");
+    write_text(path("other.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [-1, 0, 1],
+                                        "intensity": 0.6}]})");
+    const auto lit = [&](const std::string& model, const std::string& lights, const std::string& out,
+                         std::vector<std::string> more = {}) {
+        more.insert(more.begin(), {"simplify", model, "--lights", lights, "-o", out});
+        const Outcome outcome = run(more);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.err;
+    };
+    const std::string measured = "measured what the folds of ball.obj change under lights";
+    EXPECT_THAT(lit("ball.obj", "lights.json", "first.ply"), HasSubstr(measured));
+    EXPECT_THAT(kept(), ElementsAre("ball.obj+lights", "ball.obj"));
+    EXPECT_THAT(run({"cache"}).out, HasSubstr("ball.obj+lights"));
+    EXPECT_EQ(lit("ball.obj", "lights.json", "second.ply"), "") << "the second start reads";
+    EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply"))) << "another mesh";
+    EXPECT_EQ(lit("ball.obj", "other.json", "other.ply"), "") << "of all lights";
+    lit("ball.obj", "lights.json", "anew.ply", {"--no-cache"});
+    EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("anew.ply"))) << "what is kept changes the mesh";
+    EXPECT_THAT(kept(), SizeIs(2));
+
+    const auto file = [&] {
+        for (const auto& tree : TreeCache().trees())
+            if (tree.source == "ball.obj+lights") return tree.file;
+        return fs::path();
+    };
+    std::string bytes = read_text(file());
+    const std::string whole = bytes;
+    bytes[bytes.size() - bytes.size() / 8] ^= 4; // attributes stand last
+    for (const std::string& damaged : {bytes, whole.substr(0, whole.size() - 100), std::string("nothing")}) {
+        write_text(file(), damaged);
+        EXPECT_THAT(lit("ball.obj", "lights.json", "second.ply"), HasSubstr(measured));
+        EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply")));
+        EXPECT_TRUE(read_text(file()) == whole);
+    }
+    // Whole trees, but without what belongs there, or of another mesh.
+    write_ball("smaller.obj", 6, 9);
+    ASSERT_EQ(run({"build", "ball.obj", "-o", "plain.vdt"}).status, 0);
+    ASSERT_EQ(run({"build", "smaller.obj", "-o", "smaller.vdt", "--lit-fold-errors"}).status, 0);
+    for (const char* foreign : {"plain.vdt", "smaller.vdt"}) {
+        write_text(file(), read_text(path(foreign)));
+        EXPECT_THAT(lit("ball.obj", "lights.json", "second.ply"), HasSubstr(measured)) << foreign;
+        EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply"))) << foreign;
+        EXPECT_TRUE(read_text(file()) == whole) << foreign;
+    }
+    write_text(path("ball.obj"), "# other bytes\n" + read_text(path("ball.obj")));
+    EXPECT_THAT(lit("ball.obj", "lights.json", "second.ply"), HasSubstr(measured));
+}
+
+TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptInTreeFiles) {
+    write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 2, 0.5],
+                                        "intensity": 0.8}]})");
+    ASSERT_EQ(run({"build", "ball.obj", "-o", "plain.vdt"}).status, 0);
+    const Outcome built = run({"build", "ball.obj", "-o", "lit.vdt", "--lit-fold-errors", "--json", "-"});
+    ASSERT_EQ(built.status, 0) << built.err;
+    EXPECT_EQ(built.json()["lit_fold_errors"], true);
+    const auto lit = [&](const std::string& tree, const std::string& out) {
+        const Outcome outcome = run({"simplify", tree, "--lights", "lights.json", "-o", out});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.err;
+    };
+    EXPECT_EQ(lit("lit.vdt", "lit.ply"), "");
+    EXPECT_THAT(kept(), IsEmpty()) << "the file has it";
+    EXPECT_THAT(lit("plain.vdt", "first.ply"), HasSubstr("measured what the folds of plain.vdt change under lights"));
+    EXPECT_THAT(kept(), ElementsAre("plain.vdt+lights"));
+    EXPECT_EQ(lit("plain.vdt", "second.ply"), "");
+    EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply")));
+    EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("lit.ply")));
+}
+
 TEST_F(CacheTest, AProgramChoosesTheFolderOrNone) {
     const auto load = [&](const CacheOptions& cache, session::Messages messages = {}) {
         return Scene::load(path("ball.obj"), {.cache = cache, .messages = std::move(messages)});

@@ -242,7 +242,7 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
             picture.draw(FoldPicture::Layer::mesh, corner(whole[0]), corner(whole[1]), corner(whole[2]));
             picture.draw(FoldPicture::Layer::folded, corner(drawn[0]), corner(drawn[1]), corner(drawn[2]));
         }
-        const auto amplitudes = picture.difference().amplitudes;
+        const auto amplitudes = picture.difference().amplitudes[0];
         ++compared;
         within += *std::max_element(amplitudes.begin(), amplitudes.end()) <= 1.25f * counted;
     }

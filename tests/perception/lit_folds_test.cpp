@@ -3,13 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <limits>
 #include <random>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
 
 #include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <perception/criterion.h>
 #include <perception/fold_measurement.h>
+#include <vdtree/tree_io.h>
 
 #include "built.h"
 #include "measure/fold_record.h"
@@ -97,6 +104,127 @@ TEST(LitFolds, CostNothingWhereNoLightReaches) {
         EXPECT_EQ(records[node].bias, 0) << node;
     }
     EXPECT_GT(dark, 100);
+}
+
+std::string bytes_of(const VertexTree& tree) {
+    std::string all;
+    for (const AttributeInfo& info : tree.attributes()) {
+        all += info.name + ' ';
+        if (info.name == record_name) {
+            const auto bytes = std::as_bytes(tree.attribute<FoldRecord>(record_name));
+            all.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        }
+        if (info.name == facing_name) {
+            const auto bytes = std::as_bytes(tree.attribute<FoldFacing>(facing_name));
+            all.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        }
+    }
+    return all;
+}
+
+TEST(LitFolds, AreTheSameFromAFile) {
+    for (const bool is_painted : {false, true}) {
+        Mesh mesh = shapes::bumpy_sphere(3, 0.04);
+        if (is_painted) mesh = shapes::with_attributes(std::move(mesh));
+        const VertexTree tree = support::built(mesh);
+        EXPECT_FALSE(has_lit_folds(tree));
+        const auto none = LitFolds::of(tree);
+        ASSERT_FALSE(none);
+        EXPECT_EQ(none.error().code, ErrorCode::invalid_argument);
+        const auto folds = LitFolds::measure(tree);
+        ASSERT_TRUE(folds);
+        const auto with = folds->with_attributes(tree);
+        ASSERT_TRUE(with) << with.error().message;
+        const std::filesystem::path file =
+            std::filesystem::temp_directory_path() / ("lit-folds-" + std::to_string(::getpid()) + ".vdt");
+        ASSERT_TRUE(write_tree(file, *with));
+        const auto read = read_tree(file);
+        std::filesystem::remove(file);
+        ASSERT_TRUE(read) << read.error().message;
+        EXPECT_TRUE(has_lit_folds(*read));
+        const auto kept = LitFolds::of(*read);
+        ASSERT_TRUE(kept) << kept.error().message;
+        const Lighting lighting = one_light({1, 2, 0.5});
+        EXPECT_TRUE(bytes_of(*folds->under(tree, lighting)) == bytes_of(*kept->under(*read, lighting)));
+        EXPECT_FALSE(has_lit_folds(*tree.relit(Light())));
+        EXPECT_FALSE(folds->with_attributes(support::built(shapes::icosphere(2))));
+    }
+}
+
+// As files keep them.
+struct Folds {
+    using Component = float;
+    float values[40];
+};
+struct Albedo {
+    using Component = float;
+    float values[11];
+};
+
+// What a file says, or what somebody puts there: never a crash, and no number that is none.
+TEST(LitFolds, RefuseDamagedAttributes) {
+    const VertexTree tree = support::built(shapes::with_attributes(shapes::bumpy_sphere(2, 0.04)));
+    const VertexTree with = *LitFolds::measure(tree)->with_attributes(tree);
+    const std::size_t nodes = tree.interior_count();
+    const auto folds = with.attribute<Folds>("lit_folds");
+    const auto albedo = with.attribute<Albedo>("lit_albedo");
+    const auto settings = with.attribute<float>("lit_measurement");
+    const auto facing = with.attribute<FoldFacing>("lit_facing");
+    ASSERT_EQ(folds.size(), nodes);
+    ASSERT_EQ(albedo.size(), nodes);
+    ASSERT_EQ(facing.size(), nodes);
+    const auto complaint = [](const Result<VertexTree>& damaged) {
+        EXPECT_TRUE(damaged);
+        const auto read = LitFolds::of(*damaged);
+        return read ? std::string() : read.error().message;
+    };
+    const auto with_folds = [&](std::vector<Folds> values, AttributeDomain domain = AttributeDomain::interior_node) {
+        return with.with_attribute("lit_folds", domain, std::move(values));
+    };
+    const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+    constexpr std::size_t gap = 5, sine = 6;
+    for (std::size_t i = 0; i < 40; ++i)
+        for (const float value : {nan, -1.0f, infinity, -infinity}) {
+            if (i == gap && value == infinity) continue; // nothing is near
+            std::vector<Folds> values(folds.begin(), folds.end());
+            values[nodes / 2].values[i] = value;
+            EXPECT_THAT(complaint(with_folds(values)), HasSubstr("node " + std::to_string(nodes / 2))) << i << value;
+        }
+    std::vector<Folds> steep(folds.begin(), folds.end());
+    steep[0].values[sine] = 1.5f;
+    EXPECT_THAT(complaint(with_folds(steep)), HasSubstr("node 0"));
+    for (std::size_t i = 0; i < 11; ++i) {
+        std::vector<Albedo> values(albedo.begin(), albedo.end());
+        values.back().values[i] = nan;
+        EXPECT_THAT(complaint(with.with_attribute("lit_albedo", AttributeDomain::interior_node, values)),
+                    HasSubstr("node " + std::to_string(nodes - 1)));
+    }
+    std::vector<FoldFacing> fading(facing.begin(), facing.end());
+    fading[1].fading = 9;
+    EXPECT_THAT(complaint(with.with_attribute("lit_facing", AttributeDomain::interior_node, fading)),
+                HasSubstr("node 1 "));
+    // Cut off, or of another type: attributes of the whole tree have any length.
+    for (const std::size_t left : {std::size_t{1}, nodes / 2, nodes - 1}) {
+        EXPECT_THAT(complaint(with_folds({folds.begin(), folds.begin() + static_cast<std::ptrdiff_t>(left)},
+                                         AttributeDomain::tree)),
+                    HasSubstr("missing"));
+        EXPECT_THAT(complaint(with.with_attribute(
+                        "lit_albedo", AttributeDomain::tree,
+                        std::vector<Albedo>(albedo.begin(), albedo.begin() + static_cast<std::ptrdiff_t>(left)))),
+                    HasSubstr("missing"));
+    }
+    EXPECT_THAT(complaint(with.with_attribute("lit_facing", AttributeDomain::interior_node, std::vector<float>(nodes))),
+                HasSubstr("missing"));
+    for (std::size_t left = 0; left < settings.size(); ++left)
+        EXPECT_THAT(complaint(with.with_attribute(
+                        "lit_measurement", AttributeDomain::tree,
+                        std::vector<float>(settings.begin(), settings.begin() + static_cast<std::ptrdiff_t>(left)))),
+                    HasSubstr("other settings"));
+    std::vector<float> others(settings.begin(), settings.end());
+    others[0] = nan;
+    EXPECT_THAT(complaint(with.with_attribute("lit_measurement", AttributeDomain::tree, others)),
+                HasSubstr("other settings"));
+    EXPECT_EQ(complaint(with.share()), "");
 }
 
 TEST(LitFolds, RefuseWhatTheyDoNotKnow) {

@@ -17,6 +17,7 @@
 #include <xxhash.h>
 
 #include <perception/fold_measurement.h>
+#include <perception/lit_folds.h>
 
 namespace unseen::session {
 namespace {
@@ -155,6 +156,15 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
         hash.add(range.name);
         hash.add({reinterpret_cast<const char*>(place), sizeof place});
     }
+    return hash.digits();
+}
+
+std::string lights_key(const std::string& key) {
+    const auto settings = std::as_bytes(perception::lit_measurement_settings());
+    Hash hash;
+    hash.add("under lights");
+    hash.add(key);
+    hash.add({reinterpret_cast<const char*>(settings.data()), settings.size()});
     return hash.digits();
 }
 

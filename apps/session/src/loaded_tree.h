@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include <perception/lit_folds.h>
 #include <session/model_file.h>
 #include <session/scene.h>
 #include <session/tree_cache.h>
@@ -12,25 +13,39 @@ namespace unseen::session {
 // Larger trees are measured only where somebody asks for that. Interior nodes; about a minute on one core.
 inline constexpr vdtree::NodeId most_measured = 2'000'000;
 
-// Where the measurement of a tree file's tree is kept.
+// Where what is measured of a tree is kept.
 struct MeasurementPlace {
     TreeCache cache;
-    std::string key;
+    std::string key; // of the file's tree
     std::filesystem::path file;
     vdtree::VertexTree tree; // that this is of: an object's tree may have become another one
+    // Under the key stands, or is to stand, the tree with what its folds change under its own light. Not of meshes: there
+    // stands what was built, whether it was measured or not.
+    bool is_of_tree_file = true;
 };
 
 struct LoadedTree {
     vdtree::VertexTree tree;
     TreeOrigin origin;
-    std::shared_ptr<const MeasurementPlace> measurement = {}; // null: it has one, or is kept nowhere
+    std::shared_ptr<const MeasurementPlace> measurement = {}; // null: nothing of it is kept
 };
 
 // open_tree() where `may_map`, else load_tree().
 Result<LoadedTree> load(const std::filesystem::path& file, const LoadOptions& options, bool may_map);
 
-// measured(), or what is kept of it. `place` may be null.
+// Null where nothing is kept, and of textured trees.
+std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, const std::string& key,
+                                                      const std::filesystem::path& file,
+                                                      const vdtree::VertexTree& tree);
+
+// measured(), or what is kept of it. `place` may be null, else it is a tree file's.
 Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                          const Messages& messages);
+
+// What a tree's folds change under lights: what the tree has of it, or what is kept, else measured now and kept. `place`
+// may be null. `takes_long`: is told where
+// it is measured.
+Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
+                                                        const Messages& messages, bool takes_long);
 
 } // namespace unseen::session

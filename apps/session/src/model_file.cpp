@@ -1,7 +1,9 @@
 #include <session/model_file.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <string_view>
 
 #include <perception/fold_measurement.h>
 #include <vdtree/baked_light.h>
@@ -48,10 +50,19 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     return measures ? measured(*tree, 0, options.messages.progress) : std::move(tree);
 }
 
+// Of files in the cache, behind the source's name.
+constexpr std::string_view under_lights = "+lights";
+
+// Whoever can write to the cache can put another tree there.
+bool is_same_tree(const vdtree::VertexTree& a, const vdtree::VertexTree& b) {
+    return a.interior_count() == b.interior_count() && std::ranges::equal(a.positions(), b.positions());
+}
+
 // Runs `make`, which builds or only measures, keeps its tree, and notes both. `key`: none where it is kept nowhere.
-template <class Make>
+// `deed`: what it has done, of the tree.
+template <class Make, class Deed>
 Result<vdtree::VertexTree> make_and_keep(const TreeCache& cache, const std::optional<std::string>& key,
-                                         const fs::path& file, const Messages& messages, bool builds, Make&& make) {
+                                         const fs::path& file, const Messages& messages, Make&& make, Deed&& deed) {
     const auto start = std::chrono::steady_clock::now();
     Result<vdtree::VertexTree> tree = make();
     if (!tree) return tree;
@@ -62,10 +73,7 @@ Result<vdtree::VertexTree> make_and_keep(const TreeCache& cache, const std::opti
         what_becomes = kept ? "kept in " + cache.folder().string() + " for the next time (session::TreeCache)"
                             : "not kept for the next time: " + kept.error().message;
     }
-    const bool is_measured = perception::has_fold_measurement(*tree);
-    const std::string deed = !builds ? "measured" : is_measured ? "built and measured" : "built";
-    if (messages.note)
-        messages.note(deed + " the tree of " + file.string() + " in " + rounded(seconds, 2) + " s; " + what_becomes);
+    if (messages.note) messages.note(deed(*tree) + " in " + rounded(seconds, 2) + " s; " + what_becomes);
     return tree;
 }
 
@@ -73,18 +81,30 @@ Result<LoadedTree> load_mesh(const fs::path& file, const LoadOptions& options) {
     const TreeCache cache(options.cache);
     std::optional<std::string> key;
     if (cache.is_on()) key = cache_key(file, options);
+    const auto with_place = [&](vdtree::VertexTree tree, TreeOrigin origin) {
+        LoadedTree loaded{std::move(tree), origin};
+        if (key) loaded.measurement = place_of_mesh(cache, *key, file, loaded.tree);
+        return loaded;
+    };
     if (key) {
         auto kept = cache.find(*key, options.messages.progress);
         if (!kept) return kept.error();
-        if (*kept) return LoadedTree{std::move(**kept), TreeOrigin::cache};
+        if (*kept) return with_place(std::move(**kept), TreeOrigin::cache);
     }
-    auto tree = make_and_keep(cache, key, file, options.messages, true, [&]() -> Result<vdtree::VertexTree> {
-        auto built = build(file, options);
-        if (key && cache_key(file, options) != key) key.reset(); // the files have changed meanwhile
-        return built;
-    });
+    auto tree = make_and_keep(
+        cache, key, file, options.messages,
+        [&]() -> Result<vdtree::VertexTree> {
+            auto built = build(file, options);
+            if (key && cache_key(file, options) != key) key.reset(); // the files have changed meanwhile
+            return built;
+        },
+        [&](const vdtree::VertexTree& built) {
+            return (perception::has_fold_measurement(built) ? "built and measured the tree of "
+                                                            : "built the tree of ") +
+                   file.string();
+        });
     if (!tree) return tree.error();
-    return LoadedTree{std::move(*tree), TreeOrigin::built};
+    return with_place(std::move(*tree), TreeOrigin::built);
 }
 
 } // namespace
@@ -128,8 +148,8 @@ Result<LoadedTree> load(const fs::path& file, const LoadOptions& options, bool m
     if (!tree) return tree.error();
     LoadedTree loaded{std::move(*tree), TreeOrigin::file};
     TreeCache cache(options.cache);
-    if (!cache.is_on() || is_large || perception::has_fold_measurement(loaded.tree) || !loaded.tree.texture().empty())
-        return loaded;
+    const bool has_all = perception::has_fold_measurement(loaded.tree) && perception::has_lit_folds(loaded.tree);
+    if (!cache.is_on() || is_large || has_all || !loaded.tree.texture().empty()) return loaded;
     if (auto key = cache_key(file, options))
         loaded.measurement = std::make_shared<const MeasurementPlace>(
             MeasurementPlace{std::move(cache), std::move(*key), file, loaded.tree.share()});
@@ -169,8 +189,47 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
     auto kept = place->cache.find(place->key, messages.progress);
     if (!kept) return kept.error();
     if (*kept) return std::move(**kept);
-    return make_and_keep(place->cache, place->key, place->file, messages, false,
-                         [&] { return measured(tree, 0, messages.progress); });
+    return make_and_keep(
+        place->cache, place->key, place->file, messages, [&] { return measured(tree, 0, messages.progress); },
+        [&](const vdtree::VertexTree&) { return "measured the tree of " + place->file.string(); });
+}
+
+std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, const std::string& key,
+                                                      const fs::path& file, const vdtree::VertexTree& tree) {
+    if (!cache.is_on() || !tree.texture().empty()) return nullptr;
+    return std::make_shared<const MeasurementPlace>(MeasurementPlace{cache, key, file, tree.share(), false});
+}
+
+Result<vdtree::VertexTree> measured_under_lights(const vdtree::VertexTree& tree, int threads,
+                                                 const Progress& progress) {
+    const auto folds = perception::LitFolds::measure(tree, threads, progress);
+    return folds ? folds->with_attributes(tree) : folds.error();
+}
+
+Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
+                                                        const Messages& messages, bool takes_long) {
+    // What is damaged, or of another version, is measured again.
+    if (perception::has_lit_folds(tree))
+        if (auto own = perception::LitFolds::of(tree)) return own;
+    const std::string key = place ? lights_key(place->key) : std::string();
+    if (place) {
+        const auto kept = place->cache.find(key, messages.progress);
+        if (!kept) return kept.error();
+        if (*kept && is_same_tree(**kept, tree))
+            if (auto folds = perception::LitFolds::of(**kept)) return folds;
+    }
+    if (messages.note && takes_long)
+        messages.note("measuring what folds change under lights" +
+                      std::string(place ? "" : " (session::measured_under_lights() keeps that in the tree)") + " ...");
+    if (!place) return perception::LitFolds::measure(tree, 0, messages.progress);
+    const auto with_folds = make_and_keep(
+        place->cache, key, place->file.string() + std::string(under_lights), messages,
+        [&] { return measured_under_lights(tree, 0, messages.progress); },
+        [&](const vdtree::VertexTree&) {
+            return "measured what the folds of " + place->file.string() + " change under lights";
+        });
+    if (!with_folds) return with_folds.error();
+    return perception::LitFolds::of(*with_folds);
 }
 
 } // namespace unseen::session

@@ -98,6 +98,7 @@ Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<dou
         auto relit = object.tree.relit(light);
         if (!relit) return relit.error();
         object.tree = std::move(*relit);
+        object.measurement.reset(); // of the tree as it was read
         object.is_relit = true;
     }
     return {};

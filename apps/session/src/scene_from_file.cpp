@@ -35,6 +35,7 @@ struct Part {
     bool folds = false;                          // shown by other nodes than those of the background, too
     std::optional<vdtree::VertexTree> tree = {}; // none: it has no triangles
     TreeOrigin origin = TreeOrigin::built;
+    std::shared_ptr<const MeasurementPlace> measurement = {};
 };
 
 struct Placed {
@@ -90,6 +91,7 @@ private:
             if (*kept) {
                 part.tree = std::move(**kept);
                 part.origin = TreeOrigin::cache;
+                part.measurement = place_of_mesh(cache_, key, name_, *part.tree);
                 return {};
             }
         }
@@ -107,6 +109,7 @@ private:
             if (!kept && not_kept_.empty()) not_kept_ = kept.error().message;
         }
         part.tree = std::move(*tree);
+        part.measurement = place_of_mesh(cache_, key, name_, *part.tree);
         return {};
     }
 
@@ -305,6 +308,7 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         Object object{part.tree->share(), node.placement, node.node->name};
         object.texture_left_out = options.without_textures;
         object.origin = part.origin;
+        object.measurement = part.measurement;
         object.node = node.node->node;
         object.mesh = node.node->mesh;
         (node.node->is_background ? scene.backdrop : scene.objects).push_back(std::move(object));

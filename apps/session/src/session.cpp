@@ -47,6 +47,12 @@ std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
     return planes;
 }
 
+// What is kept is of the tree as it was read.
+const MeasurementPlace* place_of(const Object& object) {
+    const MeasurementPlace* const place = object.measurement.get();
+    return place && &place->tree.data() == &object.tree.data() ? place : nullptr;
+}
+
 // As the session's users take it.
 Result<std::optional<vdtree::Lighting>> copied(const Result<std::shared_ptr<const vdtree::Lighting>>& lighting) {
     if (!lighting) return lighting.error();
@@ -272,11 +278,11 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
 Result<void> Session::State::measure(std::size_t object) {
     constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
     Object& of = scene.objects[object];
-    // What is kept is of the tree as it was read.
-    if (of.measurement && &of.measurement->tree.data() != &of.tree.data()) of.measurement.reset();
-    if (messages.note && of.tree.interior_count() >= told_from && !of.measurement)
+    const MeasurementPlace* const known = place_of(of);
+    const MeasurementPlace* const place = known && known->is_of_tree_file ? known : nullptr;
+    if (messages.note && of.tree.interior_count() >= told_from && !place)
         messages.note("measuring what folds change (session::measured() keeps that in the tree) ...");
-    auto with_errors = measured_once(of.tree, of.measurement.get(), messages);
+    auto with_errors = measured_once(of.tree, place, messages);
     if (!with_errors) return with_errors.error();
     of.measurement.reset();
     // Of all objects that have this tree.
@@ -295,10 +301,8 @@ Result<void> Session::State::measure(std::size_t object) {
 
 Result<void> Session::State::measure_under_lights(std::size_t object) {
     constexpr vdtree::NodeId told_from = 6'000; // nodes; about half a second on one core
-    const vdtree::VertexTree& tree = scene.objects[object].tree;
-    if (messages.note && tree.interior_count() >= told_from)
-        messages.note("measuring what folds change under lights ...");
-    auto folds = perception::LitFolds::measure(tree, 0, messages.progress);
+    const Object& of = scene.objects[object];
+    auto folds = measured_under_lights_once(of.tree, place_of(of), messages, of.tree.interior_count() >= told_from);
     if (!folds) return folds.error();
     caches[object]->lit_folds = std::move(*folds);
     return {};

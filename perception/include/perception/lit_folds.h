@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 
 #include <vdtree/function_ref.h>
 #include <vdtree/lighting.h>
@@ -17,8 +18,16 @@ namespace unseen::perception {
 // luminance. So is what changes of a, for ambient light. Copies are cheap and share their data.
 class LitFolds {
 public:
-    // Fails where measure_folds() does. Cost: three times its, or four where there are colours.
+    // Fails where measure_folds() does. Cost: about that of it; all is measured at once.
     static Result<LitFolds> measure(const vdtree::VertexTree& tree, int threads = 0, const Progress& progress = {});
+
+    // What with_attributes() has kept in a tree. Fails where the tree has none of it (invalid_argument), where other
+    // settings measured it (unsupported), and on what is damaged (malformed_data). Cost: as LightBounds::measure().
+    static Result<LitFolds> of(const vdtree::VertexTree& tree);
+    // The tree with all of this as attributes (lit_folds, lit_facing, lit_albedo and lit_measurement;
+    // docs/file-format.md), which files keep. Light does not count: the tree's own may be another one than the measured
+    // tree's, though relit() and its like drop all attributes. Fails where the tree is another one.
+    Result<vdtree::VertexTree> with_attributes(const vdtree::VertexTree& tree) const;
 
     // The tree under these lights, which stand still: luminances are lit_luminance() of leaves and proxies, and folds
     // change what they do at most from whichever side the light comes. For error_distances(), whose cuts are the given
@@ -32,5 +41,11 @@ private:
     explicit LitFolds(std::shared_ptr<const State> state) : state_(std::move(state)) {}
     std::shared_ptr<const State> state_;
 };
+
+// Whether with_attributes() was there. What files say is looked at in LitFolds::of().
+bool has_lit_folds(const vdtree::VertexTree& tree);
+
+// The numbers that such a measurement goes by. LitFolds::of() refuses those of another one.
+std::span<const float> lit_measurement_settings() noexcept;
 
 } // namespace unseen::perception

@@ -122,18 +122,19 @@ struct Box {
 // Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
 class ContactFinder {
 public:
-    explicit ContactFinder(const SoundTree& tree)
-        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()),
-          scale_(unit_scale(tree.bounding_sphere().radius)), luminance_(tree.luminance().subspan(interior_)),
-          first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree),
+    explicit ContactFinder(std::span<const SoundTree> trees)
+        : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
+          scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
+          boxes_(interior_), of_leaf_(tree_),
           boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
-        const auto leaves = tree.positions().subspan(interior_);
+        for (const SoundTree& tree : trees) luminances_.push_back(tree.luminance().subspan(interior_));
+        const auto leaves = tree_.positions().subspan(interior_);
         positions_.assign(leaves.begin(), leaves.end());
         for (glm::vec3& p : positions_) p *= scale_;
         for (NodeId node = interior_; node-- > 0;) {
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t)
                 boxes_[node].include(box_of(corners(t)));
-            if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
+            if (node > 0) boxes_[tree_.parents()[node]].include(boxes_[node]);
         }
     }
 
@@ -164,9 +165,14 @@ private:
         const Triangle& t = triangles_[triangle];
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
-    float luminance(Index triangle) const {
-        const Triangle& t = triangles_[triangle];
-        return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
+    bool look_alike(Index a, Index b) const {
+        const Triangle &s = triangles_[a], &t = triangles_[b];
+        return std::all_of(luminances_.begin(), luminances_.end(), [&](std::span<const Unorm16> luminance) {
+            const auto mean = [&](const Triangle& of) {
+                return (luminance[of[0]] + luminance[of[1]] + luminance[of[2]]) / 3;
+            };
+            return std::abs(mean(s) - mean(t)) <= alike_luminance;
+        });
     }
     static Box box_of(const Corners& c) {
         return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))};
@@ -279,8 +285,7 @@ private:
             const glm::vec3 way = way_between(own, its);
             const float gap = glm::length(way);
             if (!(gap < near) || is_beside(own, its, way)) continue;
-            const bool is_alike =
-                face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
+            const bool is_alike = face_alike(own, its) && look_alike(triangle, other);
             if (!is_alike) contact.include({gap, sine_between(own, its)});
         }
         return contact;
@@ -289,9 +294,9 @@ private:
     const SoundTree& tree_;
     NodeId interior_;
     std::span<const Triangle> triangles_;
-    float scale_;                        // in which they are measured
-    std::vector<glm::vec3> positions_;   // of leaves
-    std::span<const Unorm16> luminance_; // likewise
+    float scale_;                                      // in which they are measured
+    std::vector<glm::vec3> positions_;                 // of leaves
+    std::vector<std::span<const Unorm16>> luminances_; // likewise, by tree
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
     LeafTriangles of_leaf_;
@@ -300,6 +305,6 @@ private:
 
 } // namespace
 
-std::vector<Contact> find_contacts(const SoundTree& tree) { return ContactFinder(tree).run(); }
+std::vector<Contact> find_contacts(std::span<const SoundTree> trees) { return ContactFinder(trees).run(); }
 
 } // namespace unseen::perception

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include <vdtree/vertex_tree.h>
@@ -23,6 +24,7 @@ struct Contact {
 
 // By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a
 // triangle.
-std::vector<Contact> find_contacts(const vdtree::SoundTree& tree);
+// `trees`: one at least, the same but for their luminances; what looks alike does so in all of them.
+std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees);
 
 } // namespace unseen::perception

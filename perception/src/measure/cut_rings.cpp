@@ -427,7 +427,7 @@ Result<CutRings> bound_cut_rings(const VertexTree& tree, bool with_chroma) {
                      : chroma.empty() ? RingBounder<GreyVertices>(*sound, {}).run()
                                       : RingBounder<ColouredVertices>(*sound, std::move(chroma)).run();
     // What comes as near as a quarter of a triangle is in the way of any fold.
-    const std::vector<Contact> contacts = find_contacts(*sound);
+    const std::vector<Contact> contacts = find_contacts(std::span(&*sound, 1));
     if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
         rings.meets_another.resize(contacts.size());
         std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));

@@ -21,17 +21,26 @@ constexpr std::size_t side = FoldPicture::side, bands = FoldPicture::bands;
 // ---- drawing
 
 // A triangle as a picture shows it.
+template <std::size_t count>
 struct Shown {
-    float x, y, height, luminance;  // of a corner: cells, mesh units, relative
-    float vx, vy, wx, wy;           // by how much the shares of the other two grow from cell to cell
-    float height_v, height_w;       // their heights less the corner's
-    float luminance_v, luminance_w; // and their luminances
-    std::size_t x0, x1, y0, y1;     // cells whose middles may lie between the corners
+    float x, y, height;         // of a corner: cells, mesh units
+    float vx, vy, wx, wy;       // by how much the shares of the other two grow from cell to cell
+    float height_v, height_w;   // their heights less the corner's
+    std::size_t x0, x1, y0, y1; // cells whose middles may lie between the corners
+    // Relative: the corner's, and the others' less the corner's.
+    std::array<float, count> luminance, luminance_v, luminance_w;
+};
+
+// A layer's cells.
+template <std::size_t count>
+struct Canvas {
+    float* height;
+    std::array<float*, count> luminance;
 };
 
 // Cells of a row are looked at by registers, `Floats`, whether they lie in the triangle or not.
-template <class Floats>
-UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* luminances) {
+template <class Floats, std::size_t count>
+UNSEEN_INLINE void draw_rows(const Shown<count>& t, const Canvas<count>& on) {
     constexpr std::size_t width = sizeof(Floats) / sizeof(float);
     static_assert(side % width == 0);
     Floats lane;
@@ -41,30 +50,39 @@ UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* luminances) 
         const float dy = static_cast<float>(y) + 0.5f - t.y;
         const float v_here = dy * t.vy, w_here = dy * t.wy;
         for (std::size_t begin = t.x0 / width * width; begin < t.x1; begin += width) {
-            float *const height = heights + y * side + begin, *const luminance = luminances + y * side + begin;
+            const std::size_t cell = y * side + begin;
+            float* const height = on.height + cell;
             const Floats x = lane + static_cast<float>(begin), dx = x + 0.5f - t.x;
             const Floats v = dx * t.vx + v_here, w = dx * t.wx + w_here;
             const Floats h = t.height + v * t.height_v + w * t.height_w;
-            const Floats l = t.luminance + v * t.luminance_v + w * t.luminance_w;
-            Floats old_height, old_luminance;
+            Floats old_height;
             std::memcpy(&old_height, height, sizeof(Floats));
-            std::memcpy(&old_luminance, luminance, sizeof(Floats));
             const auto is_seen = (x >= from) & (x < to) & (v >= 0) & (w >= 0) & (v + w <= 1) & (h > old_height);
-            const Floats new_height = is_seen ? h : old_height, new_luminance = is_seen ? l : old_luminance;
+            const Floats new_height = is_seen ? h : old_height;
             std::memcpy(height, &new_height, sizeof(Floats));
-            std::memcpy(luminance, &new_luminance, sizeof(Floats));
+            for (std::size_t i = 0; i < count; ++i) {
+                float* const luminance = on.luminance[i] + cell;
+                const Floats l = t.luminance[i] + v * t.luminance_v[i] + w * t.luminance_w[i];
+                Floats old_luminance;
+                std::memcpy(&old_luminance, luminance, sizeof(Floats));
+                const Floats new_luminance = is_seen ? l : old_luminance;
+                std::memcpy(luminance, &new_luminance, sizeof(Floats));
+            }
         }
     }
 }
-void draw_plain(const Shown& t, float* heights, float* luminances) {
-    draw_rows<vdtree::Float4>(t, heights, luminances);
+template <std::size_t count>
+void draw_plain(const Shown<count>& t, const Canvas<count>& on) {
+    draw_rows<vdtree::Float4>(t, on);
 }
 #if defined(UNSEEN_EIGHT_WIDE)
-UNSEEN_AVX2 void draw_avx2(const Shown& t, float* heights, float* luminances) {
-    draw_rows<vdtree::Float8>(t, heights, luminances);
+template <std::size_t count>
+UNSEEN_AVX2 void draw_avx2(const Shown<count>& t, const Canvas<count>& on) {
+    draw_rows<vdtree::Float8>(t, on);
 }
 #else
-constexpr auto draw_avx2 = draw_plain;
+template <std::size_t count>
+constexpr auto draw_avx2 = draw_plain<count>;
 #endif
 
 // ---- bands of frequency
@@ -173,13 +191,15 @@ UNSEEN_INLINE void split(Worktop& on, float* largest) {
 }
 
 // Cells of both surfaces.
+template <std::size_t count>
 struct Compared {
-    const float *mesh_height, *mesh_luminance, *folded_height, *folded_luminance;
+    const float *mesh_height, *folded_height;
+    std::array<const float*, count> mesh_luminance, folded_luminance;
 };
 
 // Puts by how much one differs from the other where both are seen on the worktop.
-template <class Floats>
-UNSEEN_INLINE void subtract(const Compared& c, const float* folded, const float* mesh, Worktop& on) {
+template <class Floats, std::size_t count>
+UNSEEN_INLINE void subtract(const Compared<count>& c, const float* folded, const float* mesh, Worktop& on) {
     for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
         const std::size_t cell = y * side + x;
         const auto are_seen =
@@ -190,33 +210,39 @@ UNSEEN_INLINE void subtract(const Compared& c, const float* folded, const float*
     });
 }
 
-template <class Floats>
-UNSEEN_INLINE void compare_cells(const Compared& c, FoldPicture::Difference& difference) {
+template <class Floats, std::size_t count>
+UNSEEN_INLINE void compare_cells(const Compared<count>& c, typename FoldPictureOf<count>::Difference& difference) {
     Worktop& on = worktop;
     subtract<Floats>(c, c.folded_height, c.mesh_height, on);
     difference.shift = find_largest_mean<Floats>(on);
-    subtract<Floats>(c, c.folded_luminance, c.mesh_luminance, on);
-    split<Floats>(on, difference.amplitudes.data());
+    for (std::size_t i = 0; i < count; ++i) {
+        subtract<Floats>(c, c.folded_luminance[i], c.mesh_luminance[i], on);
+        split<Floats>(on, difference.amplitudes[i].data());
+    }
 }
-void compare_plain(const Compared& c, FoldPicture::Difference& difference) {
+template <std::size_t count>
+void compare_plain(const Compared<count>& c, typename FoldPictureOf<count>::Difference& difference) {
     compare_cells<vdtree::Float4>(c, difference);
 }
 #if defined(UNSEEN_EIGHT_WIDE)
-UNSEEN_AVX2 void compare_avx2(const Compared& c, FoldPicture::Difference& difference) {
+template <std::size_t count>
+UNSEEN_AVX2 void compare_avx2(const Compared<count>& c, typename FoldPictureOf<count>::Difference& difference) {
     compare_cells<vdtree::Float8>(c, difference);
 }
 #else
-constexpr auto compare_avx2 = compare_plain;
+template <std::size_t count>
+constexpr auto compare_avx2 = compare_plain<count>;
 #endif
 
 using vdtree::Float4;
 using vdtree::Int4;
 
+// The first register of a point, or of a place.
 template <class T>
-Float4 load(const T& four) {
-    static_assert(sizeof(T) == sizeof(Float4));
+Float4 load(const T& point) {
+    static_assert(sizeof(T) % sizeof(Float4) == 0);
     Float4 to;
-    std::memcpy(&to, &four, sizeof to);
+    std::memcpy(&to, &point, sizeof to);
     return to;
 }
 Float4 least(const Float4& a, const Float4& b) { return a < b ? a : b; }
@@ -232,7 +258,8 @@ Int4 first_cell(const Float4& place) {
 
 } // namespace
 
-void FoldPicture::look(glm::vec3 centre, glm::vec3 normal, float half_width) {
+template <std::size_t count>
+void FoldPictureOf<count>::look(glm::vec3 centre, glm::vec3 normal, float half_width) {
     centre_ = centre;
     const glm::vec3 axis = std::abs(normal.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
     const glm::vec3 right = glm::normalize(glm::cross(axis, normal));
@@ -242,20 +269,26 @@ void FoldPicture::look(glm::vec3 centre, glm::vec3 normal, float half_width) {
     for (const Layer layer : {Layer::mesh, Layer::folded}) clear(layer);
 }
 
-void FoldPicture::clear(Layer layer) { pictures_[static_cast<std::size_t>(layer)].height.fill(nothing); }
+template <std::size_t count>
+void FoldPictureOf<count>::clear(Layer layer) {
+    pictures_[static_cast<std::size_t>(layer)].height.fill(nothing);
+}
 
-FoldPicture::Place FoldPicture::place(const LitPoint& point) const {
+template <std::size_t count>
+typename FoldPictureOf<count>::Place FoldPictureOf<count>::place(const LitPoint& point) const {
     const Float4 p = load(point);
     const auto from = [&](int axis) { return p[axis] - centre_[axis]; };
     const auto along = [&](int axis) { return Float4{axes_[0][axis], axes_[1][axis], axes_[2][axis], 0}; };
     Float4 to = from(0) * along(0) + from(1) * along(1) + from(2) * along(2);
     to[3] = p[3];
     Place place;
-    std::memcpy(&place, &to, sizeof place);
+    std::memcpy(&place, &to, sizeof to);
+    for (std::size_t i = 1; i < std::size(place.luminance); ++i) place.luminance[i] = point.luminance[i];
     return place;
 }
 
-void FoldPicture::draw(Layer layer, const Place& a, const Place& b, const Place& c) {
+template <std::size_t count>
+void FoldPictureOf<count>::draw(Layer layer, const Place& a, const Place& b, const Place& c) {
     constexpr float half = static_cast<float>(side) / 2;
     const Float4 size = {cell_, cell_, 1, 1}, middle = {half, half, 0, 0};
     const Float4 p = load(a) / size + middle, q = load(b) / size + middle, r = load(c) / size + middle;
@@ -266,29 +299,39 @@ void FoldPicture::draw(Layer layer, const Place& a, const Place& b, const Place&
     const Int4 first = first_cell(least(p, least(q, r))), end = first_cell(largest(p, largest(q, r)));
     if (first[0] == end[0] || first[1] == end[1]) return; // many of what is far below the node
     const float inverse = 1 / area;
-    const Shown t = {.x = p[0],
-                     .y = p[1],
-                     .height = p[2],
-                     .luminance = p[3],
-                     .vx = pr[1] * inverse,
-                     .vy = -pr[0] * inverse,
-                     .wx = -pq[1] * inverse,
-                     .wy = pq[0] * inverse,
-                     .height_v = pq[2],
-                     .height_w = pr[2],
-                     .luminance_v = pq[3],
-                     .luminance_w = pr[3],
-                     .x0 = static_cast<std::size_t>(first[0]),
-                     .x1 = static_cast<std::size_t>(end[0]),
-                     .y0 = static_cast<std::size_t>(first[1]),
-                     .y1 = static_cast<std::size_t>(end[1])};
+    Shown<count> t = {.x = p[0],
+                      .y = p[1],
+                      .height = p[2],
+                      .vx = pr[1] * inverse,
+                      .vy = -pr[0] * inverse,
+                      .wx = -pq[1] * inverse,
+                      .wy = pq[0] * inverse,
+                      .height_v = pq[2],
+                      .height_w = pr[2],
+                      .x0 = static_cast<std::size_t>(first[0]),
+                      .x1 = static_cast<std::size_t>(end[0]),
+                      .y0 = static_cast<std::size_t>(first[1]),
+                      .y1 = static_cast<std::size_t>(end[1]),
+                      .luminance = {},
+                      .luminance_v = {},
+                      .luminance_w = {}};
+    for (std::size_t i = 0; i < count; ++i) {
+        t.luminance[i] = a.luminance[i];
+        t.luminance_v[i] = b.luminance[i] - a.luminance[i], t.luminance_w[i] = c.luminance[i] - a.luminance[i];
+    }
     Picture& picture = pictures_[static_cast<std::size_t>(layer)];
-    (vdtree::has_avx2() ? draw_avx2 : draw_plain)(t, picture.height.data(), picture.luminance.data());
+    Canvas<count> on{picture.height.data(), {}};
+    for (std::size_t i = 0; i < count; ++i) on.luminance[i] = picture.luminance[i].data();
+    (vdtree::has_avx2() ? draw_avx2<count> : draw_plain<count>)(t, on);
 }
 
-float FoldPicture::wavelength(std::size_t band) const { return cell_ / static_cast<float>(nominal_frequency(band)); }
+template <std::size_t count>
+float FoldPictureOf<count>::wavelength(std::size_t band) const {
+    return cell_ / static_cast<float>(nominal_frequency(band));
+}
 
-FoldPicture::Difference FoldPicture::difference() const {
+template <std::size_t count>
+typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference() const {
     static const std::array<float, bands> gains = [] {
         std::array<float, bands> all;
         for (std::size_t band = 0; band < bands; ++band) all[band] = static_cast<float>(band_gain(band));
@@ -296,10 +339,19 @@ FoldPicture::Difference FoldPicture::difference() const {
     }();
     const auto& [mesh, folded] = pictures_;
     Difference difference;
-    (vdtree::has_avx2() ? compare_avx2 : compare_plain)(
-        {mesh.height.data(), mesh.luminance.data(), folded.height.data(), folded.luminance.data()}, difference);
-    for (std::size_t band = 0; band < bands; ++band) difference.amplitudes[band] /= gains[band];
+    Compared<count> compared{mesh.height.data(), folded.height.data(), {}, {}};
+    for (std::size_t i = 0; i < count; ++i) {
+        compared.mesh_luminance[i] = mesh.luminance[i].data();
+        compared.folded_luminance[i] = folded.luminance[i].data();
+    }
+    (vdtree::has_avx2() ? compare_avx2<count> : compare_plain<count>)(compared, difference);
+    for (auto& of_luminance : difference.amplitudes)
+        for (std::size_t band = 0; band < bands; ++band) of_luminance[band] /= gains[band];
     return difference;
 }
+
+template class FoldPictureOf<1>;
+template class FoldPictureOf<3>;
+template class FoldPictureOf<4>;
 
 } // namespace unseen::perception

@@ -12,13 +12,21 @@
 
 namespace unseen::perception {
 
-struct alignas(16) LitPoint { // one register
-    glm::vec3 position;
-    float luminance;
-};
+// What is measured of several luminances at once fills whole registers.
+constexpr std::size_t luminances_kept(std::size_t count) { return count == 1 ? 1 : 5; }
 
-class FoldPicture {
+template <std::size_t count>
+struct alignas(16) LitPointOf { // one register, or two
+    glm::vec3 position;
+    float luminance[luminances_kept(count)];
+};
+using LitPoint = LitPointOf<1>;
+
+// With so many luminances in every point. The pictures are there for each; what lies where is the same for all.
+template <std::size_t count>
+class FoldPictureOf {
 public:
+    using LitPoint = LitPointOf<count>;
     static constexpr std::size_t side = measurement::picture_side;   // cells
     static constexpr std::size_t bands = measurement::picture_bands; // an octave each, the finest first
 
@@ -29,7 +37,7 @@ public:
     // Where a point lies for this picture, and for others with its centre and normal.
     struct alignas(16) Place {
         float right, up, height; // from the centre, mesh units
-        float luminance;
+        float luminance[luminances_kept(count)];
     };
     Place place(const LitPoint& point) const;
 
@@ -48,7 +56,7 @@ public:
     struct Difference {
         // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own
         // frequency. Bands are those of a Laplacian pyramid: the lowest has waves longer than the picture.
-        std::array<float, bands> amplitudes;
+        std::array<std::array<float, bands>, count> amplitudes; // by luminance
         // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
         float shift;
     };
@@ -58,7 +66,8 @@ public:
 private:
     using Cells = std::array<float, side * side>;
     struct Picture {
-        Cells luminance, height; // no height: nothing is seen
+        std::array<Cells, count> luminance;
+        Cells height; // none: nothing is seen
     };
 
     glm::vec3 centre_;
@@ -67,5 +76,9 @@ private:
     bool has_front_ = false, has_back_ = false;
     std::array<Picture, 2> pictures_; // by layer
 };
+using FoldPicture = FoldPictureOf<1>;
+extern template class FoldPictureOf<1>;
+extern template class FoldPictureOf<3>;
+extern template class FoldPictureOf<4>;
 
 } // namespace unseen::perception

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +21,7 @@
 
 #include "measure/fold_record.h"
 #include "measure/measure_folds.h"
+#include "measure/measurement.h"
 
 namespace unseen::perception {
 
@@ -34,13 +38,80 @@ constexpr float falloff_curvature = 4;
 constexpr float least_lit = 1e-5f;       // what is less lit is dark: below a step of stored luminances
 constexpr float least_luminance = 1e-3f; // that shifts of the mean are shares of
 
-using Records = MeasuredFolds;
+// What is kept with a measurement: its own numbers, and all of measure_folds().
+constexpr int revision = 1; // one more where the same settings give other numbers
+constexpr auto settings = [] {
+    std::array<float, 3 + measurement::settings.size()> all = {revision, offset, scale};
+    std::copy(measurement::settings.begin(), measurement::settings.end(), all.begin() + 3);
+    return all;
+}();
+constexpr std::string_view lit_record_name = "lit_folds", lit_facing_name = "lit_facing",
+                           lit_albedo_name = "lit_albedo", lit_settings_name = "lit_measurement";
 
-Result<Records> measure_shaded(const VertexTree& tree, const FunctionRef<float(NodeId)>& luminance, int threads,
-                               const Progress& progress) {
-    const auto shaded = tree.shaded(luminance);
-    if (!shaded) return shaded.error();
-    return measure_records(*shaded, threads, progress);
+// What a fold changes of a luminance: of FoldRecord.
+struct Shades {
+    using Component = float;
+
+    float largest = 0, mean = 0, bias = 0;
+    float amplitudes[measurement::picture_sizes.size()][measurement::picture_bands] = {};
+};
+static_assert(sizeof(Shades) == 11 * sizeof(float));
+
+// Of an interior node.
+struct LitRecord {
+    using Component = float;
+
+    float shift = 0, farthest = 0, mean_distance = 0, extent = 0, border = 0;
+    float gap = 0, sine = 1;
+    Shades of_axis[3]; // of a n_k in the pictures' luminances
+};
+static_assert(sizeof(LitRecord) == 40 * sizeof(float));
+
+constexpr float LitRecord::*lengths[] = {&LitRecord::shift, &LitRecord::farthest, &LitRecord::mean_distance,
+                                         &LitRecord::extent, &LitRecord::border};
+
+bool is_sound(const Shades& shades) {
+    bool sound = true;
+    const auto look_at = [&](float value) { sound &= value >= 0 && std::isfinite(value); };
+    for (const float value : {shades.largest, shades.mean, shades.bias}) look_at(value);
+    for (const auto& of_size : shades.amplitudes)
+        for (const float amplitude : of_size) look_at(amplitude);
+    return sound;
+}
+
+bool is_sound(const LitRecord& record) {
+    bool sound = record.gap >= 0 && record.sine >= 0 && record.sine <= 1;
+    for (const auto length : lengths) sound &= record.*length >= 0 && std::isfinite(record.*length);
+    for (const Shades& shades : record.of_axis) sound &= is_sound(shades);
+    return sound;
+}
+
+Shades shades_of(const FoldRecord& record) {
+    Shades shades{record.largest_luminance, record.mean_luminance, record.bias, {}};
+    std::copy(&record.amplitudes[0][0],
+              &record.amplitudes[0][0] + std::size(shades.amplitudes) * measurement::picture_bands,
+              &shades.amplitudes[0][0]);
+    return shades;
+}
+
+void include(const FoldRecord& other, LitRecord& record) {
+    record.shift = std::max(record.shift, other.shift);
+    record.farthest = std::max(record.farthest, other.farthest);
+    record.mean_distance = std::max(record.mean_distance, other.mean_distance);
+    record.extent = std::max(record.extent, other.extent);
+    record.border = std::max(record.border, other.border);
+    record.gap = std::min(record.gap, other.gap), record.sine = std::min(record.sine, other.sine);
+}
+
+void include(const FoldFacing& other, FoldFacing& facing) {
+    facing.fading = std::min(facing.fading, other.fading);
+    facing.facing |= other.facing;
+    facing.is_height_field &= other.is_height_field;
+}
+
+Error refused(const std::string& what) {
+    return {ErrorCode::malformed_data, "What the tree's folds change under lights is damaged: " + what +
+                                           " Measure it again, or build the tree again from its mesh."};
 }
 
 // Of one light at a node.
@@ -88,33 +159,81 @@ glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
 } // namespace
 
 struct LitFolds::State {
-    std::array<Records, 3> by_axis;
-    std::vector<FoldRecord> albedo; // empty: the same everywhere
+    std::vector<LitRecord> folds; // by interior node, as the others
+    std::vector<FoldFacing> facing;
+    std::vector<Shades> albedo; // empty: the same everywhere
     LightBounds bounds;
 };
 
 Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Progress& progress) {
-    const bool is_painted = !tree.colours().empty();
-    const std::size_t passes = is_painted ? 4 : 3;
+    std::vector<Shading> shadings;
+    for (int axis = 0; axis < 3; ++axis)
+        shadings.push_back([&tree, axis](NodeId node) {
+            return (offset + albedo_of(tree, node) * glm::vec3(tree.normals()[node])[axis]) / scale;
+        });
+    if (!tree.colours().empty()) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
+    auto measured = measure_records(tree, shadings, threads, progress);
+    if (!measured) return measured.error();
     auto state = std::make_shared<State>();
-    for (std::size_t pass = 0; pass < passes; ++pass) {
-        const Progress told = [&](double share, const char* stage) {
-            return !progress || progress((static_cast<double>(pass) + share) / static_cast<double>(passes), stage);
-        };
-        const auto luminance = [&](NodeId node) {
-            const float albedo = albedo_of(tree, node);
-            if (pass == 3) return albedo;
-            return (offset + albedo * glm::vec3(tree.normals()[node])[static_cast<int>(pass)]) / scale;
-        };
-        auto records = measure_shaded(tree, luminance, threads, told);
-        if (!records) return records.error();
-        if (pass < 3) state->by_axis[pass] = std::move(*records);
-        else state->albedo = std::move(records->folds);
-    }
+    const auto& axes = *measured;
+    LitRecord none;
+    none.gap = std::numeric_limits<float>::infinity();
+    state->folds.assign(tree.interior_count(), none);
+    state->facing = axes[0].facing;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            include(axes[axis].folds[node], state->folds[node]);
+            include(axes[axis].facing[node], state->facing[node]);
+            state->folds[node].of_axis[axis] = shades_of(axes[axis].folds[node]);
+        }
+    if (axes.size() > 3)
+        for (const FoldRecord& fold : axes[3].folds) state->albedo.push_back(shades_of(fold));
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
     state->bounds = std::move(*bounds);
     return LitFolds(std::move(state));
+}
+
+bool has_lit_folds(const VertexTree& tree) { return !tree.attribute<LitRecord>(lit_record_name).empty(); }
+
+std::span<const float> lit_measurement_settings() noexcept { return settings; }
+
+Result<LitFolds> LitFolds::of(const VertexTree& tree) {
+    if (!has_lit_folds(tree))
+        return Error{ErrorCode::invalid_argument,
+                     "What the tree's folds change under lights has not been measured (LitFolds::measure)."};
+    if (!std::ranges::equal(tree.attribute<float>(lit_settings_name), settings))
+        return Error{ErrorCode::unsupported, "What the tree's folds change under lights was measured with other "
+                                             "settings than this program knows: measure it again."};
+    const auto folds = tree.attribute<LitRecord>(lit_record_name);
+    const auto facing = tree.attribute<FoldFacing>(lit_facing_name);
+    const auto albedo = tree.attribute<Shades>(lit_albedo_name);
+    const std::size_t nodes = tree.interior_count();
+    if (folds.size() != nodes || facing.size() != nodes || albedo.size() != (tree.colours().empty() ? 0 : nodes))
+        return refused("a part of it is missing.");
+    for (std::size_t node = 0; node < nodes; ++node)
+        if (!is_sound(folds[node]) || facing[node].fading > most_fading || !(albedo.empty() || is_sound(albedo[node])))
+            return refused("a number of node " + std::to_string(node) + " is negative or not finite.");
+    auto bounds = LightBounds::measure(tree);
+    if (!bounds) return bounds.error();
+    auto state = std::make_shared<State>();
+    state->folds.assign(folds.begin(), folds.end());
+    state->facing.assign(facing.begin(), facing.end());
+    state->albedo.assign(albedo.begin(), albedo.end());
+    state->bounds = std::move(*bounds);
+    return LitFolds(std::move(state));
+}
+
+Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
+    if (state_->folds.size() != tree.interior_count() || state_->albedo.empty() != tree.colours().empty())
+        return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
+    auto with = tree.with_attribute(lit_settings_name, AttributeDomain::tree,
+                                    std::vector<float>(settings.begin(), settings.end()));
+    if (with) with = with->with_attribute(lit_record_name, AttributeDomain::interior_node, state_->folds);
+    if (with) with = with->with_attribute(lit_facing_name, AttributeDomain::interior_node, state_->facing);
+    if (with && !state_->albedo.empty())
+        with = with->with_attribute(lit_albedo_name, AttributeDomain::interior_node, state_->albedo);
+    return with;
 }
 
 Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& lighting) const {
@@ -122,7 +241,7 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
     if (lighting.specular > 0)
         return Error{ErrorCode::unsupported,
                      "What folds change of highlights is not measured, for these follow the eye."};
-    if (state_->by_axis[0].folds.size() != tree.interior_count())
+    if (state_->folds.size() != tree.interior_count())
         return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
     const auto lit = tree.shaded([&](NodeId node) {
         return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
@@ -133,8 +252,7 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
 
     std::vector<Lighting> alone; // each light by itself, of white
     for (const LightSource& light : lighting.lights) alone.push_back({.lights = {light}});
-    std::vector<FoldRecord> folds = state_->by_axis[0].folds;
-    std::vector<FoldFacing> facing = state_->by_axis[0].facing;
+    std::vector<FoldRecord> folds(tree.interior_count());
     const auto ambient = static_cast<float>(lighting.ambient);
     tbb::parallel_for(NodeId{0}, tree.interior_count(), [&](NodeId node) {
         const VertexCone& cone = state_->bounds.cones()[node];
@@ -149,41 +267,29 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
             most += reach.most * direction_bound(lighting.lights[i], ring);
             uneven += reach.uneven * cone.albedo.hi;
         }
+        const LitRecord& record = state_->folds[node];
         const auto combined = [&](auto&& value) {
             float of_axes = 0;
-            for (int k = 0; k < 3; ++k)
-                of_axes += most[k] * value(state_->by_axis[static_cast<std::size_t>(k)].folds[node]);
+            for (int k = 0; k < 3; ++k) of_axes += most[k] * value(record.of_axis[k]);
             const float painted = state_->albedo.empty() ? 0 : ambient * value(state_->albedo[node]);
             return painted + scale * of_axes;
         };
         FoldRecord& fold = folds[node];
-        // Which neighbours are folded with a node depends on their luminances, so these differ a little.
-        for (const Records& axis : state_->by_axis) {
-            const FoldRecord& other = axis.folds[node];
-            for (float FoldRecord::*length : {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance,
-                                              &FoldRecord::extent, &FoldRecord::border})
-                fold.*length = std::max(fold.*length, other.*length);
-            fold.gap = std::min(fold.gap, other.gap), fold.sine = std::min(fold.sine, other.sine);
-        }
+        fold.shift = record.shift, fold.farthest = record.farthest, fold.mean_distance = record.mean_distance;
+        fold.extent = record.extent, fold.border = record.border, fold.gap = record.gap, fold.sine = record.sine;
         const auto set = [&](float& to, float value) { to = std::min(1.0f, value); }; // luminances end there
-        set(fold.largest_luminance, uneven + combined([](const FoldRecord& r) { return r.largest_luminance; }));
-        set(fold.mean_luminance, uneven + combined([](const FoldRecord& r) { return r.mean_luminance; }));
+        set(fold.largest_luminance, uneven + combined([](const Shades& s) { return s.largest; }));
+        set(fold.mean_luminance, uneven + combined([](const Shades& s) { return s.mean; }));
         for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
             for (std::size_t band = 0; band < measurement::picture_bands; ++band)
-                set(fold.amplitudes[size][band],
-                    combined([&](const FoldRecord& r) { return r.amplitudes[size][band]; }));
+                set(fold.amplitudes[size][band], combined([&](const Shades& s) { return s.amplitudes[size][band]; }));
         float& widest = fold.amplitudes[measurement::picture_sizes.size() - 1][measurement::picture_bands - 1];
         set(widest, widest + uneven);
         const LuminanceRange range = lit->support_luminance()[node];
         const float middle = std::max((range.lo + range.hi) / 2, least_luminance);
-        fold.bias = combined([&](const FoldRecord& r) { return brightest * r.bias; }) / middle;
-        for (const Records& axis : state_->by_axis) {
-            facing[node].fading = std::min(facing[node].fading, axis.facing[node].fading);
-            facing[node].facing |= axis.facing[node].facing;
-            facing[node].is_height_field &= axis.facing[node].is_height_field;
-        }
+        fold.bias = combined([&](const Shades& s) { return brightest * s.bias; }) / middle;
     });
-    return with_records(*lit, {std::move(folds), std::move(facing)});
+    return with_records(*lit, {std::move(folds), state_->facing});
 }
 
 } // namespace unseen::perception

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -41,26 +42,31 @@ constexpr Index none = 0xffffffffu;
 constexpr Index leaves_of_part = 4096; // of a subtree that one task measures
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-using Point = LitPoint;
-
+// `count`: of the luminances that are measured at once.
+template <std::size_t count>
 struct Difference {
-    float distance = 0, luminance = 0;
+    float distance = 0;
+    std::array<float, count> luminance = {};
+
     void include(const Difference& other) {
         distance = std::max(distance, other.distance);
-        luminance = std::max(luminance, other.luminance);
+        for (std::size_t i = 0; i < count; ++i) luminance[i] = std::max(luminance[i], other.luminance[i]);
     }
+    float largest_luminance() const { return *std::max_element(luminance.begin(), luminance.end()); }
 };
 
 // Of a ring, before or after the fold.
+template <std::size_t count>
 struct RingTriangle {
-    Point corner[3];
+    LitPointOf<count> corner[3];
     unsigned inside = 0; // a bit for each corner in the support
 };
 
 // The directions of normals along the slabs' axes.
 class NormalReach {
 public:
-    void insert(const RingTriangle& t) {
+    template <std::size_t count>
+    void insert(const RingTriangle<count>& t) {
         const glm::vec3 a = t.corner[0].position;
         glm::vec3 n = glm::cross(t.corner[1].position - a, t.corner[2].position - a);
         const float squared = glm::dot(n, n);
@@ -95,8 +101,10 @@ private:
 };
 
 // Points by columns, so that eight at once are compared with a surface, and the nearest points of that surface.
+template <std::size_t count>
 class Points {
 public:
+    using Point = LitPointOf<count>;
     static constexpr std::size_t lanes = 8;
 
     void clear() { points_.clear(); }
@@ -106,7 +114,7 @@ public:
     // Columns of the points from `first` on; after the last point it is repeated.
     struct alignas(32) Block {
         float x[lanes], y[lanes], z[lanes];
-        float squared[lanes], luminance[lanes]; // the distance to the nearest point, and its luminance
+        float squared[lanes], luminance[count][lanes]; // the distance to the nearest point, and its luminances
     };
     std::span<Block> blocks() {
         blocks_.resize((size() + lanes - 1) / lanes);
@@ -118,9 +126,12 @@ public:
         return blocks_;
     }
     // Once the blocks are compared.
-    Difference difference(std::size_t i) const {
+    Difference<count> difference(std::size_t i) const {
         const Block& at = blocks_[i / lanes];
-        return {std::sqrt(at.squared[i % lanes]), std::abs(points_[i].luminance - at.luminance[i % lanes])};
+        Difference<count> found{std::sqrt(at.squared[i % lanes]), {}};
+        for (std::size_t k = 0; k < count; ++k)
+            found.luminance[k] = std::abs(points_[i].luminance[k] - at.luminance[k][i % lanes]);
+        return found;
     }
 
 private:
@@ -128,9 +139,12 @@ private:
     std::vector<Block> blocks_;
 };
 
+template <std::size_t count>
 class Surface {
 public:
-    void assign(std::span<const RingTriangle> ring) {
+    using Block = typename Points<count>::Block;
+
+    void assign(std::span<const RingTriangle<count>> ring) {
         triangles_.clear();
         for (const auto& [corner, inside] : ring) {
             const auto& [a, b, c] = corner;
@@ -138,15 +152,30 @@ public:
             const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
             const float determinant = bb * cc - bc * bc;
             const float inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
-            triangles_.push_back({a.position, ab, ac, a.luminance, b.luminance - a.luminance, c.luminance - a.luminance,
-                                  bb, bc, cc, divisor(bb), divisor(cc), divisor(bb - 2 * bc + cc), inverse});
+            PreparedTriangle& t = triangles_.emplace_back(PreparedTriangle{a.position,
+                                                                           ab,
+                                                                           ac,
+                                                                           {},
+                                                                           {},
+                                                                           {},
+                                                                           bb,
+                                                                           bc,
+                                                                           cc,
+                                                                           divisor(bb),
+                                                                           divisor(cc),
+                                                                           divisor(bb - 2 * bc + cc),
+                                                                           inverse});
+            for (std::size_t i = 0; i < count; ++i) {
+                t.luminance[i] = a.luminance[i];
+                t.luminance_b[i] = b.luminance[i] - a.luminance[i], t.luminance_c[i] = c.luminance[i] - a.luminance[i];
+            }
         }
     }
     bool empty() const { return triangles_.empty(); }
 
     // How the points differ from the nearest ones of the surface; of equally near ones, those of the first triangle.
-    void compare(Points& points) const {
-        for (Points::Block& block : points.blocks()) (has_avx2() ? find_avx2 : find_plain)(triangles_, block);
+    void compare(Points<count>& points) const {
+        for (Block& block : points.blocks()) (has_avx2() ? find_avx2 : find_plain)(triangles_, block);
     }
 
 private:
@@ -154,11 +183,11 @@ private:
     static constexpr float least_determinant = 1e-6f;
 
     struct PreparedTriangle {
-        glm::vec3 a, b, c;                         // b and c from a
-        float luminance, luminance_b, luminance_c; // a's; the others' less that
-        float bb, bc, cc;                          // products
-        float along_b, along_c, along_bc;          // what lengths along the edges are divided by
-        float inverse;                             // of the determinant; 0: only its edges count
+        glm::vec3 a, b, c;                                            // b and c from a
+        std::array<float, count> luminance, luminance_b, luminance_c; // a's; the others' less that
+        float bb, bc, cc;                                             // products
+        float along_b, along_c, along_bc;                             // what lengths along the edges are divided by
+        float inverse;                                                // of the determinant; 0: only its edges count
     };
     // Of edges without a length, the first end is as near as any.
     static float divisor(float squared) { return squared > 0 ? squared : infinity; }
@@ -166,15 +195,14 @@ private:
     // The nearest point a + v b + w c of each triangle: of its inside, where the foot of the perpendicular lies there,
     // or of an edge. `Floats`: a register's.
     template <class Floats>
-    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Points::Block& points,
-                                   std::size_t first) {
+    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Block& points, std::size_t first) {
         const auto load = [&](const float* column, Floats& to)
                               UNSEEN_INLINE_LAMBDA { std::memcpy(&to, column + first, sizeof(Floats)); };
         const auto share = [](const Floats& part, float whole) UNSEEN_INLINE_LAMBDA {
             const Floats s = part / whole, above = s > 0 ? s : Floats{};
             return above < 1 ? above : Floats{} + 1;
         };
-        Floats x, y, z, nearest = Floats{} + infinity, nearest_luminance{};
+        Floats x, y, z, nearest = Floats{} + infinity, nearest_luminance[count] = {};
         load(points.x, x), load(points.y, y), load(points.z, z);
         for (const PreparedTriangle& t : triangles) {
             const Floats px = x - t.a.x, py = y - t.a.y, pz = z - t.a.z;
@@ -196,19 +224,22 @@ private:
             const Floats dx = px - v * t.b.x - w * t.c.x, dy = py - v * t.b.y - w * t.c.y,
                          dz = pz - v * t.b.z - w * t.c.z;
             const Floats squared = dx * dx + dy * dy + dz * dz;
-            const Floats luminance = t.luminance + v * t.luminance_b + w * t.luminance_c;
             const auto is_nearer = squared < nearest;
             nearest = is_nearer ? squared : nearest;
-            nearest_luminance = is_nearer ? luminance : nearest_luminance;
+            for (std::size_t i = 0; i < count; ++i) {
+                const Floats luminance = t.luminance[i] + v * t.luminance_b[i] + w * t.luminance_c[i];
+                nearest_luminance[i] = is_nearer ? luminance : nearest_luminance[i];
+            }
         }
         std::memcpy(points.squared + first, &nearest, sizeof(Floats));
-        std::memcpy(points.luminance + first, &nearest_luminance, sizeof(Floats));
+        for (std::size_t i = 0; i < count; ++i)
+            std::memcpy(points.luminance[i] + first, &nearest_luminance[i], sizeof(Floats));
     }
-    static void find_plain(std::span<const PreparedTriangle> triangles, Points::Block& points) {
+    static void find_plain(std::span<const PreparedTriangle> triangles, Block& points) {
         for (const std::size_t first : {std::size_t{0}, std::size_t{4}}) find<Float4>(triangles, points, first);
     }
 #if defined(UNSEEN_EIGHT_WIDE)
-    UNSEEN_AVX2 static void find_avx2(std::span<const PreparedTriangle> triangles, Points::Block& points) {
+    UNSEEN_AVX2 static void find_avx2(std::span<const PreparedTriangle> triangles, Block& points) {
         find<Float8>(triangles, points, 0);
     }
 #else
@@ -218,19 +249,37 @@ private:
     std::vector<PreparedTriangle> triangles_;
 };
 
+// Of trees that are the same but for their luminances. Which neighbours are folded with a node depends on these: what a
+// light makes of several of them may let as many fold as any of them does, or as few as all do. Both are measured where
+// they differ, of all luminances.
+template <std::size_t luminances>
 class Measurer {
+    using Point = LitPointOf<luminances>;
+    using Difference = perception::Difference<luminances>;
+    using RingTriangle = perception::RingTriangle<luminances>;
+    using Points = perception::Points<luminances>;
+    using Surface = perception::Surface<luminances>;
+    using FoldPicture = FoldPictureOf<luminances>;
+
 public:
-    Measurer(const SoundTree& tree, std::vector<FoldRecord>& records, std::vector<FoldFacing>& facing)
-        : tree_(tree), records_(records), facing_(facing), support_luminance_(tree.support_luminance()),
-          first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
-          first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), of_leaf_(tree), border_(tree, of_leaf_), crossing_(interior_),
-          contacts_(find_contacts(tree)), witnesses_(interior_) {
-        most_changed_.reserve(interior_);
-        for (NodeId node = 0; node < interior_; ++node) most_changed_.push_back(most_changed(node));
-        points_.reserve(tree.node_count());
-        for (NodeId node = 0; node < tree.node_count(); ++node)
-            points_.push_back({tree.positions()[node], tree.luminance()[node]});
+    Measurer(std::span<const SoundTree> trees, std::span<MeasuredFolds> found)
+        : tree_(trees.front()), found_(found), first_leaf_(tree_.first_leaf()), leaf_end_(tree_.leaf_end()),
+          parents_(tree_.parents()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
+          support_(tree_.support_spheres()), interior_(tree_.interior_count()), of_leaf_(tree_),
+          border_(tree_, of_leaf_), crossing_(interior_), contacts_(find_contacts(trees)), witnesses_(interior_),
+          luminance_span_(interior_), most_changed_(interior_) {
+        for (NodeId node = 0; node < interior_; ++node) {
+            for (std::size_t i = 0; i < luminances; ++i) {
+                const PackedRange support = trees[i].support_luminance()[node];
+                luminance_span_[node][i] = support.hi.value - support.lo.value;
+            }
+            most_changed_[node] = most_changed(node, trees);
+        }
+        points_.resize(tree_.node_count());
+        for (NodeId node = 0; node < tree_.node_count(); ++node) {
+            points_[node].position = tree_.positions()[node];
+            for (std::size_t i = 0; i < luminances; ++i) points_[node].luminance[i] = trees[i].luminance()[node];
+        }
     }
 
     // False where `progress` has cancelled; it is called on the calling thread only.
@@ -269,12 +318,14 @@ private:
         int count = 0;
         void include(const Difference& other) {
             sum.distance += other.distance;
-            sum.luminance += other.luminance;
+            for (std::size_t i = 0; i < luminances; ++i) sum.luminance[i] += other.luminance[i];
             ++count;
         }
         Difference value() const {
             const float share = 1 / static_cast<float>(std::max(count, 1));
-            return {sum.distance * share, sum.luminance * share};
+            Difference mean{sum.distance * share, sum.luminance};
+            for (float& luminance : mean.luminance) luminance *= share;
+            return mean;
         }
     };
     struct Sample {
@@ -293,13 +344,14 @@ private:
         Surface before_surface, after_surface;
         Points points;
         std::vector<Sample> samples;
+        std::vector<NodeId> shown, shown_before; // corners of the crossing triangles: now, and as measured before
         std::vector<Child> children;
         std::array<FoldPicture, picture_sizes.size()> pictures;
         bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
-            samples.clear();
+            shown.clear();
             children.clear();
         }
     };
@@ -334,60 +386,97 @@ private:
     // What a fold inside the surface can change at most, but for a factor: luminance times area, and heights. Neither
     // falls from a node to its parent.
     struct Change {
-        float light = 0, height = 0;
+        std::array<float, luminances> light = {};
+        float height = 0;
     };
-    Change most_changed(NodeId node) const {
-        const PackedRange luminance = tree_.ring_luminance()[node];
+    Change most_changed(NodeId node, std::span<const SoundTree> trees) const {
         const NormalSlabs& normals = tree_.bounds()[node].slabs;
         int turn = 0; // by which the normals differ
         for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) turn = std::max(turn, normals.hi[i] - normals.lo[i]);
         const float radius = support_[node].radius;
-        return {static_cast<float>(luminance.hi.value - luminance.lo.value) * radius * radius,
-                static_cast<float>(turn) * radius};
+        Change change{{}, static_cast<float>(turn) * radius};
+        for (std::size_t i = 0; i < luminances; ++i) {
+            const PackedRange luminance = trees[i].ring_luminance()[node];
+            change.light[i] = static_cast<float>(luminance.hi.value - luminance.lo.value) * radius * radius;
+        }
+        return change;
     }
-    bool changes_much_less(NodeId a, NodeId node) const {
+    bool changes_much_less(NodeId a, NodeId node, std::size_t luminance) const {
         const Change &less = most_changed_[a], &more = most_changed_[node];
-        return much_less * less.light <= more.light && much_less * less.height <= more.height &&
+        return much_less * less.light[luminance] <= more.light[luminance] && much_less * less.height <= more.height &&
                !(tree_.bounds()[a].flags & irregular_ring); // whose border may move as far as it likes
     }
     bool supports(NodeId a, NodeId b) const { return first_leaf_[a] <= first_leaf_[b] && leaf_end_[b] <= leaf_end_[a]; }
 
     // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no
-    // more to hide, and those that are hardly seen to fold at any size, as the faces beside an edge.
-    NodeId stand_in(Index leaf, NodeId node) const {
+    // more to hide, and those that are hardly seen to fold at any size, as the faces beside an edge. So says each of
+    // the luminances; any of them may, or all do.
+    enum class Says { any, all };
+    NodeId stand_in(Index leaf, NodeId node, Says says) const {
         NodeId at = interior_ + leaf;
-        const int most = much_more * luminance_span(node);
         const auto folds_earlier = [&](NodeId up) {
-            return (is_larger(node, up) && luminance_span(up) <= most) ||
-                   (changes_much_less(up, node) && !supports(up, node));
+            const bool is_smaller = is_larger(node, up);
+            for (std::size_t i = 0; i < luminances; ++i) {
+                const bool so = (is_smaller && luminance_span_[up][i] <= much_more * luminance_span_[node][i]) ||
+                                (changes_much_less(up, node, i) && !supports(up, node));
+                if (so == (says == Says::any)) return so;
+            }
+            return says == Says::all;
         };
         int steps = 0;
         for (NodeId up = parents_[at]; up != no_node && folds_earlier(up) && ++steps <= most_steps; up = parents_[at])
             at = up;
         return at;
     }
-    int luminance_span(NodeId node) const {
-        return support_luminance_[node].hi.value - support_luminance_[node].lo.value;
-    }
 
     void measure(NodeId node, Scratch& scratch) {
         crossing_[node] = crossing(node);
+        scratch.samples.clear();
+        add_samples(node, scratch);
+        FoldFacing facing;
+        facing.is_height_field = 1;
+        FoldRecord record;
+        std::array<FoldRecord, luminances> records; // of the luminances alone
+        measure(node, Says::any, scratch, record, records, facing);
+        if constexpr (luminances > 1) {
+            scratch.shown_before.swap(scratch.shown);
+            measure(node, Says::all, scratch, record, records, facing);
+        }
+        choose_witnesses(node, scratch.samples);
+        record.gap = contacts_[node].gap, record.sine = contacts_[node].sine;
+        for (std::size_t i = 0; i < luminances; ++i) {
+            FoldRecord& own = found_[i].folds[node];
+            own = record;
+            own.largest_luminance = records[i].largest_luminance, own.mean_luminance = records[i].mean_luminance;
+            std::memcpy(own.amplitudes, records[i].amplitudes, sizeof own.amplitudes);
+            found_[i].facing[node] = facing;
+        }
+    }
+
+    // Raises what was found before. Does nothing where all neighbours are as they were then.
+    void measure(NodeId node, Says says, Scratch& scratch, FoldRecord& record,
+                 std::span<FoldRecord, luminances> records, FoldFacing& facing) {
+        const NormalSlabs turned = lay_out(node, says, scratch).slabs();
+        if (says == Says::all && scratch.shown == scratch.shown_before) return;
+        facing.facing |= turned;
         const Point proxy = point(node);
-        facing_[node].facing = lay_out(node, scratch).slabs();
         if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
         Difference worst;
-        const Difference mean = compare_surfaces(node, scratch, worst);
-        FoldRecord& record = records_[node];
-        record.farthest = worst.distance, record.mean_distance = mean.distance;
-        record.largest_luminance = worst.luminance, record.mean_luminance = mean.luminance;
-        record.extent = mean_reach(scratch.after, proxy) / 2;
-        record.border = border_.shift(node, crossing_[node], [&](Index leaf) { return stand_in(leaf, node); });
-        record.gap = contacts_[node].gap, record.sine = contacts_[node].sine;
-        facing_[node].is_height_field = draw(node, scratch, std::max(support_[node].radius, record.extent), record);
+        const Difference mean = compare_surfaces(scratch, worst);
+        const auto raise = [](float& to, float value) { to = std::max(to, value); };
+        raise(record.farthest, worst.distance), raise(record.mean_distance, mean.distance);
+        const float extent = mean_reach(scratch.after, proxy) / 2;
+        raise(record.extent, extent);
+        raise(record.border,
+              border_.shift(node, crossing_[node], [&](Index leaf) { return stand_in(leaf, node, says); }));
+        for (std::size_t i = 0; i < luminances; ++i)
+            raise(records[i].largest_luminance, worst.luminance[i]),
+                raise(records[i].mean_luminance, mean.luminance[i]);
+        facing.is_height_field &= draw(node, scratch, std::max(support_[node].radius, extent), record, records);
     }
 
     // Puts the ring before and after the fold, coarse and fine, into `scratch`; returns what its triangles face.
-    NormalReach lay_out(NodeId node, Scratch& scratch) {
+    NormalReach lay_out(NodeId node, Says says, Scratch& scratch) {
         const Index begin = first_leaf_[node], end = leaf_end_[node];
         const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
         scratch.clear();
@@ -413,7 +502,7 @@ private:
                 const bool is_here = is_inside(leaf);
                 whole.corner[k] = leaf_point(leaf);
                 whole.inside |= static_cast<unsigned>(is_here) << k;
-                shown[k] = is_here ? node : stand_in(leaf, node);
+                shown[k] = is_here ? node : stand_in(leaf, node, says);
                 shown_before[k] = is_here ? child_of(leaf) : shown[k];
             }
             before.inside = after.inside = whole.inside;
@@ -421,6 +510,7 @@ private:
                 before.corner[k] = point(shown_before[k]);
                 after.corner[k] = point(shown[k]);
             }
+            scratch.shown.insert(scratch.shown.end(), shown.begin(), shown.end());
             turned.insert(whole);
             if (are_distinct(shown_before)) add(scratch.before, before);
             RingTriangle fine_before = whole;
@@ -441,21 +531,20 @@ private:
     }
 
     // Raises the worst errors to those between the surfaces; returns the mean ones.
-    Difference compare_surfaces(NodeId node, Scratch& scratch, Difference& worst) {
+    Difference compare_surfaces(Scratch& scratch, Difference& worst) {
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
-        add_samples(node, scratch);
         Mean over_leaves, over_before, over_after;
         scratch.points.clear();
         for (const Sample& sample : scratch.samples) scratch.points.add(sample.point);
         scratch.after_surface.compare(scratch.points);
         for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
             Sample& sample = scratch.samples[i];
-            sample.error = scratch.points.difference(i);
-            worst.include(sample.error);
-            if (sample.is_typical) over_leaves.include(sample.error);
+            const Difference error = scratch.points.difference(i);
+            sample.error.include(error);
+            worst.include(error);
+            if (sample.is_typical) over_leaves.include(error);
         }
-        choose_witnesses(node, scratch.samples);
         compare(scratch.before, scratch.after_surface, scratch.points, worst, over_before);
         compare(scratch.after, scratch.before_surface, scratch.points, worst, over_after);
         Difference mean = over_leaves.value();
@@ -478,7 +567,8 @@ private:
 
     // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded.
     // Returns whether nothing is hidden under something else.
-    bool draw(NodeId node, Scratch& scratch, float width, FoldRecord& record) const {
+    bool draw(NodeId node, Scratch& scratch, float width, FoldRecord& record,
+              std::span<FoldRecord, luminances> records) const {
         glm::vec3 normal(0);
         for (const RingTriangle& t : scratch.after) {
             const glm::vec3 a = t.corner[0].position;
@@ -494,11 +584,13 @@ private:
             for (FoldPicture& picture : pictures) picture.clear(FoldPicture::Layer::folded);
             for (const RingTriangle& t : folded) draw(FoldPicture::Layer::folded, t.corner, pictures);
             for (std::size_t size = 0; size < pictures.size(); ++size) {
-                const FoldPicture::Difference difference = pictures[size].difference();
+                const typename FoldPicture::Difference difference = pictures[size].difference();
                 record.shift = std::max(record.shift, difference.shift);
-                for (std::size_t band = 0; band < picture_bands; ++band)
-                    record.amplitudes[size][band] =
-                        std::max(record.amplitudes[size][band], difference.amplitudes[band]);
+                for (std::size_t i = 0; i < luminances; ++i)
+                    for (std::size_t band = 0; band < picture_bands; ++band) {
+                        float& amplitude = records[i].amplitudes[size][band];
+                        amplitude = std::max(amplitude, difference.amplitudes[i][band]);
+                    }
             }
         };
         compare(scratch.after);
@@ -507,7 +599,7 @@ private:
                            [](const FoldPicture& picture) { return picture.is_height_field(); });
     }
 
-    static void draw(FoldPicture::Layer layer, const Point (&corner)[3], std::span<FoldPicture> pictures) {
+    static void draw(typename FoldPicture::Layer layer, const Point (&corner)[3], std::span<FoldPicture> pictures) {
         const auto a = pictures[0].place(corner[0]), b = pictures[0].place(corner[1]), c = pictures[0].place(corner[2]);
         for (FoldPicture& picture : pictures) picture.draw(layer, a, b, c);
     }
@@ -572,7 +664,7 @@ private:
     static bool are_equal(std::span<const RingTriangle> a, std::span<const RingTriangle> b) {
         return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const RingTriangle& s, const RingTriangle& t) {
             return std::equal(s.corner, s.corner + 3, t.corner, [](const Point& p, const Point& q) {
-                return p.position == q.position && p.luminance == q.luminance;
+                return p.position == q.position && std::ranges::equal(p.luminance, q.luminance);
             });
         });
     }
@@ -582,12 +674,13 @@ private:
     }
 
     static Point middle_of(const Point& a, const Point& b) {
-        Float4 p, q;
-        std::memcpy(&p, &a, sizeof p);
-        std::memcpy(&q, &b, sizeof q);
-        p = (p + q) * 0.5f;
+        constexpr std::size_t registers = sizeof(Point) / sizeof(Float4);
+        Float4 p[registers], q[registers];
+        std::memcpy(p, &a, sizeof p);
+        std::memcpy(q, &b, sizeof q);
+        for (std::size_t i = 0; i < registers; ++i) p[i] = (p[i] + q[i]) * 0.5f;
         Point middle;
-        std::memcpy(&middle, &p, sizeof middle);
+        std::memcpy(&middle, p, sizeof middle);
         return middle;
     }
 
@@ -624,14 +717,12 @@ private:
             }
         };
         take(0, [](const Sample& s) { return s.error.distance; });
-        take(witness_count / 2, [](const Sample& s) { return s.error.luminance; });
+        take(witness_count / 2, [](const Sample& s) { return s.error.largest_luminance(); });
     }
 
     const SoundTree& tree_;
-    std::vector<FoldRecord>& records_;
-    std::vector<FoldFacing>& facing_;
-    std::vector<Point> points_; // of nodes
-    std::span<const PackedRange> support_luminance_;
+    std::span<MeasuredFolds> found_; // by tree
+    std::vector<Point> points_;      // of nodes
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
     std::span<const Index> first_triangle_;
@@ -643,7 +734,8 @@ private:
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
-    std::vector<Change> most_changed_; // by interior node
+    std::vector<std::array<int, luminances>> luminance_span_; // by interior node: of its support
+    std::vector<Change> most_changed_;                        // likewise
 };
 
 // Lengths in the tree's own units again. False where they are beyond all numbers.
@@ -678,81 +770,109 @@ std::span<const float> measurement_settings() noexcept { return settings; }
 
 namespace {
 
-struct Measured : MeasuredFolds {
-    std::vector<FoldStage> stages;
-    std::vector<std::uint8_t> stage_of; // by interior node
+// Of trees that are the same but for their luminances, with what follows from each.
+struct Measured {
+    std::vector<MeasuredFolds> found;           // by tree
+    std::vector<std::vector<FoldError>> errors; // likewise, in the units that were measured in
+    std::vector<SoundTree> in_units;            // the trees in these
 };
 
-Result<Measured> measure(const VertexTree& tree, int threads, const Progress& progress, bool with_stages) {
-    const auto sound = SoundTree::of(tree);
-    if (!sound) return sound.error();
-    if (!tree.texture().empty())
-        return Error{
-            ErrorCode::unsupported,
-            "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
-    // Measured is in units in which no product of lengths overflows or vanishes.
-    const float scale = unit_scale(tree.bounding_sphere().radius);
-    const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
-    if (scale != 1) scaled->geometry = scaled_geometry(tree.data().geometry, scale);
-    const auto measured = SoundTree::of(VertexTree(scaled));
-    if (!measured) return measured.error();
+template <std::size_t luminances>
+bool measure_all(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, const Progress& progress) {
+    return Measurer<luminances>(trees, found).run(progress);
+}
 
-    Measured found;
-    found.folds.resize(tree.interior_count());
-    found.facing.resize(tree.interior_count());
-    found.stage_of.resize(tree.interior_count());
-    std::vector<FoldError> errors;
+Result<Measured> measure(std::span<const VertexTree> trees, int threads, const Progress& progress) {
+    assert(trees.size() == 1 || trees.size() == 3 || trees.size() == 4);
+    Measured all;
+    std::shared_ptr<const TreeGeometry> geometry; // scaled, of all
+    // Measured is in units in which no product of lengths overflows or vanishes.
+    const float scale = unit_scale(trees.front().bounding_sphere().radius);
+    for (const VertexTree& tree : trees) {
+        const auto sound = SoundTree::of(tree);
+        if (!sound) return sound.error();
+        if (!tree.texture().empty())
+            return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold "
+                                                 "test, or the tree without its texture."};
+        const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
+        if (scale != 1 && !geometry) geometry = scaled_geometry(tree.data().geometry, scale);
+        if (scale != 1) scaled->geometry = geometry;
+        auto measured = SoundTree::of(VertexTree(scaled));
+        if (!measured) return measured.error();
+        all.in_units.push_back(std::move(*measured));
+    }
+    const NodeId nodes = trees.front().interior_count();
+    all.found.resize(trees.size());
+    for (MeasuredFolds& found : all.found) found.folds.resize(nodes), found.facing.resize(nodes);
+    all.errors.resize(trees.size());
+    const auto measure_these = trees.size() == 1 ? measure_all<1> : trees.size() == 3 ? measure_all<3> : measure_all<4>;
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = Measurer(*measured, found.folds, found.facing).run(progress);
+        is_whole = measure_these(all.in_units, all.found, progress);
         if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
-        errors = nested_errors(*measured, found.folds, found.facing, FoldModel());
-        find_luminance_bias(*measured, errors);
-        if (with_stages) found.stages = find_stages(*measured, errors);
+        tbb::parallel_for(std::size_t{0}, trees.size(), [&](std::size_t i) {
+            MeasuredFolds& found = all.found[i];
+            all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, FoldModel());
+            find_luminance_bias(all.in_units[i], all.errors[i]);
+        });
     });
     if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
-    for (NodeId node = 0; node < errors.size(); ++node) {
-        found.folds[node].bias = errors[node].bias;
-        found.facing[node].fading = errors[node].fading;
-        found.stage_of[node] = errors[node].stage;
-        if (!scale_back(found.folds[node], scale))
-            return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
-                                                     " changes is beyond all numbers: the mesh is too large."};
-    }
-    return found;
+    for (std::size_t i = 0; i < trees.size(); ++i)
+        for (NodeId node = 0; node < nodes; ++node) {
+            FoldRecord& fold = all.found[i].folds[node];
+            fold.bias = all.errors[i][node].bias;
+            all.found[i].facing[node].fading = all.errors[i][node].fading;
+            if (!scale_back(fold, scale))
+                return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
+                                                         " changes is beyond all numbers: the mesh is too large."};
+        }
+    return all;
 }
 
-Result<VertexTree> with_attributes(const VertexTree& tree, Measured measured) {
+Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measured, std::vector<std::uint8_t> stage_of,
+                                   std::vector<FoldStage> stages) {
     Attributes with(tree.share());
     with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
     with.add(record_name, AttributeDomain::interior_node, std::move(measured.folds));
     with.add(facing_name, AttributeDomain::interior_node, std::move(measured.facing));
-    with.add(stage_of_name, AttributeDomain::interior_node, std::move(measured.stage_of));
-    with.add(stages_name, AttributeDomain::tree, std::move(measured.stages));
+    with.add(stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
+    with.add(stages_name, AttributeDomain::tree, std::move(stages));
     return with.take();
 }
 
 } // namespace
 
 Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
-    auto measured = measure(tree, threads, progress, true);
+    auto measured = measure(std::span(&tree, 1), threads, progress);
     if (!measured) return measured.error();
-    return with_attributes(tree, std::move(*measured));
+    std::vector<FoldError>& errors = measured->errors.front();
+    std::vector<FoldStage> stages;
+    tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
+        stages = find_stages(measured->in_units.front(), errors);
+    });
+    std::vector<std::uint8_t> stage_of(errors.size());
+    for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
+    return with_attributes(tree, std::move(measured->found.front()), std::move(stage_of), std::move(stages));
 }
 
-Result<MeasuredFolds> measure_records(const VertexTree& tree, int threads, const Progress& progress) {
-    auto measured = measure(tree, threads, progress, false);
+Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::span<const Shading> shadings,
+                                                   int threads, const Progress& progress) {
+    std::vector<VertexTree> shaded;
+    for (const Shading& luminance : shadings) {
+        auto as_shaded = tree.shaded(luminance);
+        if (!as_shaded) return as_shaded.error();
+        shaded.push_back(std::move(*as_shaded));
+    }
+    auto measured = measure(shaded, threads, progress);
     if (!measured) return measured.error();
-    return MeasuredFolds(std::move(*measured));
+    return std::move(measured->found);
 }
 
 Result<VertexTree> with_records(const VertexTree& tree, MeasuredFolds measured) {
-    Measured all{std::move(measured), {}, {}};
-    all.stage_of.resize(tree.interior_count());
-    return with_attributes(tree, std::move(all));
+    return with_attributes(tree, std::move(measured), std::vector<std::uint8_t>(tree.interior_count()), {});
 }
 
 } // namespace unseen::perception

@@ -1,6 +1,7 @@
 // The measurement of folds without what follows from it for the whole mesh.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <vdtree/function_ref.h>
@@ -16,8 +17,14 @@ struct MeasuredFolds { // by interior node
     std::vector<FoldFacing> facing;
 };
 
-// As measure_folds(), without its stages.
-Result<MeasuredFolds> measure_records(const vdtree::VertexTree& tree, int threads, const Progress& progress);
+// What a tree's nodes are given as luminance.
+using Shading = Callback<float(vdtree::NodeId)>;
+
+// As measure_folds(), without its stages, for several luminances at once. Which neighbours are folded with a node is the
+// same for all, so they share what is measured of lengths, and where surfaces touch. By shading. Precondition: one,
+// three or four of them.
+Result<std::vector<MeasuredFolds>> measure_records(const vdtree::VertexTree& tree, std::span<const Shading> shadings,
+                                                   int threads, const Progress& progress);
 
 // The tree with these as measure_folds() keeps them, and no stages.
 Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured);

@@ -59,4 +59,10 @@ std::string hint_at_baked_light(const vdtree::VertexTree& tree);
 // 0: all cores.
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0, const Progress& progress = {});
 
+// A tree with what its folds change under lights, whichever these are (perception::LitFolds), which `error` goes by in
+// scenes with lights. Without it a session measures it when it first needs to, and keeps it in the cache where the scene
+// is of a file. Of other attributes none is lost. Fails where perception::LitFolds::measure() does, at that cost.
+Result<vdtree::VertexTree> measured_under_lights(const vdtree::VertexTree& tree, int threads = 0,
+                                                 const Progress& progress = {});
+
 } // namespace unseen::session

@@ -25,7 +25,7 @@ struct Object {
     // What was done to the tree since it was built, for the reasons that a plan gives.
     bool texture_left_out = false, is_relit = false;
     TreeOrigin origin = TreeOrigin::given;
-    std::shared_ptr<const MeasurementPlace> measurement = {}; // where that of a tree file's tree is kept; null: nowhere
+    std::shared_ptr<const MeasurementPlace> measurement = {}; // where what is measured of it is kept; null: nowhere
     std::int32_t node = -1, mesh = -1;                        // of Scene::source; -1: none
 };
 
