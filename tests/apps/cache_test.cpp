@@ -318,6 +318,21 @@ TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptInTreeFiles) {
     EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("lit.ply")));
 }
 
+TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptOfScenes) {
+    write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 2, 0.5],
+                                        "intensity": 0.8}]})");
+    ASSERT_EQ(run({"simplify", "ball.obj", "--full", "-o", "ball.gltf", "--no-cache"}).status, 0);
+    const auto lit = [&](const std::string& out) {
+        const Outcome outcome = run({"simplify", "ball.gltf", "--as", "scene", "--lights", "lights.json", "-o", out});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.err;
+    };
+    EXPECT_THAT(lit("first.gltf"), HasSubstr("measured what the folds of ball.gltf change under lights"));
+    EXPECT_THAT(kept(), ElementsAre("ball.gltf+lights", "ball.gltf"));
+    EXPECT_EQ(lit("second.gltf"), "");
+    EXPECT_TRUE(read_text(path("first.bin")) == read_text(path("second.bin")));
+}
+
 TEST_F(CacheTest, AProgramChoosesTheFolderOrNone) {
     const auto load = [&](const CacheOptions& cache, session::Messages messages = {}) {
         return Scene::load(path("ball.obj"), {.cache = cache, .messages = std::move(messages)});

@@ -43,8 +43,7 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
                                          const Messages& messages);
 
 // What a tree's folds change under lights: what the tree has of it, or what is kept, else measured now and kept. `place`
-// may be null. `takes_long`: is told where
-// it is measured.
+// may be null. `takes_long`: a note says so before it is measured.
 Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                                         const Messages& messages, bool takes_long);
 
