@@ -366,8 +366,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
 Session sunlit(const std::vector<glm::dvec3>& places, glm::dvec3 towards, bool casts) {
     static const vdtree::VertexTree plain = support::built(shapes::bumpy_sphere(5, 0.02));
     Scene scene;
-    for (const glm::dvec3& at : places)
-        scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
+    for (const glm::dvec3& at : places) scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
     vdtree::Lighting lighting;
     lighting.ambient = 0.2;
     vdtree::LightSource& sun = lighting.lights.emplace_back();
@@ -426,9 +425,10 @@ TEST_F(LevelControlTest, PicturesHaveTheScenesShadows) {
     const auto items = renderer->items(drawn_cuts(cuts), ahead(96));
     ASSERT_TRUE(items) << items.error().message;
     auto target = render::Target::create(context(), 96, 96);
-    ASSERT_TRUE(render::draw(std::span(items->items).first(1),
-                             {.view = ahead(96), .near_plane = control->layers().near_plane(), .shadows = items->shadows},
-                             *target, {.colour = glm::vec4(session.background())}));
+    ASSERT_TRUE(
+        render::draw(std::span(items->items).first(1),
+                     {.view = ahead(96), .near_plane = control->layers().near_plane(), .shadows = items->shadows},
+                     *target, {.colour = glm::vec4(session.background())}));
     EXPECT_EQ(*render::read_pixels(control->picture()), *render::read_pixels(*target));
     // It is in the shadow: half of it is at the ambient light.
     const auto dark = *render::read_luminance(control->picture());
