@@ -103,6 +103,38 @@ void print_arrays(const Arrays& arrays) {
     }
 }
 
+// What surfaces are made of, by name; images by the names of their files.
+using Materials = std::vector<meshio::Material>;
+
+std::string image_of(const meshio::Material& material) {
+    if (!material.image.empty()) return material.image.generic_string();
+    return material.image_bytes ? "in the file" : "";
+}
+
+Json materials_json(const Materials& materials) {
+    Json json = Json::array();
+    for (const meshio::Material& m : materials) {
+        const std::string image = image_of(m);
+        json.push_back({{"name", m.name},
+                        {"colour", {m.colour.r, m.colour.g, m.colour.b, m.colour.a}},
+                        {"image", image.empty() ? Json() : Json(image)}});
+    }
+    return json;
+}
+
+// "material 'bark': image oak.png", one line each.
+void print_materials(const Materials& materials, bool with_all) {
+    constexpr std::size_t most_lines = 40;
+    const std::size_t shown = with_all ? materials.size() : std::min(materials.size(), most_lines);
+    for (std::size_t i = 0; i < shown; ++i) {
+        const std::string image = image_of(materials[i]);
+        print_line("material '" + printable(materials[i].name) +
+                   "': " + (image.empty() ? std::string("no image") : "image " + printable(image)));
+    }
+    if (shown < materials.size())
+        print_line("and " + grouped(materials.size() - shown) + " more materials (--verbose lists them)");
+}
+
 // Of what the mesh's file said.
 Result<Arrays> arrays_of(const vdtree::VertexTree& tree) {
     if (tree.document().empty()) return Arrays();
@@ -245,6 +277,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"file_bytes", file_bytes},
                  {"faces", read->source_faces},
                  {"images", images},
+                 {"materials", materials_json(read->materials)},
                  {"arrays", arrays_json(arrays)},
                  {"examination", examination_json(*read, *examined)},
                  {"ranges", mesh.ranges.size()}};
@@ -266,6 +299,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"of them closed", grouped(examined->closed_components)}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
+    if (!a.json) print_materials(read->materials, a.is_verbose);
     if (!a.json) print_arrays(arrays);
     if (!a.json) print_findings(*read, *examined, a.is_verbose);
     return exit_done;
@@ -289,6 +323,7 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
         std::uint64_t triangles = 0, nodes = 0, background_nodes = 0;
     };
     std::map<std::int32_t, Shown> meshes;
+    Materials materials; // of all meshes, each once
     for (const meshio::SceneNode& node : contents.nodes) {
         Shown& shown = meshes[node.mesh];
         if (shown.nodes++ == 0) shown.name = node.name;
@@ -304,6 +339,9 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
             if (const auto examined = meshio::examine((*read)->mesh.view()); !examined)
                 return Error{examined.error().code, a.file + ": " + examined.error().message};
             shown.triangles = (*read)->mesh.triangles.size();
+            for (const meshio::Material& material : (*read)->materials)
+                if (std::ranges::none_of(materials, [&](const auto& m) { return m.name == material.name; }))
+                    materials.push_back(material);
         }
         const std::uint64_t of_objects = shown.nodes - shown.background_nodes;
         objects += of_objects;
@@ -334,6 +372,7 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
                  {"meshes", std::move(meshes_json)},
                  {"mesh_triangles", own},
                  {"background_triangles", background},
+                 {"materials", materials_json(materials)},
                  {"lights", std::move(lights)},
                  {"camera", std::move(camera)},
                  {"file_bytes", file_bytes_of(a.file)}};
@@ -344,6 +383,7 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
                  {"different meshes", grouped(meshes.size())},
                  {"their triangles, once each", grouped(own)},
                  {"background triangles", grouped(background)},
+                 {"materials", grouped(materials.size())},
                  {"lights", grouped(contents.lights.size())},
                  {"camera", contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none"},
                  {"bytes on disk", grouped(file_bytes_of(a.file))}};
@@ -353,6 +393,7 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
     lines.resize(lines.size() - left_out);
     rows.insert(rows.end(), lines.begin(), lines.end());
     output(a.json, json, rows);
+    if (!a.json) print_materials(materials, a.is_verbose);
     if (!a.json && left_out > 0) print_line("and " + grouped(left_out) + " more meshes (--verbose lists them)");
     return exit_done;
 }
@@ -387,7 +428,8 @@ Command info_command(CLI::App& app) {
         "A mesh is examined: holes, non-manifold and inconsistent edges, duplicates, parts that are inside out, size;\n"
         "what is unusual is said with what it means for simplification. Bad vertices and faces are counted and left\n"
         "out, but for --verify. Values of vertices are listed: name, type, components, range of each.\n\n"
-        "Of a scene: its objects, how often each mesh is shown, lights and camera; --as model examines it as one "
+        "Of a scene: its objects, how often each mesh is shown, materials, lights and camera; --as model examines it "
+        "as one "
         "mesh.\n\n"
         "Examples:\n  unseen info bunny.ply\n  unseen info museum.glb\n  unseen info bunny.vdt --verify --json");
     return {verb, [a] { return run(*a); }};

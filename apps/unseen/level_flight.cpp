@@ -342,8 +342,6 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
     if (!context) return context.error();
     auto session = open_session(model, view_options, display);
     if (!session) return session.error();
-    if (session->scene().objects.empty())
-        return Error{ErrorCode::invalid_argument, "'" + model + "' has no objects, so there are no levels to choose."};
     session->set_velocity(options.what.velocity());
     vdtree::View view = make_view(*session, view_options);
     if (options.what.gaze_px) session->set_gaze(session::Gaze{*options.what.gaze_px});

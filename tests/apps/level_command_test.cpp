@@ -36,7 +36,10 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
     ASSERT_EQ(json["frames"].size(), 1u);
     const Json& frame = json["frames"][0];
     EXPECT_EQ(frame["layers"], 5);
-    EXPECT_EQ(frame["surface_passes"], 7) << "5 layers, the background, the depth";
+    // One of the lamps casts shadows, six maps of them, and on some of each layer.
+    EXPECT_EQ(frame["shadow_maps"], 6);
+    EXPECT_EQ(frame["masked_layers"], 5);
+    EXPECT_EQ(frame["surface_passes"], 7 + 5) << "5 layers, the background, the depth; and masks";
     EXPECT_GT(frame["full_screen_passes"], 5);
     EXPECT_GT(frame["texture_bytes"], 128 * 96 * 16 * 6);
     EXPECT_LT(frame["triangles"], json["source_triangles"]);
@@ -98,7 +101,8 @@ TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
     for (const std::string method : {"distance", "area"}) {
         int before = 0;
         for (const std::string bias : {"1e-6", method == "area" ? "3" : "0.03", "1e6"}) {
-            const Outcome drawn = render({"--method", method, "--bias", bias, "--json", "-"});
+            // Under shadows of a lamp among the objects no level is unseen from any distance.
+            const Outcome drawn = render({"--method", method, "--bias", bias, "--no-shadows", "--json", "-"});
             ASSERT_EQ(drawn.status, 0) << drawn.err;
             const int triangles = drawn.json()["frames"][0]["triangles"];
             EXPECT_GT(triangles, before) << method << " " << bias;
@@ -122,6 +126,42 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
         const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show});
         EXPECT_EQ(drawn.status, 0) << drawn.err;
     }
+}
+
+// The background alone: by every method, and whatever is to be shown of it.
+TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
+    ASSERT_EQ(run({"scene", "make", "museum", "-o", "museum.glb", "--triangles", "10000"}).status, 0);
+    const std::string bytes = read_text(path("museum.glb"));
+    const auto length = static_cast<std::size_t>(static_cast<unsigned char>(bytes[12])) |
+                        static_cast<std::size_t>(static_cast<unsigned char>(bytes[13])) << 8 |
+                        static_cast<std::size_t>(static_cast<unsigned char>(bytes[14])) << 16;
+    Json json = Json::parse(bytes.substr(20, length));
+    for (Json& node : json["nodes"])
+        if (node.contains("mesh")) node["extras"]["unseen"]["background"] = true;
+    json["buffers"][0]["uri"] = "data.bin";
+    write_text(path("data.bin"), bytes.substr(20 + length + 8));
+    write_text(path("scene.gltf"), json.dump());
+    std::string first;
+    for (const std::string method : {"perceptual", "distance", "area"}) {
+        const Outcome drawn =
+            run({"render", "scene.gltf", "--size", "64x48", "--method", method, "-o", method + ".pfm", "--json", "-"});
+        ASSERT_EQ(drawn.status, 0) << method << ": " << drawn.err;
+        EXPECT_EQ(drawn.json()["frames"][0]["triangles"], 0);
+        EXPECT_TRUE(drawn.json()["is_settled"]);
+        const std::string picture = read_text(path(method + ".pfm"));
+        if (first.empty()) first = picture;
+        EXPECT_EQ(picture, first) << method;
+    }
+    const auto picture = unseen::perception::read_image(path("area.pfm"));
+    ASSERT_TRUE(picture);
+    const auto [least, most] = std::ranges::minmax(picture->image.values);
+    EXPECT_GT(most, 2 * least) << "there are walls";
+    for (const std::string show : {"layers", "combinations", "maps", "levels"})
+        EXPECT_EQ(run({"render", "scene.gltf", "--size", "64x48", "--method", "perceptual", "-o", show + ".png",
+                       "--show", show})
+                      .status,
+                  0)
+            << show;
 }
 
 TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {

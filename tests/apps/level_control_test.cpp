@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -346,6 +347,18 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     aside.target = aside.eye;
     EXPECT_FALSE(control->draw(aside));
 
+    // Larger than this GPU draws: the picture of before stays, and the next one is drawn.
+    vdtree::View huge = ahead(64);
+    huge.width = render::largest_target_side() + 1;
+    const auto too_large = control->draw(huge);
+    ASSERT_FALSE(too_large);
+    EXPECT_THAT(too_large.error().message, HasSubstr("choose a smaller size"));
+    EXPECT_EQ(control->picture().width(), 64);
+    EXPECT_TRUE(control->read_levels());
+    EXPECT_TRUE(control->wait());
+    EXPECT_TRUE(control->draw(ahead(64)));
+    EXPECT_FALSE(LevelControl::create(context(), session, huge));
+
     const auto refused = [&](const LevelControlOptions& options) {
         const auto made = LevelControl::create(context(), session, ahead(64), options);
         return made ? std::string("none") : made.error().message;
@@ -353,11 +366,24 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_THAT(refused({.bias = 0}), HasSubstr("bias"));
     EXPECT_THAT(refused({.bias = std::nan("")}), HasSubstr("bias"));
     EXPECT_THAT(refused({.chain = {.levels = 0}}), HasSubstr("1 to 16 levels"));
+    EXPECT_THAT(refused({.layers = 0}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.layers = 17}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.map_block = 0}), HasSubstr("pixels a side"));
     EXPECT_THAT(refused({.upper_share = 0.1, .lower_share = 0.2}), HasSubstr("shares"));
     EXPECT_THAT(refused({.fade_frames = -1}), HasSubstr("fade"));
     EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));
+}
+
+// Contexts are shared: one lasts as long as anything that draws in it.
+TEST_F(LevelControlTest, OutlivesTheHandleOfItsContext) {
+    Session session = bodies({{0, 0, -4}, {1, 1, -7}});
+    auto own = std::optional(*render::Context::headless());
+    auto control = LevelControl::create(*own, session, ahead(64));
+    ASSERT_TRUE(control);
+    own.reset();
+    EXPECT_TRUE(context().make_current());
+    EXPECT_TRUE(control->settle(ahead(64)));
+    EXPECT_TRUE(control->thresholds(0));
 }
 
 // ---- shadows ----------------------------------------------------------------------------------------------------------
@@ -366,8 +392,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
 Session sunlit(const std::vector<glm::dvec3>& places, glm::dvec3 towards, bool casts) {
     static const vdtree::VertexTree plain = support::built(shapes::bumpy_sphere(5, 0.02));
     Scene scene;
-    for (const glm::dvec3& at : places)
-        scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
+    for (const glm::dvec3& at : places) scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
     vdtree::Lighting lighting;
     lighting.ambient = 0.2;
     vdtree::LightSource& sun = lighting.lights.emplace_back();
@@ -426,9 +451,10 @@ TEST_F(LevelControlTest, PicturesHaveTheScenesShadows) {
     const auto items = renderer->items(drawn_cuts(cuts), ahead(96));
     ASSERT_TRUE(items) << items.error().message;
     auto target = render::Target::create(context(), 96, 96);
-    ASSERT_TRUE(render::draw(std::span(items->items).first(1),
-                             {.view = ahead(96), .near_plane = control->layers().near_plane(), .shadows = items->shadows},
-                             *target, {.colour = glm::vec4(session.background())}));
+    ASSERT_TRUE(
+        render::draw(std::span(items->items).first(1),
+                     {.view = ahead(96), .near_plane = control->layers().near_plane(), .shadows = items->shadows},
+                     *target, {.colour = glm::vec4(session.background())}));
     EXPECT_EQ(*render::read_pixels(control->picture()), *render::read_pixels(*target));
     // It is in the shadow: half of it is at the ambient light.
     const auto dark = *render::read_luminance(control->picture());

@@ -44,6 +44,11 @@ Result<void> check(const LevelControlOptions& o) {
     return {};
 }
 
+// After a frame of another size failed for want of memory.
+Error no_picture() {
+    return {ErrorCode::invalid_argument, "There is no picture: the last frame could not be drawn. Draw one first."};
+}
+
 struct Sphere {
     glm::dvec3 centre = glm::dvec3(0);
     double radius = 0;
@@ -265,6 +270,13 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
     if (passes && passes->width == wanted.width && passes->height == wanted.height &&
         same_gaze(passes->gaze, observer.gaze))
         return {};
+    // What the GPU cannot draw at all leaves the old ones as they are.
+    if (auto current = context.make_current(); !current) return current;
+    if (const int most = render::largest_target_side(); wanted.width > most || wanted.height > most)
+        return Error{ErrorCode::unsupported, "A picture of " + std::to_string(wanted.width) + "x" +
+                                                 std::to_string(wanted.height) +
+                                                 " pixels cannot be drawn: this OpenGL can draw at most " +
+                                                 std::to_string(most) + " pixels a side; choose a smaller size."};
     passes.reset(); // the old ones first, so that both sizes need not fit at a time
     open.clear();
     for (Thing& thing : things) thing.is_open = false;
@@ -367,6 +379,7 @@ std::uint64_t LevelControl::Impl::shadow_redraws() const {
 }
 
 Result<void> LevelControl::Impl::combine(int left_out) {
+    if (!passes) return no_picture();
     const auto layer = static_cast<std::size_t>(left_out);
     if (!shadows || left_out < 0 || layer >= is_shaded.size() || !is_shaded[layer])
         return passes->layers.combine(left_out);
@@ -764,6 +777,7 @@ Result<LevelFrame> LevelControl::settle(const vdtree::View& view, int most_frame
 // Of the objects of each level the depth alone: the nearest level is what a pixel shows.
 Result<std::vector<int>> LevelControl::read_levels() {
     Impl& own = *impl_;
+    if (!own.passes) return no_picture();
     auto target =
         render::Target::create(own.context, own.passes->width, own.passes->height, {.colours = {}, .label = "levels"});
     if (!target) return target.error();
@@ -797,6 +811,7 @@ Result<void> LevelControl::combine(int left_out) { return impl_->combine(left_ou
 
 Result<std::vector<float>> LevelControl::thresholds(int left_out) {
     Impl& own = *impl_;
+    if (!own.passes) return no_picture();
     if (!own.passes->modern && !own.passes->rpg99)
         return bad_option("only the method perceptual has maps of thresholds");
     if (auto combined = own.combine(left_out); !combined) return combined.error();

@@ -125,6 +125,8 @@ public:
     // Of the last frame: whether every object in sight was tested since a level last changed, and kept its own.
     bool is_settled() const noexcept;
 
+    // Preconditions of what refers to pictures: the last draw() succeeded. Of others' sizes that cannot be drawn the old
+    // picture stays; where memory runs out there is none.
     const render::Target& picture() const noexcept;      // of the last frame: linear RGB, relative luminance
     const render::LayerPasses& layers() const noexcept;  // of the last frame
     Result<void> combine(int left_out);                  // of the last frame, for people to look at
