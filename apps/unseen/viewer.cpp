@@ -396,7 +396,9 @@ private:
     }
 
     const perception::Display& display() const { return session_.observer().display; }
-    std::vector<session::DrawnCut> cuts() const { return session::drawn_cuts(follower_, session_.scene().objects.size()); }
+    std::vector<session::DrawnCut> cuts() const {
+        return session::drawn_cuts(follower_, session_.scene().objects.size());
+    }
 
     session::Session& session_;
     const ViewerOptions& options_;

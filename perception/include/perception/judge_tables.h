@@ -47,7 +47,7 @@ struct JudgeTables {
         int halvings = 0;
         std::vector<float> kernel; // from the middle on, along one axis; at most 12 values
     };
-    struct Band { // level 0 first, the base last
+    struct Band {                     // level 0 first, the base last
         CyclesPerDegree nominal = {}; // the frequency that it sees best
         float of_patch = 1;
         std::array<Gaussian, 3> window; // the law of area; from the widest on

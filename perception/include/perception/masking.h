@@ -20,7 +20,7 @@ namespace unseen::perception {
 
 // Of one picture, in cells of a grid over it, from its top left: the factor by which thresholds are raised, at least.
 struct Elevations {
-    int cell_px = 0;              // a side; cells at the right and the bottom may reach beyond the picture
+    int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
     int columns = 0, rows = 0;
     std::vector<CyclesPerDegree> bands = {}; // nominal frequencies, falling; one: the same at all frequencies
     std::vector<float> elevation = {};       // [(band * rows + row) * columns + column], 1 or more

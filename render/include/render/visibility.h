@@ -94,7 +94,7 @@ struct VisibilitySummary {
 
 // By how much a picture raises thresholds, at least, in cells of a grid over it.
 struct ElevationGrid {
-    int cell_px = 0;              // a side; cells at the right and the bottom may reach beyond the picture
+    int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
     int columns = 0, rows = 0;
     std::vector<float> elevation; // [(band * rows + row) * columns + column], 1 or more; bands as in the tables
 };
