@@ -420,6 +420,8 @@ Command scenes_command(CLI::App& app) {
     verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
+    verb->add_flag_function(
+        "--no-shadows", [a](std::int64_t) { a->options.has_shadows = false; }, "No light casts shadows");
     verb->add_flag("--quick", a->quick, "Fewer samples a pixel, and a short walk");
     add_report_options(*verb, a->report);
     verb->callback([a] {

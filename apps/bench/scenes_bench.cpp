@@ -46,6 +46,8 @@ public:
         load.as = session::LoadAs::scene;
         auto scene = session::Scene::load(file, load);
         if (!scene) return scene.error();
+        if (!options.has_shadows && scene->lights)
+            if (auto set = scene->lights->set_shadows(false); !set) return set.error();
         if (!scene->camera)
             return Error{ErrorCode::invalid_argument, "'" + file + "' has no camera: the views of scenes are theirs."};
         auto session = session::Session::create(std::move(*scene));
@@ -85,12 +87,15 @@ public:
         return row;
     }
 
-    // The cuts of a frame's levels; what is out of the window is not there.
+    // The cuts of a frame's levels. What is out of the window is whole where it may cast shadows into it, and else not
+    // there.
     std::vector<vdtree::Cut> cuts_of(const LevelControl& control, const session::LevelFrame& frame) const {
+        const auto& lights = session_->scene().lights;
+        const bool casts = lights && !lights->casting().empty();
         std::vector<vdtree::Cut> cuts;
         for (std::size_t i = 0; i < frame.levels.size(); ++i) {
             if (frame.levels[i] >= 0) cuts.push_back(control.chain(i).cut(frame.levels[i]));
-            else cuts.emplace_back(session_->tree(i));
+            else if (cuts.emplace_back(session_->tree(i)); casts) cuts.back().unfold_all();
         }
         return cuts;
     }
@@ -147,17 +152,17 @@ private:
 
 // ---- triangles and what shows
 
-// Levels by distance or by area with about so many triangles: the coarsest bias that has as many, by bisection.
+// Levels by distance or by area in a budget of triangles: the finest bias that keeps to it, by bisection.
 Result<session::LevelFrame> with_triangles(LevelControl& control, const vdtree::View& view, std::uint64_t triangles) {
-    double low = 1e-4, high = 1e4; // too few, enough
+    double low = 1e-4, high = 1e4; // within it, and more
     for (int step = 0; step < 24; ++step) {
         const double middle = std::sqrt(low * high);
         control.set_bias(middle);
         const auto frame = control.draw(view);
         if (!frame) return frame;
-        (frame->triangles < triangles ? low : high) = middle;
+        (frame->triangles <= triangles ? low : high) = middle;
     }
-    control.set_bias(high);
+    control.set_bias(low);
     return control.draw(view);
 }
 
@@ -213,7 +218,7 @@ Result<std::vector<Row>> rows_of(JudgedScene& scene) {
         const auto start = BenchClock::now();
         const auto frame = with_triangles(*control, scene.view(), least);
         if (!frame) return frame.error();
-        add(scene.judge(std::string(name) + ", as many triangles", scene.cuts_of(*control, *frame),
+        add(scene.judge(std::string(name) + ", in as many triangles", scene.cuts_of(*control, *frame),
                         seconds_since(start)));
         add(without_visible_pixels(scene, *control, std::string(name) + ", where nothing shows"));
     }

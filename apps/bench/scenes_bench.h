@@ -13,8 +13,9 @@ struct ScenesBenchOptions {
     std::vector<std::string> scenes; // glTF files; empty: the four of `unseen scene make`, of about `triangles` each
     std::uint64_t triangles = 500'000;
     int window_px = 512;
-    int samples = 64;     // a pixel of what is judged
-    int path_frames = 24; // of the walk that times and renderings are summed over
+    int samples = 64;        // a pixel of what is judged
+    bool has_shadows = true; // where lights of the scenes cast some
+    int path_frames = 24;    // of the walk that times and renderings are summed over
 };
 
 struct ScenesBenchResult {
