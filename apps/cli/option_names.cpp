@@ -16,6 +16,7 @@ constexpr OptionName option_names[] = {
     {"observer.csf = ", "--csf "},
     {"request.fold_test", "--fold-test"},
     {"request.chroma", "--chroma"},
+    {"request.keeps_shadows", "--shadows"},
     {"request.masking", "--masking scene"},
     {"request.shown", "--visibility picture"},
     {"request.goal.triangles", "--triangles"},

@@ -102,7 +102,7 @@ TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
         int before = 0;
         for (const std::string bias : {"1e-6", method == "area" ? "3" : "0.03", "1e6"}) {
             // Under shadows of a lamp among the objects no level is unseen from any distance.
-            const Outcome drawn = render({"--method", method, "--bias", bias, "--no-shadows", "--json", "-"});
+            const Outcome drawn = render({"--method", method, "--bias", bias, "--json", "-"});
             ASSERT_EQ(drawn.status, 0) << drawn.err;
             const int triangles = drawn.json()["frames"][0]["triangles"];
             EXPECT_GT(triangles, before) << method << " " << bias;

@@ -161,6 +161,8 @@ Effect shadow_effect(const Sight& sight, const Decision& decision) {
         return {"shadows", true,
                 why + "; the fold test " + name_of(decision.test) +
                     " does not look at them, so their edges may move visibly"};
+    if (!decision.request.keeps_shadows)
+        return {"shadows", true, why + "; without request.keeps_shadows their edges may move visibly"};
     return {"shadows", true,
             why + "; folds are tested with any of these hidden, and outlines that a light sees fold only where their "
                   "shadows' edges move invisibly"};

@@ -361,7 +361,7 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     const auto& kept = decision.masking ? masked : last;
     CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
     if (!folds_unseen(sight, decision)) {
-        if (!kept->edges) return recipe;
+        if (!kept->edges || !decision.request.keeps_shadows) return recipe;
         auto with_outlines = keep_outlines(sight, kept, decision.request.threshold);
         if (!with_outlines) return with_outlines.error();
         recipe.criterion = std::move(*with_outlines);
@@ -371,7 +371,7 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     if (!hidden) return hidden.error();
     auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
     if (!without) return without.error();
-    if (kept->edges) { // what is hidden may cast shadows that are not
+    if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
         find_shadowing_outlines(sight, kept, decision.request.threshold);
         sight.shadow.criterion.reset();
         without = vdtree::keeping(sight.object.tree, *without, beyond(sight.shadow.shifts, sight.shadow.limit));

@@ -143,6 +143,7 @@ vdtree::Cut LevelChain::cut(int level) const {
 Result<LevelChain> level_chain(Session& session, const vdtree::View& view, Request request, std::size_t object,
                                const LevelChainOptions& options) {
     request.goal = Goal::imperceptible();
+    request.keeps_shadows = false; // levels are for eyes at any distance, and the lights' distances are others
     const auto recipe = session.recipe(view, request, object);
     if (!recipe) return recipe.error();
     return LevelChain::create(session.tree(object), *recipe->criterion, options);

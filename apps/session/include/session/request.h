@@ -59,6 +59,9 @@ struct Request {
     // Of pictures: what the scene of this view, and of no other, masks of each object; by object, or empty: nothing.
     // Counts for the test error, for gazes that are known for sure and where nothing moves over the retina.
     std::vector<perception::MaskingPicture> masking = {};
+    // Keep outlines whose shadows would move visibly, where lights cast some. False: a cut for the eye alone, whose
+    // shadows may show it.
+    bool keeps_shadows = true;
     // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
     bool may_measure = true;
     // Report::effects: some 20 us an object, which flights through scenes of many can do without.
