@@ -27,6 +27,8 @@
 #include <perception/fold_measurement.h>
 #include <perception/fold_model.h>
 #include <perception/lit_folds.h>
+#include <perception/masking.h>
+#include <perception/shadow_edges.h>
 
 // Pictures, and judges of them.
 #include <perception/change.h>
