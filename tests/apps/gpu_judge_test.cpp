@@ -17,6 +17,7 @@
 
 #include "built.h"
 #include "gl_test.h"
+#include "luminance_images.h"
 #include "shapes.h"
 
 namespace {
@@ -28,6 +29,8 @@ using perception::Judgement;
 using perception::JudgeOptions;
 using render::VisibilityPrecision;
 using session::GpuJudge;
+using support::flat;
+using support::noise;
 using ::testing::HasSubstr;
 using GpuJudgeTest = render::testing::GlTest;
 
@@ -36,18 +39,6 @@ constexpr double full_tolerance = 1e-3, half_tolerance = 0.01; // relative
 // Below these V errors are not relative: differences in float round to so much, and half floats keep no less.
 constexpr double full_floor = 1e-4, half_floor = 0.1;
 constexpr double most_in_half_floats = 5e3; // V beyond it is cut off some day
-
-Image flat(int width, int height, float cdm2) {
-    return {width, height, 1,
-            std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), cdm2)};
-}
-
-Image noise(int width, int height, double mean, double contrast, unsigned seed) {
-    Image image = flat(width, height, 0);
-    std::mt19937_64 random(seed);
-    for (float& v : image.values) v = static_cast<float>(mean * (1 + contrast * shapes::random_between(random, -1, 1)));
-    return image;
-}
 
 // Cycles a pixel and contrast grow to the right and to the bottom.
 Image gratings(int width, int height, double mean, double contrast) {

@@ -15,6 +15,7 @@
 #include <session_gpu/gpu_judge.h>
 
 #include "gl_test.h"
+#include "luminance_images.h"
 #include "shapes.h"
 
 namespace {
@@ -22,6 +23,8 @@ namespace {
 using namespace unseen;
 using perception::Image;
 using render::LuminanceImage;
+using support::flat;
+using support::noise;
 using ::testing::HasSubstr;
 using ThresholdMapsTest = render::testing::GlTest;
 
@@ -31,18 +34,6 @@ constexpr double full_tolerance = 1e-3, half_tolerance = 0.01;
 // A table is linear where the formula of TVI has steps, at 0.036 and 79.4 cd/m2; few pixels have just that luminance, but
 // one of few may.
 constexpr double step_of_tvi = 0.03;
-
-Image flat(int width, int height, float cdm2) {
-    return {width, height, 1,
-            std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), cdm2)};
-}
-
-Image noise(int width, int height, double mean, double contrast, unsigned seed) {
-    Image image = flat(width, height, 0);
-    std::mt19937_64 random(seed);
-    for (float& v : image.values) v = static_cast<float>(mean * (1 + contrast * shapes::random_between(random, -1, 1)));
-    return image;
-}
 
 // Slow on the left, fast on the right, and half of it dark.
 Image waves(int width, int height, double mean, double contrast) {

@@ -307,10 +307,9 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
         if (!maps) return maps.error();
         made.rpg99 = std::move(*maps);
     } else {
-        perception::JudgeOptions judging{.display = display};
-        judging.csf_table = observer.csf;
-        judging.gain = observer.csf ? 1 : observer.person.gain;
-        if (observer.gaze) judging.gaze_px = observer.gaze->px / static_cast<double>(options.map_block);
+        perception::JudgeOptions judging = judge_options(observer);
+        judging.display = display;
+        if (judging.gaze_px) *judging.gaze_px /= static_cast<double>(options.map_block);
         // Whatever a picture holds: all that the display shows.
         const auto tables = perception::judge_tables(
             combination.width(), combination.height(), static_cast<float>(perception::black_level(display).value()),
