@@ -65,7 +65,6 @@ struct Decision {
     const perception::MaskingPicture* masking = nullptr; // of what the scene masks of the object; null: nothing is
 };
 
-WorldSphere world_sphere(const Object& object);
 // Around all that fold tests look at: vertices, proxies, rings. Larger than that of the triangles.
 WorldSphere sphere_of_all(const Object& object, ObjectCache& cache);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);

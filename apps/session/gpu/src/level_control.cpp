@@ -49,18 +49,7 @@ Error no_picture() {
     return {ErrorCode::invalid_argument, "There is no picture: the last frame could not be drawn. Draw one first."};
 }
 
-struct Sphere {
-    glm::dvec3 centre = glm::dvec3(0);
-    double radius = 0;
-};
-
-Sphere sphere_of(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
-    const vdtree::Sphere sphere = tree.bounding_sphere();
-    return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)),
-            placement.scale * static_cast<double>(sphere.radius)};
-}
-
-bool is_in_sight(const Sphere& sphere, const vdtree::View& view) {
+bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
     const vdtree::CameraFrame frame = vdtree::camera_frame(view);
     const glm::dvec3 to = sphere.centre - view.eye;
     const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360),
@@ -97,7 +86,7 @@ bool is_in_casting_light(const render::Item& item) {
 }
 
 // Whether a shadow of what is in the one sphere may fall on what is in the other.
-bool may_shade(const Caster& light, const Sphere& from, const Sphere& to) {
+bool may_shade(const Caster& light, const WorldSphere& from, const WorldSphere& to) {
     const double both = from.radius + to.radius;
     if (light.is_far) {
         const glm::dvec3 off = from.centre - to.centre;
@@ -113,7 +102,7 @@ bool may_shade(const Caster& light, const Sphere& from, const Sphere& to) {
 }
 
 // Of the sphere's outline, within the field that a flat window has at its middle.
-double pixels_of(const Sphere& sphere, const vdtree::View& view) {
+double pixels_of(const WorldSphere& sphere, const vdtree::View& view) {
     const double distance = std::max(glm::length(sphere.centre - view.eye), sphere.radius);
     const double focal = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
     const double radius = focal * sphere.radius / distance;
@@ -136,7 +125,7 @@ struct LevelControl::Impl {
     struct Thing {
         Levels* levels = nullptr;
         vdtree::Similarity placement;
-        Sphere sphere;
+        WorldSphere sphere;
         int level = 0, drawn_level = -1;
         int fading_from = -1, fade_left = 0;        // level, frames
         bool is_fading = false;                     // in the last frame
@@ -193,7 +182,7 @@ struct LevelControl::Impl {
     std::map<const vdtree::VertexTree::Data*, Levels> trees;
     std::vector<Thing> things;
     std::vector<render::GpuCut> backdrop;
-    std::vector<Sphere> backdrop_spheres;
+    std::vector<WorldSphere> backdrop_spheres;
     std::optional<render::Ball> reach; // of shadows: around all that there is
     // Of the picture; and, one after the other, those that mask a layer and those that what is tested casts. Made when
     // they are first drawn.
@@ -244,7 +233,7 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
         Thing& thing = things.emplace_back();
         thing.levels = &levels->second;
         thing.placement = scene.objects[i].placement;
-        thing.sphere = sphere_of(tree, thing.placement);
+        thing.sphere = world_sphere(scene.objects[i]);
         thing.level = levels->second.chain.size() - 1;
     }
     std::map<const vdtree::VertexTree::Data*, render::GpuCut> whole;
@@ -260,7 +249,7 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
             known = whole.emplace(&part.tree.data(), cut).first;
         }
         backdrop.push_back(known->second);
-        backdrop_spheres.push_back(sphere_of(part.tree, part.placement));
+        backdrop_spheres.push_back(world_sphere(part));
     }
     return {};
 }

@@ -100,11 +100,7 @@ float share_raised(const perception::Elevations& a, const perception::Elevations
 
 Result<render::LayerSplit> split_objects(const Session& session, const vdtree::View& view, int layers) {
     std::vector<glm::dvec3> centres;
-    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) {
-        const vdtree::VertexTree& tree = session.tree(i);
-        centres.push_back(
-            session.scene().objects[i].placement.to_world(tree.origin() + glm::dvec3(tree.bounding_sphere().centre)));
-    }
+    for (const Object& object : session.scene().objects) centres.push_back(world_sphere(object).centre);
     return render::split_into_layers(centres, view, layers);
 }
 

@@ -40,6 +40,7 @@ struct WorldSphere {
     glm::dvec3 centre = glm::dvec3(0);
     double radius = 0;
 };
+WorldSphere world_sphere(const Object& object); // around its triangles
 
 // What Session makes the cut of one object by, for programs that make cuts themselves.
 struct CutRecipe {
