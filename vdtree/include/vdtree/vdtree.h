@@ -37,6 +37,7 @@
 #include <vdtree/geomorph.h>
 #include <vdtree/lighting.h>
 #include <vdtree/occluders.h>
+#include <vdtree/occlusion_map.h>
 #include <vdtree/view.h>
 
 // Errors and callbacks.

@@ -56,8 +56,14 @@ public:
 
     // Slots hold until the next insert(). Nothing has one before the first reserve().
     Slot slot_of(NodeId node) const noexcept { return slots_of_nodes_[node]; }
+    template <class F> // f(slot)
+    void for_each_slot(F&& f) const {
+        for (Slot slot = 0; slot < candidates_.size(); ++slot)
+            if (used_[slot / block_slots] >> (slot % block_slots) & 1) f(slot);
+    }
     const FoldCandidate& operator[](Slot slot) const noexcept { return candidates_[slot]; }
     std::span<const FoldCandidate> candidates() const noexcept { return candidates_; }
+    void set_rows(Slot slot, FoldClass rows) noexcept { candidates_[slot].rows = rows; }
     void set_unfolded(Slot slot, bool is_unfolded) noexcept { candidates_[slot].is_unfolded = is_unfolded; }
     void set_waiting(Slot slot, bool is_waiting) noexcept { candidates_[slot].is_waiting = is_waiting; }
 
