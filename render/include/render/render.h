@@ -14,6 +14,7 @@
 
 #include <render/context.h>
 #include <render/depth.h>
+#include <render/depth_cells.h>
 #include <render/difference_count.h>
 #include <render/draw.h>
 #include <render/elevation.h>
