@@ -138,9 +138,13 @@ void print_details(const session::Report& s, double draw_ms) {
     print_table(rows);
     print_line("effects");
     print(s.effects);
-    if (s.passes.empty()) return;
+    print(s.passes);
+}
+
+void print(std::span<const session::PassEffect> effects) {
+    if (effects.empty()) return;
     print_line("pictures drawn for it");
-    for (const session::PassEffect& e : s.passes)
+    for (const session::PassEffect& e : effects)
         print_line("  " + e.name + (e.on ? ": on, " : ": off, ") + e.why +
                    (e.surface_passes == 0
                         ? std::string()

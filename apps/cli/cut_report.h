@@ -35,5 +35,6 @@ void print_scene(const session::Session& session);
 Json to_json(std::span<const session::Effect> effects);
 Json to_json(std::span<const session::PassEffect> effects);
 void print(std::span<const session::Effect> effects);
+void print(std::span<const session::PassEffect> effects);
 
 } // namespace unseen::app

@@ -71,8 +71,9 @@ struct TriangleCount {
 };
 
 // WHAT.
-// How it is known what of a picture cannot be seen: by spheres inside solids, or by what the picture shows, too.
-enum class Visibility { spheres, picture };
+// How it is known what of a picture cannot be seen: by spheres inside solids, or by what the picture shows, too; or, of
+// flights, by that where frames take less time.
+enum class Visibility { spheres, picture, where_it_saves_time };
 
 struct WhatOptions {
     session::Request request; // of budgets, without the number of triangles

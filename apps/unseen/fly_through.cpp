@@ -10,6 +10,7 @@
 #include <panel_plot.h>
 #include <perception/image.h>
 #include <session/follower.h>
+#include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
 #include <vdtree/internal/atomic_file.h>
 
@@ -32,6 +33,11 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
 
+bool draws_frames(const FlyThroughOptions& options) {
+    return options.draws.value_or(!options.pictures.empty() || options.judges_changes ||
+                                  options.what.visibility == Visibility::where_it_saves_time);
+}
+
 // What one frame came to. Times in milliseconds of the wall clock.
 struct FrameRecord {
     vdtree::AdjustStats stats;
@@ -46,16 +52,26 @@ struct FrameRecord {
 
 // The parts that draw, where anything is drawn.
 struct Drawing {
-    std::unique_ptr<render::Context> context; // whose place does not change: the renderer refers to it
+    std::unique_ptr<render::Context> context; // whose place does not change: the others refer to it
     session::SceneRenderer renderer;
+    std::optional<session::MovingOcclusion> occlusion;
 };
 
-Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context) {
+Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context,
+                                            Visibility visibility) {
     if (!context) return std::optional<Drawing>();
     auto kept = std::make_unique<render::Context>(std::move(*context));
     auto renderer = session::SceneRenderer::create(*kept, session);
     if (!renderer) return renderer.error();
-    return std::optional<Drawing>(Drawing{std::move(kept), std::move(*renderer)});
+    std::optional<Drawing> drawing(Drawing{std::move(kept), std::move(*renderer), {}});
+    if (visibility == Visibility::spheres) return drawing;
+    session::MovingOcclusionOptions options;
+    if (visibility == Visibility::where_it_saves_time)
+        options.use = session::MovingOcclusionOptions::Use::where_it_saves_time;
+    auto occlusion = session::MovingOcclusion::create(*drawing->context, session, options);
+    if (!occlusion) return occlusion.error();
+    drawing->occlusion = std::move(*occlusion);
+    return drawing;
 }
 
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
@@ -190,6 +206,7 @@ Json to_json(const session::Session& session, const std::vector<FrameRecord>& fr
                                 {"frame", seen->frame}};
     json["imperceptible_from_m"] = number_or_null(last.imperceptible_from_m);
     json["effects"] = app::to_json(last.effects);
+    if (!last.passes.empty()) json["passes"] = app::to_json(last.passes);
     return json;
 }
 
@@ -225,6 +242,7 @@ void print_details(const std::vector<FrameRecord>& frames, const session::Report
     print_table(rows);
     print_line("effects of the last frame");
     app::print(last.effects);
+    app::print(last.passes);
 }
 
 class FlyThrough {
@@ -241,7 +259,7 @@ public:
             if (!made) return made.error();
             changes_.emplace(std::move(*made));
         }
-        auto drawing = make_drawing(session_, std::move(context));
+        auto drawing = make_drawing(session_, std::move(context), options_.what.visibility);
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
@@ -298,6 +316,11 @@ private:
             if (auto drawn = changes_->before(follower_, request_, view_, *draw); !drawn) return drawn.error();
         }
         const auto start = Clock::now();
+        if (drawing && drawing->occlusion) {
+            auto hidden = drawing->occlusion->begin_frame(view_);
+            if (!hidden) return hidden.error();
+            request_.hidden = std::move(*hidden);
+        }
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
         if (!request_.reasons) simplified->effects = std::move(last_.effects);
@@ -311,16 +334,22 @@ private:
             record.gliding = static_cast<double>(last_.gliding);
         }
         Result<render::Frame> frame = render::Frame{};
+        const auto frame_ms = [&] { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); };
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
-            frame =
-                drawing->renderer.draw(session::drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
-            if (!frame) return frame;
-            record.draw_ms = frame->draw_ms;
-            record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
+            const auto cuts = session::drawn_cuts(follower_, session_.scene().objects.size());
+            if (draws_frames(options_)) {
+                frame = drawing->renderer.draw(cuts, view_, *draw);
+                if (!frame) return frame;
+                record.draw_ms = frame->draw_ms;
+                record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
+            }
+            if (drawing->occlusion)
+                if (auto seen = occlude(*drawing, cuts, *draw, frame_ms()); !seen) return seen.error();
+            if (drawing->occlusion) last_.passes = {drawing->occlusion->effect()};
         }
-        record.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        record.frame_ms = frame_ms();
         if (changes_) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
@@ -333,6 +362,15 @@ private:
         }
         records_.push_back(record);
         return frame;
+    }
+
+    Result<void> occlude(Drawing& drawing, std::span<const session::DrawnCut> cuts, const render::DrawOptions& draw,
+                         double frame_ms) {
+        const auto depth = draws_frames(options_) ? drawing.renderer.drawn_depth() : std::nullopt;
+        if (depth) return drawing.occlusion->end_frame(*depth, view_, frame_ms);
+        const auto items = drawing.renderer.items(cuts, view_, draw);
+        if (!items) return items.error();
+        return drawing.occlusion->end_frame(*items, view_, frame_ms);
     }
 
     session::Session& session_;
@@ -372,7 +410,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         csv = std::move(*file);
     }
     std::optional<render::Context> context;
-    if (options.draws.value_or(!options.pictures.empty() || options.judges_changes)) {
+    if (draws_frames(options) || options.what.visibility != Visibility::spheres) {
         auto made = render::Context::headless();
         if (!made) return made.error();
         context = std::move(*made);

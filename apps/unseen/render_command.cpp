@@ -196,7 +196,7 @@ void check_levels(const RenderArguments& a) {
             "--threshold, --geomorph, --changes, --csv and --plot are of cuts, and exclude --method; --json says all.");
     if (o.gaze.source != GazeSource::none)
         refuse("--gaze-trace and --gaze-mode are of cuts, and exclude --method: give --gaze.");
-    if (a.what.visibility == Visibility::picture) refuse("--visibility picture is of cuts, and excludes --method.");
+    if (a.what.visibility != Visibility::spheres) refuse("--visibility is of cuts, and excludes --method.");
     if (a.draw.wireframe || a.draw.shading != render::Shading::smooth)
         refuse("--wireframe and --shading flat exclude --method.");
     if (a.out.empty() && a.json.empty()) refuse("--method needs -o or --json.");
@@ -225,6 +225,8 @@ void check(const RenderArguments& a) {
             "--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
+        if (a.what.visibility == Visibility::where_it_saves_time)
+            refuse("--visibility auto is of flights: give --path, or --visibility picture.");
         if (a.show.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
         if (a.show.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full)
             refuse("--show cost and --full exclude each other: nothing is folded.");
@@ -237,8 +239,10 @@ void check(const RenderArguments& a) {
         return;
     }
     if (a.show.map) refuse("--show is for single pictures, and excludes --path.");
-    if (a.what.visibility == Visibility::picture)
-        refuse("--visibility picture is for single pictures, and excludes --path.");
+    if (a.what.visibility != Visibility::spheres && o.judges_changes)
+        refuse("--changes are judged without --visibility picture or auto.");
+    if (a.what.visibility == Visibility::where_it_saves_time && o.draws && !*o.draws)
+        refuse("--visibility auto goes by how long frames take, and excludes --no-draw.");
     if (a.what.masks) refuse("--masking scene is for single pictures, and excludes --path.");
     if (o.judges_changes && o.draws && !*o.draws) refuse("--no-draw and --changes exclude each other.");
     if (o.judges_changes && a.draw.wireframe) refuse("--changes are those of the model: leave --wireframe away.");
@@ -379,6 +383,7 @@ Command render_command(CLI::App& app) {
         "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
         "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
         "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
+        "  unseen render museum.glb --path walk:1.5:120 --visibility picture --csv walk.csv --json -\n"
         "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60\n"
         "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv\n"
         "  unseen render museum.glb --method perceptual --maps rpg99 -o levels.png --show levels\n"

@@ -1,17 +1,21 @@
 // What a square cell of a depth picture holds, for one sample a pixel: a cell a fragment. Reversed depth is near /
 // distance.
 layout(binding = 0) uniform sampler2D depths;
-layout(location = 0) uniform ivec2 size; // of the picture
-layout(location = 1) uniform vec4 cell;  // pixels a side, the near plane's reciprocal
+layout(location = 0) uniform vec4 drawn; // the part that was drawn to, the last column and row excluded
+layout(location = 1) uniform vec4 cell;  // pixels a side, the near plane's reciprocal, the picture's size
 
 // Negatives, so that one blending keeps the extremes of all samples: the least.
 layout(location = 0) out vec4 least; // least, -most, -largest difference between neighbours
 
-float at(int x, int y) { return texelFetch(depths, clamp(ivec2(x, y), ivec2(0), size - 1), 0).x; }
+float at(int x, int y) {
+    ivec2 place = clamp(ivec2(x, y), ivec2(0), ivec2(cell.zw) - 1);
+    bool is_drawn = all(greaterThanEqual(place, ivec2(drawn.xy))) && all(lessThan(place, ivec2(drawn.zw)));
+    return is_drawn ? texelFetch(depths, place, 0).x : 0.0;
+}
 
 void main() {
     int side = int(cell.x);
-    ivec2 first = ivec2(gl_FragCoord.xy) * side, last = min(first + side, size) - 1;
+    ivec2 first = ivec2(gl_FragCoord.xy) * side, last = min(first + side, ivec2(cell.zw)) - 1;
     float smallest = at(first.x, first.y), largest = smallest, jump = 0.0;
     // Each pixel with the ones before and above it, and those after and below the cell with its last ones.
     for (int y = first.y; y <= last.y + 1; ++y) {

@@ -18,7 +18,7 @@ namespace unseen::render {
 namespace {
 
 constexpr int largest_cell_px = 64;
-constexpr int size_location = 0, cell_location = 1;
+constexpr int box_location = 0, cell_location = 1;
 constexpr GLuint64 wait_ns = 1'000'000'000; // a turn of waiting for the GPU; it repeats
 constexpr std::size_t values_a_cell = 4;
 
@@ -30,23 +30,25 @@ using Fence = std::unique_ptr<std::remove_pointer_t<GLsync>, DeleteSync>;
 } // namespace
 
 struct DepthCellReader::Impl {
-    Impl(const Context& context_, Target depth_, Target cells_, int cell_px_)
-        : context(context_), depth(std::move(depth_)), cells(std::move(cells_)), cell_px(cell_px_) {}
+    Impl(const Context& context_, int width_, int height_, Target cells_, int cell_px_)
+        : context(context_), width(width_), height(height_), cells(std::move(cells_)), cell_px(cell_px_) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
     ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
 
     Result<void> prepare();
     void clear();
-    void reduce(double near_plane);
+    void reduce(const DrawnDepth& depth);
     void read();
     Result<std::optional<vdtree::DepthCells>> take(bool waits);
     GLsizeiptr bytes() const {
         return static_cast<GLsizeiptr>(sizeof(float) * values_a_cell) * cells.width() * cells.height();
     }
 
-    Context context; // first, and so gone last
-    Target depth, cells;
+    Context context;             // first, and so gone last
+    int width, height;           // pixels
+    std::optional<Target> depth; // made for the first picture that is drawn here
+    Target cells;
     int cell_px;
     const Program* program = nullptr;
     VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
@@ -73,16 +75,16 @@ void DepthCellReader::Impl::clear() {
     glClearNamedFramebufferfv(cells.id(), GL_COLOR, 0, &nothing.x);
 }
 
-void DepthCellReader::Impl::reduce(double near_plane) {
+void DepthCellReader::Impl::reduce(const DrawnDepth& drawn) {
     set_fixed_state(cells.impl());
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_CULL_FACE);
     glEnable(GL_BLEND);
     glBlendEquation(GL_MIN);
     cells.impl().bind(0);
-    glBindTextureUnit(0, depth.depth_texture());
-    program->set(size_location, glm::ivec2(depth.width(), depth.height()));
-    program->set(cell_location, glm::vec4(static_cast<float>(cell_px), static_cast<float>(1 / near_plane), 0, 0));
+    glBindTextureUnit(0, drawn.texture);
+    program->set(box_location, glm::vec4(drawn.left, drawn.top, drawn.right, drawn.bottom));
+    program->set(cell_location, glm::vec4(cell_px, 1 / drawn.near_plane, drawn.width, drawn.height));
     program->use();
     glBindVertexArray(no_arrays.id());
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -131,12 +133,11 @@ Result<DepthCellReader> DepthCellReader::create(const Context& context, int widt
     if (cell_px < 1 || cell_px > largest_cell_px)
         return invalid_argument("Depth cells are of 1 to " + std::to_string(largest_cell_px) + " pixels a side, not " +
                                 std::to_string(cell_px) + ".");
-    auto depth = Target::create(context, width, height, {.colours = {}, .label = "depth for cells"});
-    if (!depth) return depth.error();
+    if (width < 1 || height < 1) return invalid_argument("Depth cells need a window of a pixel or more.");
     auto cells = Target::create(context, (width + cell_px - 1) / cell_px, (height + cell_px - 1) / cell_px,
                                 {.depth = false, .label = "depth cells"});
     if (!cells) return cells.error();
-    auto impl = std::make_unique<Impl>(context, std::move(*depth), std::move(*cells), cell_px);
+    auto impl = std::make_unique<Impl>(context, width, height, std::move(*cells), cell_px);
     if (auto made = in_context(context, "Making depth cells", [&] { return impl->prepare(); }); !made)
         return made.error();
     return DepthCellReader(std::move(impl));
@@ -151,30 +152,44 @@ Result<void> DepthCellReader::begin(std::span<const Item> items, const vdtree::V
                                     std::uint32_t seed) {
     Impl& impl = *impl_;
     if (const auto valid = check_samples(samples); !valid) return valid;
-    if (view.width != impl.depth.width() || view.height != impl.depth.height())
+    if (view.width != impl.width || view.height != impl.height)
         return invalid_argument("The depth cells are of another window than the view.");
     const auto nearest = near_plane(items, view);
     if (!nearest) return nearest.error();
     impl.under_way.reset();
-    if (auto cleared = in_context(impl.context, "Clearing depth cells",
-                                  [&]() -> Result<void> {
-                                      impl.clear();
-                                      return {};
-                                  });
-        !cleared)
-        return cleared;
+    if (!impl.depth) {
+        auto made = Target::create(impl.context, impl.width, impl.height, {.colours = {}, .label = "depth for cells"});
+        if (!made) return made.error();
+        impl.depth = std::move(*made);
+    }
+    const DrawnDepth drawn{
+        impl.depth->depth_texture(), impl.width, impl.height, 0, 0, impl.width, impl.height, *nearest};
+    bool is_first = true;
     for (const glm::dvec2 point : n_rooks(samples, seed)) {
-        if (auto drawn = draw(items, {view, point, *nearest}, impl.depth, {.colour = std::nullopt}); !drawn)
-            return drawn;
-        if (auto reduced = in_context(impl.context, "Reducing depth to cells",
-                                      [&]() -> Result<void> {
-                                          impl.reduce(*nearest);
-                                          return {};
-                                      });
-            !reduced)
-            return reduced;
+        if (auto done = draw(items, {view, point, *nearest}, *impl.depth, {.colour = std::nullopt}); !done) return done;
+        auto reduced = in_context(impl.context, "Reducing depth to cells", [&]() -> Result<void> {
+            if (is_first) impl.clear();
+            impl.reduce(drawn);
+            return {};
+        });
+        if (!reduced) return reduced;
+        is_first = false;
     }
     return in_context(impl.context, "Reading depth cells", [&]() -> Result<void> {
+        impl.read();
+        return {};
+    });
+}
+
+Result<void> DepthCellReader::begin(const DrawnDepth& depth) {
+    Impl& impl = *impl_;
+    if (depth.width != impl.width || depth.height != impl.height)
+        return invalid_argument("The depth cells are of another window than the depth that was drawn.");
+    if (depth.texture == 0 || !(depth.near_plane > 0)) return invalid_argument("No depth was drawn.");
+    impl.under_way.reset();
+    return in_context(impl.context, "Reducing depth to cells", [&]() -> Result<void> {
+        impl.clear();
+        impl.reduce(depth);
         impl.read();
         return {};
     });
@@ -196,9 +211,9 @@ Result<std::optional<vdtree::DepthCells>> DepthCellReader::take(bool waits) {
 
 std::uint64_t DepthCellReader::byte_size() const noexcept {
     constexpr std::uint64_t depth_bytes = 4;
-    return depth_bytes * static_cast<std::uint64_t>(impl_->depth.width()) *
-               static_cast<std::uint64_t>(impl_->depth.height()) +
-           2 * static_cast<std::uint64_t>(impl_->bytes());
+    const std::uint64_t pixels =
+        impl_->depth ? static_cast<std::uint64_t>(impl_->width) * static_cast<std::uint64_t>(impl_->height) : 0;
+    return depth_bytes * pixels + 2 * static_cast<std::uint64_t>(impl_->bytes());
 }
 
 } // namespace unseen::render

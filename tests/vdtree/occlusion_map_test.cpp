@@ -122,7 +122,11 @@ TEST(OcclusionMap, HidesFromAllEyesWithinReach) {
         const auto plates = random_plates(random);
         Depths depths(view, plates);
         const double reach = trial % 3 == 0 ? 0.02 : trial % 3 == 1 ? 0.1 : 0.3;
-        const auto map = OcclusionMap::create(view, depths.cells(view, 4), reach);
+        // Standing, walking ahead, and aside.
+        const glm::dvec3 along = trial / 3 % 3 == 0   ? glm::dvec3(0)
+                                 : trial / 3 % 3 == 1 ? glm::dvec3(0.05, 0.02, -0.4)
+                                                      : glm::dvec3(0.2, -0.1, 0.1);
+        const auto map = OcclusionMap::create(view, depths.cells(view, 4), {along, reach});
         ASSERT_TRUE(map) << map.error().message;
         for (int i = 0; i < 400; ++i) {
             const glm::dvec3 centre(random_between(random, -6, 6), random_between(random, -5, 5),
@@ -133,7 +137,8 @@ TEST(OcclusionMap, HidesFromAllEyesWithinReach) {
             bool is_hidden_here = true, is_seen_elsewhere = false;
             for (int k = 0; k < 60; ++k) {
                 const glm::dvec3 place = random_within(random, centre, radius),
-                                 eye = random_within(random, view.eye, reach);
+                                 eye = random_within(random, view.eye + random_between(random, 0, 1) * along, reach);
+                ASSERT_TRUE(map->holds_for(eye));
                 is_hidden_here = is_hidden_here && !is_seen(plates, view.eye, place);
                 is_seen_elsewhere = is_seen_elsewhere || is_seen(plates, eye, place);
             }
@@ -156,18 +161,18 @@ TEST(OcclusionMap, AGapThatOpensIsAHole) {
     const glm::dvec3 behind(-0.2, 0, -5);
     ASSERT_FALSE(is_seen(plates, view.eye, behind));
     ASSERT_TRUE(is_seen(plates, {0.2, 0, 10}, behind));
-    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), 0)->hides(behind, 0.05));
-    EXPECT_FALSE(OcclusionMap::create(view, depths.cells(view, 4), 0.2)->hides(behind, 0.05));
+    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), {.around = 0})->hides(behind, 0.05));
+    EXPECT_FALSE(OcclusionMap::create(view, depths.cells(view, 4), {.around = 0.2})->hides(behind, 0.05));
     // Far from the edge both hide.
-    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), 0.2)->hides({2, 0, -5}, 0.05));
-    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), 0.2)->hides({-3, 0, -5}, 0.05));
+    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), {.around = 0.2})->hides({2, 0, -5}, 0.05));
+    EXPECT_TRUE(OcclusionMap::create(view, depths.cells(view, 4), {.around = 0.2})->hides({-3, 0, -5}, 0.05));
 }
 
 TEST(OcclusionMap, NothingIsHiddenBesideTheWindowOrBehindTheEye) {
     View view = looking_down_z();
     const std::vector<Plate> wall = {{{-100, -100}, {100, 100}, 5}};
     Depths depths(view, wall);
-    const auto map = *OcclusionMap::create(view, depths.cells(view, 4), 0.1);
+    const auto map = *OcclusionMap::create(view, depths.cells(view, 4), {.around = 0.1});
     EXPECT_TRUE(map.hides({0, 0, 0}, 0.5));
     EXPECT_FALSE(map.hides({0, 0, 20}, 0.5));
     EXPECT_FALSE(map.hides({0, 0, 10}, 0.5));
@@ -179,24 +184,30 @@ TEST(OcclusionMap, NothingIsHiddenBesideTheWindowOrBehindTheEye) {
     EXPECT_FALSE(map.hides({0, 0, 0}, std::numeric_limits<double>::infinity()));
     EXPECT_TRUE(map.holds_for(view.eye + glm::dvec3(0.05)));
     EXPECT_FALSE(map.holds_for(view.eye + glm::dvec3(0.1)));
+    EXPECT_FALSE(map.holds_for(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
+    const auto ahead = *OcclusionMap::create(view, depths.cells(view, 4), {{0, 0, -1}, 0.1});
+    EXPECT_TRUE(ahead.holds_for(view.eye - glm::dvec3(0.05, 0, 1)));
+    EXPECT_FALSE(ahead.holds_for(view.eye + glm::dvec3(0, 0, 0.2)));
+    EXPECT_FALSE(ahead.holds_for(view.eye - glm::dvec3(0, 0, 1.2)));
+    EXPECT_FALSE(OcclusionMap::create(view, depths.cells(view, 4), {{0, 0, -8}, 0.1})->hides({0, 0, 0}, 0.5));
 }
 
 TEST(OcclusionMap, BadCellsAreRefused) {
     const View view = looking_down_z();
     const std::vector<Plate> wall = {{{-100, -100}, {100, 100}, 5}};
     const DepthCells good = Depths(view, wall).cells(view, 8);
-    ASSERT_TRUE(OcclusionMap::create(view, good, 0.1));
-    EXPECT_FALSE(OcclusionMap::create(view, good, -1));
-    EXPECT_FALSE(OcclusionMap::create(view, good, std::numeric_limits<double>::quiet_NaN()));
+    ASSERT_TRUE(OcclusionMap::create(view, good, {.around = 0.1}));
+    EXPECT_FALSE(OcclusionMap::create(view, good, {.around = -1}));
+    EXPECT_FALSE(OcclusionMap::create(view, good, {.around = std::numeric_limits<double>::quiet_NaN()}));
     DepthCells few = good;
     few.columns -= 1;
-    EXPECT_FALSE(OcclusionMap::create(view, few, 0.1));
+    EXPECT_FALSE(OcclusionMap::create(view, few, {.around = 0.1}));
     for (std::vector<float> DepthCells::*values : {&DepthCells::least, &DepthCells::most, &DepthCells::jump})
         for (const float bad :
              {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1.0f}) {
             DepthCells cells = good;
             (cells.*values)[5] = bad;
-            const auto made = OcclusionMap::create(view, cells, 0.1);
+            const auto made = OcclusionMap::create(view, cells, {.around = 0.1});
             ASSERT_FALSE(made);
             EXPECT_NE(made.error().message.find("Cell 5 "), std::string::npos) << made.error().message;
         }
@@ -219,7 +230,8 @@ TEST(OcclusionMap, CutsFollowWhatIsHidden) {
         viewpoint.eye = placement.to_mesh(view.eye) - tree.origin();
         if (frame % 5 == 1) {
             Depths depths(view, random_plates(random));
-            const auto found = find_hidden(tree, placement, *OcclusionMap::create(view, depths.cells(view, 4), 0.05));
+            const auto found =
+                find_hidden(tree, placement, *OcclusionMap::create(view, depths.cells(view, 4), {.around = 0.05}));
             ASSERT_TRUE(found);
             viewpoint.hidden = *found;
             times_hidden += *found != nullptr;

@@ -168,8 +168,6 @@ Effect shadow_effect(const Sight& sight, const Decision& decision) {
                   "shadows' edges move invisibly"};
 }
 
-constexpr const char* may_cast = "what is not seen may cast shadows that are";
-
 Effect frustum_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
     if (decision.request.purpose == Purpose::mesh)
@@ -234,6 +232,8 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
         return {name, true,
                 std::string("what lies behind what this view shows is folded, by a picture of its depths") +
                     (casts_shadows(sight) ? ", but for outlines whose shadows would move visibly" : "")};
+    if (decision.hidden)
+        return {name, true, "what lies behind what an earlier picture showed is folded, for eyes near that one's"};
     if (casts_shadows(sight)) return {name, false, may_cast};
     if (!folds_hidden(sight, decision))
         return {name, false,

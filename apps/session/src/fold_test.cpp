@@ -206,6 +206,7 @@ vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
+    viewpoint.hidden = decision.hidden;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
         viewpoint.occluders.assign(spheres.begin(), spheres.end());
@@ -300,7 +301,20 @@ Result<Decision> decide(const Sight& sight, const Request& request, std::size_t 
             "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
             "session::measured().");
     const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
-    return Decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
+    Decision decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
+    if (request.hidden && !why_not_hidden(sight, decision))
+        decision.hidden = request.hidden->of(object, sight.object.tree);
+    return decision;
+}
+
+const char* why_not_hidden(const Sight& sight, const Decision& decision) {
+    const Request& request = decision.request;
+    if (request.purpose == Purpose::mesh) return "the mesh may be looked at from elsewhere";
+    if (!is_perceptual(decision)) return "only the perceptual fold tests know what a fold changes";
+    if (casts_shadows(sight) && request.keeps_shadows) return may_cast;
+    if (sight.lighting && decision.test != FoldTest::error) return "under lights only the fold test error knows it";
+    if (!request.hidden->holds_for(sight.view.eye)) return "the eye has gone beyond the reach of the last picture";
+    return nullptr;
 }
 
 const char* why_unmasked(const Sight& sight) {

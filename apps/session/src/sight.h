@@ -63,6 +63,7 @@ struct Decision {
     std::string_view why;                                // not the default
     bool measures = false;                               // the tree lacks the errors of its folds
     const perception::MaskingPicture* masking = nullptr; // of what the scene masks of the object; null: nothing is
+    std::shared_ptr<const std::vector<std::uint64_t>> hidden = {}; // nodes that earlier pictures tell to be; null: none
 };
 
 // Around all that fold tests look at: vertices, proxies, rings. Larger than that of the triangles.

@@ -11,7 +11,8 @@
 
 namespace unseen::render {
 
-// One picture is under way at a time. Move-only; keeps a handle to the context. Memory: 4 bytes a pixel, and 32 a cell.
+// One picture is under way at a time. Move-only; keeps a handle to the context. Memory: 32 bytes a
+// cell, and 4 a pixel where it draws by itself.
 //
 //     if (!reader->is_under_way()) reader->begin(items, view);
 //     ... // other frames
@@ -27,6 +28,8 @@ public:
     // Draws depth alone, so often, at N-rooks points of each pixel (1 to 256), and begins to read the cells. What was
     // under way is forgotten. Waits for nothing. Fails as draw() does, and on a view of another window.
     Result<void> begin(std::span<const Item> items, const vdtree::View& view, int samples = 4, std::uint32_t seed = 1);
+    // The same of depth that was drawn already: one sample a pixel, and no pass over the surfaces.
+    Result<void> begin(const DrawnDepth& depth);
     bool is_under_way() const noexcept;
 
     // What was begun, once the GPU is through with it; else nothing, or, where `waits`, then. Given once.

@@ -27,15 +27,21 @@ struct DepthCells {
     std::vector<float> jump; // the largest difference between two neighbouring pixels, one of which is the cell's
 };
 
+// Eyes that a map is for: within `around` of the way from its view's eye along a vector. World units.
+struct EyeReach {
+    glm::dvec3 along = glm::dvec3(0); // finite
+    double around = 0;                // 0 or more, and finite
+};
+
 // Copies are cheap and share their data; any number of threads may ask at once.
 class OcclusionMap {
 public:
-    // For eyes within `reach` of the view's, world units, 0 or more. Fails on an invalid view, where cells do not cover
+    // Fails on an invalid view, where cells do not cover
     // the window, and on reciprocals that are NaN, infinite or negative. Cost: some nanoseconds a cell.
-    static Result<OcclusionMap> create(const View& view, DepthCells cells, double reach);
+    static Result<OcclusionMap> create(const View& view, DepthCells cells, const EyeReach& reach);
 
     const View& view() const noexcept;
-    double reach() const noexcept;
+    const EyeReach& reach() const noexcept;
     // Whether what the map says holds for an eye there, whatever it looks at.
     bool holds_for(glm::dvec3 eye) const noexcept;
 

@@ -1,7 +1,8 @@
 // Let E be an eye within reach of the picture's eye O, and X a hidden place. The line from E to X is compared with that
-// from O to X, point by point at the same share of the way: points there differ by no more than the reach. So their images
-// as O has them differ by no more than the reach under the distance of the nearer, in which the least distance of the
-// surface around counts. Up to that distance the line is in front of the surface, and X is behind it.
+// from O to X, point by point at the same share of the way: points there differ by a part of what E and O differ by, w. So
+// the image of the one, as O has it, is X's own image but for f (w_x - t w_z) / z, where t is the tangent of X's direction
+// and z the distance along the axis. Up to the least distance of the surface around the line is in front of the surface, and
+// X is behind it.
 #include <vdtree/occlusion_map.h>
 
 #include <algorithm>
@@ -31,7 +32,10 @@ constexpr int most_turns = 4;
 
 struct OcclusionMap::Grids {
     View view;
-    double reach = 0;
+    EyeReach reach;
+    glm::dvec3 along;   // the reach's, right, down and ahead
+    double around = 0;  // the reach's, as images have it where they are stretched most
+    double deepest = 0; // how far ahead an eye may be
     CameraFrame camera;
     double focal_px = 1;
     glm::dvec2 half_tangent; // of the window's sides
@@ -49,11 +53,19 @@ struct OcclusionMap::Grids {
         float least, most;
     };
     Range range_in(const Box& box) const noexcept;
+    // By how much what is at reciprocal distances up to this may move, in the box.
+    Box widened(const Box& box, double reciprocal) const noexcept;
+    // By how many pixels neighbours move apart for each unit that their reciprocals differ by.
+    double opening(glm::dvec2 px) const noexcept;
+
+    glm::dvec2 tangent(double x, double y) const noexcept {
+        return (glm::dvec2(x, y) - 0.5 * glm::dvec2(view.width, view.height)) / focal_px;
+    }
 };
 
-Result<OcclusionMap> OcclusionMap::create(const View& view, DepthCells cells, double reach) {
+Result<OcclusionMap> OcclusionMap::create(const View& view, DepthCells cells, const EyeReach& reach) {
     if (const auto valid = validate(view); !valid) return valid.error();
-    if (!(reach >= 0 && std::isfinite(reach)))
+    if (!(reach.around >= 0 && std::isfinite(reach.around) && std::isfinite(glm::length(reach.along))))
         return invalid_argument("The reach of an occlusion map must be 0 or more, and finite.");
     if (cells.cell_px < 1 || cells.columns != (view.width + cells.cell_px - 1) / cells.cell_px ||
         cells.rows != (view.height + cells.cell_px - 1) / cells.cell_px)
@@ -69,12 +81,21 @@ Result<OcclusionMap> OcclusionMap::create(const View& view, DepthCells cells, do
     all->focal_px = view.height / (2 * half);
     all->half_tangent = {half * view.width / view.height, half};
     all->cell_px = cells.cell_px;
-    const double opens = all->focal_px * reach * std::sqrt(1 + glm::dot(all->half_tangent, all->half_tangent));
+    all->along = {glm::dot(reach.along, all->camera.right), -glm::dot(reach.along, all->camera.up),
+                  -glm::dot(reach.along, all->camera.back)};
+    all->around = reach.around * std::sqrt(1 + glm::dot(all->half_tangent, all->half_tangent));
+    all->deepest = std::max(all->along.z, 0.0) + reach.around;
     for (std::size_t i = 0; i < count; ++i) {
         const auto is_fine = [](float x) { return x >= 0 && std::isfinite(x); };
         if (!is_fine(cells.least[i]) || !is_fine(cells.most[i]) || !is_fine(cells.jump[i]))
             return invalid_argument("Cell " + std::to_string(i) +
                                     " of an occlusion map: reciprocals must be 0 or more, and finite.");
+        const auto column = static_cast<double>(i % static_cast<std::size_t>(cells.columns)),
+                   row = static_cast<double>(i / static_cast<std::size_t>(cells.columns));
+        double opens = 0; // linear along each side, so largest at a corner
+        for (const double x : {column, column + 1})
+            for (const double y : {row, row + 1})
+                opens = std::max(opens, all->opening(static_cast<double>(cells.cell_px) * glm::dvec2(x, y)));
         if (!(opens * static_cast<double>(cells.jump[i]) <= narrowest_gap_px)) cells.least[i] = 0;
     }
     all->levels.push_back({cells.columns, cells.rows, std::move(cells.least), std::move(cells.most)});
@@ -104,9 +125,29 @@ Result<OcclusionMap> OcclusionMap::create(const View& view, DepthCells cells, do
 }
 
 const View& OcclusionMap::view() const noexcept { return grids_->view; }
-double OcclusionMap::reach() const noexcept { return grids_->reach; }
+const EyeReach& OcclusionMap::reach() const noexcept { return grids_->reach; }
 
-bool OcclusionMap::holds_for(glm::dvec3 eye) const noexcept { return glm::length(eye - view().eye) <= grids_->reach; }
+bool OcclusionMap::holds_for(glm::dvec3 eye) const noexcept {
+    const glm::dvec3 way = eye - view().eye, along = reach().along;
+    const double square = glm::dot(along, along);
+    const double share = square > 0 ? std::clamp(glm::dot(way, along) / square, 0.0, 1.0) : 0;
+    return glm::length(way - share * along) <= reach().around;
+}
+
+double OcclusionMap::Grids::opening(glm::dvec2 px) const noexcept {
+    const glm::dvec2 t = tangent(px.x, px.y);
+    return focal_px * (glm::length(glm::dvec2(along) - t * along.z) + around);
+}
+
+OcclusionMap::Grids::Box OcclusionMap::Grids::widened(const Box& box, double reciprocal) const noexcept {
+    const glm::dvec2 first = tangent(box.left, box.top), last = tangent(box.right, box.bottom);
+    const glm::dvec2 a = glm::dvec2(along) - first * along.z, b = glm::dvec2(along) - last * along.z;
+    const double scale = focal_px * reciprocal;
+    return {box.left + scale * (std::min({0.0, a.x, b.x}) - around) - margin_px,
+            box.top + scale * (std::min({0.0, a.y, b.y}) - around) - margin_px,
+            box.right + scale * (std::max({0.0, a.x, b.x}) + around) + margin_px,
+            box.bottom + scale * (std::max({0.0, a.y, b.y}) + around) + margin_px};
+}
 
 OcclusionMap::Grids::Range OcclusionMap::Grids::range_in(const Box& box) const noexcept {
     const auto cell = [&](double px, int cells) {
@@ -140,8 +181,8 @@ OcclusionMap::Answer OcclusionMap::look_at(glm::dvec3 centre, double radius) con
     const Grids& all = *grids_;
     const glm::dvec3 from_eye = centre - all.view.eye;
     const double along = -glm::dot(from_eye, all.camera.back), nearest = along - radius;
-    // Around the eye, or behind it, or of no size that is a number.
-    if (!(nearest > all.reach)) return nearest + 2 * radius > 0 ? Answer::partly : Answer::seen;
+    // Around the eyes, or behind them, or of no size that is a number.
+    if (!(nearest > all.deepest)) return nearest + 2 * radius > 0 ? Answer::partly : Answer::seen;
     const double x = glm::dot(from_eye, all.camera.right), y = glm::dot(from_eye, all.camera.up);
     const glm::dvec2 middle(0.5 * all.view.width, 0.5 * all.view.height);
     // All of the ball lies in its box, whose image is that of the corners at its near or at its far side.
@@ -150,10 +191,9 @@ OcclusionMap::Answer OcclusionMap::look_at(glm::dvec3 centre, double radius) con
     const auto most = [&](double a) { return a >= 0 ? a / nearest : a / farthest; };
     const Grids::Box ball{middle.x + f * least(x - radius), middle.y - f * most(y + radius),
                           middle.x + f * most(x + radius), middle.y - f * least(y - radius)};
-    const double per_reciprocal = f * all.reach * std::sqrt(1 + glm::dot(all.half_tangent, all.half_tangent));
-    double moves = margin_px;
+    double counted = 0; // the largest reciprocal that the box is widened for
     for (int turn = 0; turn < most_turns; ++turn) {
-        const Grids::Box around{ball.left - moves, ball.top - moves, ball.right + moves, ball.bottom + moves};
+        const Grids::Box around = all.widened(ball, counted);
         if (!(around.left >= 0 && around.top >= 0 && around.right <= all.view.width &&
               around.bottom <= all.view.height)) {
             const bool is_beside =
@@ -161,17 +201,16 @@ OcclusionMap::Answer OcclusionMap::look_at(glm::dvec3 centre, double radius) con
             return is_beside ? Answer::seen : Answer::partly;
         }
         const auto [far, near] = all.range_in(around);
-        // The surface is behind the eyes' ball, and the place behind the surface.
+        // The surface is ahead of the eyes, and the place behind the surface.
         const bool is_covered = static_cast<double>(far) * (nearest * (1 - depth_rounding)) > 1 &&
-                                static_cast<double>(near) * all.reach < 1;
+                                static_cast<double>(near) * all.deepest < 1;
         if (!is_covered) {
             // Nothing there is nearer than even the far side, or what is under it is no larger than a cell.
             const bool is_small = ball.right - ball.left < all.cell_px && ball.bottom - ball.top < all.cell_px;
             return is_small || !(static_cast<double>(near) * farthest > 1) ? Answer::seen : Answer::partly;
         }
-        const double needed = margin_px + per_reciprocal * static_cast<double>(near);
-        if (needed <= moves) return Answer::hidden;
-        moves = needed;
+        if (static_cast<double>(near) <= counted) return Answer::hidden;
+        counted = static_cast<double>(near);
     }
     return Answer::partly;
 }

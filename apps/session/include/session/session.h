@@ -22,6 +22,7 @@
 #include <perception/cut_rings.h>
 #include <session/follower.h>
 #include <session/gaze_player.h>
+#include <session/hidden_nodes.h>
 #include <session/level_chain.h>
 #include <session/messages.h>
 #include <session/model_file.h>

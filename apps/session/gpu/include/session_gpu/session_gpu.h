@@ -1,11 +1,13 @@
 // session_gpu: where a session meets OpenGL. The header to include first.
 //
 // A SceneRenderer draws all objects of a session with what stands around them. simplify_as_seen() folds what lies behind
-// what a picture shows, and what the scene masks. A GpuJudge is perception::Judge on the GPU. A LevelControl chooses among
+// what a picture shows, and what the scene masks; a MovingOcclusion what earlier frames of a moving view hide. A GpuJudge is perception::Judge on the GPU. A LevelControl chooses among
 // few levels of detail by what the rest of a picture masks.
 #pragma once
 
 #include <session_gpu/as_seen.h>
 #include <session_gpu/gpu_judge.h>
 #include <session_gpu/level_control.h>
+#include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
+#include <session_gpu/trial.h>
