@@ -101,7 +101,8 @@ void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
 // Of verbs for one view. Without `adds_layers` the verb has a --layers of its own.
-void add_visibility_option(CLI::App& verb, WhatOptions& options, bool adds_layers = true);
+void add_visibility_option(CLI::App& verb, WhatOptions& options, bool flies); // flies: of moving views, too
+void add_masking_option(CLI::App& verb, WhatOptions& options, bool adds_layers);
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
 // What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.

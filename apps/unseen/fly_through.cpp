@@ -25,6 +25,7 @@
 #include "report.h"
 #include "session_options.h"
 #include "terminal.h"
+#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -64,11 +65,9 @@ Result<std::optional<Drawing>> make_drawing(const session::Session& session, std
     auto renderer = session::SceneRenderer::create(*kept, session);
     if (!renderer) return renderer.error();
     std::optional<Drawing> drawing(Drawing{std::move(kept), std::move(*renderer), {}});
-    if (visibility == Visibility::spheres) return drawing;
-    session::MovingOcclusionOptions options;
-    if (visibility == Visibility::where_it_saves_time)
-        options.use = session::MovingOcclusionOptions::Use::where_it_saves_time;
-    auto occlusion = session::MovingOcclusion::create(*drawing->context, session, options);
+    const auto options = moving_occlusion(visibility, true);
+    if (!options) return drawing;
+    auto occlusion = session::MovingOcclusion::create(*drawing->context, session, *options);
     if (!occlusion) return occlusion.error();
     drawing->occlusion = std::move(*occlusion);
     return drawing;

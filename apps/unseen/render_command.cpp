@@ -370,7 +370,8 @@ Command render_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what, false);
+    add_visibility_option(*verb, a->what, true);
+    add_masking_option(*verb, a->what, false);
     add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer(
         "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"

@@ -112,7 +112,8 @@ Command simplify_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what);
+    add_visibility_option(*verb, a->what, false);
+    add_masking_option(*verb, a->what, true);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"

@@ -65,6 +65,7 @@ Command view_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
+    add_visibility_option(*verb, a->viewer.what, true);
     add_moving_gaze_options(*verb, a->gaze, true);
     verb->callback([o = a.get()] {
         check_gaze(o->viewer.what, o->gaze);
@@ -72,7 +73,8 @@ Command view_command(CLI::App& app) {
     });
     verb->footer(viewer_help() + "\nExamples:\n  unseen view bunny.vdt\n"
                                  "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
-                                 "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");
+                                 "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25\n"
+                                 "  unseen view museum.glb --visibility auto");
     return {verb, [a] { return run(*a); }};
 }
 

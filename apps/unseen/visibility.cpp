@@ -1,6 +1,7 @@
 #include "visibility.h"
 
 #include <session_gpu/as_seen.h>
+#include <session_gpu/moving_occlusion.h>
 
 namespace unseen::app {
 
@@ -16,6 +17,16 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
     const auto own = render::Context::headless();
     if (!own) return own.error();
     return session::simplify_as_seen(session, *own, view, request, options);
+}
+
+std::optional<session::MovingOcclusionOptions> moving_occlusion(Visibility visibility, bool waits) {
+    if (visibility == Visibility::spheres) return std::nullopt;
+    session::MovingOcclusionOptions options;
+    options.waits = waits;
+    if (!waits) options.frames *= 2; // they come later
+    if (visibility == Visibility::where_it_saves_time)
+        options.use = session::MovingOcclusionOptions::Use::where_it_saves_time;
+    return options;
 }
 
 } // namespace unseen::app

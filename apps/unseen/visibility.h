@@ -1,12 +1,18 @@
 // What pictures hide and mask, for verbs that draw none.
 #pragma once
 
+#include <optional>
+
 #include <session/session.h>
 
 #include "options.h"
 
 namespace unseen::render {
 class Context;
+}
+
+namespace unseen::session {
+struct MovingOcclusionOptions;
 }
 
 namespace unseen::app {
@@ -16,5 +22,8 @@ namespace unseen::app {
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context = nullptr);
+
+// Of moving views; none: nothing goes by pictures. `waits`: cuts do not depend on the machine's speed.
+std::optional<session::MovingOcclusionOptions> moving_occlusion(Visibility visibility, bool waits);
 
 } // namespace unseen::app

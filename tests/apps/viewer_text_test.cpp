@@ -153,6 +153,9 @@ TEST(ViewerText, WhatGoesOnIsSaid) {
     EXPECT_EQ(line_of(state, "limit"), "refining, 2 ms a frame");
     EXPECT_THAT(viewer_title(state), EndsWith(" triangles, refining - Unseen"));
     state.report.stats.is_complete = true;
+    EXPECT_EQ(line_of(state, "occlusion"), "none");
+    state.report.passes = {{"occlusion", true, "it saves time"}};
+    EXPECT_EQ(line_of(state, "occlusion"), "on, it saves time");
     state.report.gliding = 1204;
     EXPECT_EQ(line_of(state, "gliding"), "1,204 vertices");
     EXPECT_THAT(viewer_title(state), EndsWith(" triangles, gliding - Unseen"));
