@@ -13,6 +13,7 @@
 #include <session/session.h>
 #include <session_gpu/as_seen.h>
 #include <session_gpu/level_control.h>
+#include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
@@ -99,6 +100,19 @@ public:
         }
         return cuts;
     }
+
+    // Of a cut alone, one sample a pixel: what a moving view draws.
+    Result<void> draw_frame(const session::Follower& follower, const vdtree::View& view) {
+        render::DrawOptions drawing;
+        drawing.samples = 1;
+        drawing.background = session_->background();
+        const auto cuts = session::drawn_cuts(follower, session_->scene().objects.size());
+        const auto frame = renderer_->draw(cuts, view, drawing);
+        if (!frame) return frame.error();
+        return {};
+    }
+    const session::SceneRenderer& renderer() const { return *renderer_; }
+    const render::Context& context() const { return context_; }
 
     Result<LevelControl> levels(const session::LevelControlOptions& how) const {
         return LevelControl::create(context_, *session_, view_, how);
@@ -282,7 +296,93 @@ Result<Walk> walk(JudgedScene& scene, int frames) {
     return walk;
 }
 
+// ---- the same walk with one cut an object
+
+// At walking speed, and so many frames a second.
+constexpr double walking_m_s = 1.5, frames_a_second = 60;
+constexpr int tree_frames = 40; // enough for a try of what is not always on
+
+struct TreeWalk {
+    double triangles = 0, frame_ms = 0, occlusion_ms = 0; // means, of the frames after the first
+    std::size_t pictures = 0;
+    session::PassEffect effect;
+};
+
+// `use`: none: nothing is hidden by pictures.
+Result<TreeWalk> walk_tree(JudgedScene& scene, int frames, std::optional<session::MovingOcclusionOptions::Use> use) {
+    std::optional<session::MovingOcclusion> occlusion;
+    if (use) {
+        auto made = session::MovingOcclusion::create(scene.context(), scene.session(), {.use = *use});
+        if (!made) return made.error();
+        occlusion = std::move(*made);
+    }
+    session::Follower follower(scene.session());
+    session::Request request{.purpose = session::Purpose::picture};
+    request.reasons = false;
+    vdtree::View view = scene.view();
+    const glm::dvec3 step = walking_m_s / frames_a_second * glm::normalize(view.target - view.eye);
+    TreeWalk walk;
+    for (int i = 0; i <= frames; ++i, view.eye += step, view.target += step) {
+        const auto start = BenchClock::now();
+        if (occlusion) {
+            auto hidden = occlusion->begin_frame(view);
+            if (!hidden) return hidden.error();
+            request.hidden = std::move(*hidden);
+        }
+        const auto report = follower.follow(view, request);
+        if (!report) return report.error();
+        if (const auto drawn = scene.draw_frame(follower, view); !drawn) return drawn.error();
+        if (occlusion) {
+            const auto ended = occlusion->end_frame(*scene.renderer().drawn_depth(), view, 1e3 * seconds_since(start));
+            if (!ended) return ended.error();
+        }
+        if (i == 0) continue;
+        walk.triangles += static_cast<double>(report->stats.triangles) / frames;
+        walk.frame_ms += 1e3 * seconds_since(start) / frames;
+    }
+    if (!occlusion) return walk;
+    walk.pictures = occlusion->facts().pictures;
+    walk.occlusion_ms = occlusion->facts().milliseconds / static_cast<double>(occlusion->facts().frames);
+    walk.effect = occlusion->effect();
+    return walk;
+}
+
+struct TreeWalks {
+    TreeWalk without, with, where_it_saves_time;
+};
+
+Result<TreeWalks> walk_trees(JudgedScene& scene, int frames) {
+    using Use = session::MovingOcclusionOptions::Use;
+    auto without = walk_tree(scene, frames, {});
+    if (!without) return without.error();
+    auto with = walk_tree(scene, frames, Use::always);
+    if (!with) return with.error();
+    auto tried = walk_tree(scene, frames, Use::where_it_saves_time);
+    if (!tried) return tried.error();
+    return TreeWalks{std::move(*without), std::move(*with), std::move(*tried)};
+}
+
 // ---- tables
+
+BenchTable tree_walks_table(const std::vector<std::pair<std::string, TreeWalks>>& walks) {
+    BenchTable table;
+    table.title = "Walking with cuts: what earlier frames hide, and whether that is worth it";
+    table.rows.push_back({"scene", "triangles without", "with", "saved", "ms a frame without", "with", "of it for that",
+                          "pictures", "where it saves time"});
+    for (const auto& [name, w] : walks)
+        table.rows.push_back({name, grouped(static_cast<std::uint64_t>(std::llround(w.without.triangles))),
+                              grouped(static_cast<std::uint64_t>(std::llround(w.with.triangles))),
+                              rounded(100 * (1 - w.with.triangles / w.without.triangles), 2) + "%",
+                              rounded(w.without.frame_ms, 3), rounded(w.with.frame_ms, 3),
+                              rounded(w.with.occlusion_ms, 2), std::to_string(w.with.pictures),
+                              w.where_it_saves_time.effect.on ? "on" : "off"});
+    return table;
+}
+
+Json to_json(const TreeWalk& walk) {
+    return {{"triangles", walk.triangles}, {"frame_ms", walk.frame_ms}, {"occlusion_ms", walk.occlusion_ms},
+            {"pictures", walk.pictures},   {"on", walk.effect.on},      {"why", walk.effect.why}};
+}
 
 BenchTable table_of(const std::string& scene, const std::vector<Row>& rows, std::uint64_t all) {
     BenchTable table;
@@ -414,6 +514,7 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
     if (!context) return context.error();
     ScenesBenchResult result;
     std::vector<std::pair<std::string, Walk>> walks;
+    std::vector<std::pair<std::string, TreeWalks>> tree_walks;
     std::vector<std::pair<std::string, std::vector<session::PassEffect>>> passes;
     for (const std::string& file : files) {
         auto scene = JudgedScene::create(*context, file, options);
@@ -429,8 +530,15 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
         if (!walked) return walked.error();
         result.walks.push_back(to_json(*walked, scene->name()));
         walks.emplace_back(scene->name(), std::move(*walked));
+        auto by_trees = walk_trees(*scene, tree_frames);
+        if (!by_trees) return by_trees.error();
+        result.walks.back()["tree"] = {{"without", to_json(by_trees->without)},
+                                       {"with", to_json(by_trees->with)},
+                                       {"where_it_saves_time", to_json(by_trees->where_it_saves_time)}};
+        tree_walks.emplace_back(scene->name(), std::move(*by_trees));
     }
     result.tables.push_back(passes_table(passes));
+    result.tables.push_back(tree_walks_table(tree_walks));
     result.tables.push_back(renderings_table(walks));
     result.tables.push_back(times_table(walks));
     return result;
