@@ -72,6 +72,7 @@ struct Setting {
     glm::dvec3 eye = {0.6, 1.6, 2.6}, target = {-0.1, 0.35, 0};
     double fov_y_degrees = 30;
     float grey = 0.8f; // of the ball
+    enum class Seen { ball, shadow, nothing } seen = Seen::ball;
 };
 
 vdtree::Lighting lit(std::vector<LightSource> lights, double specular = 0) {
@@ -95,6 +96,20 @@ std::vector<Setting> settings() {
     narrow.inner_cosine = std::cos(0.03);
     narrow.outer_cosine = std::cos(0.04);
     all.push_back({"NearShadow", lit({narrow}), 0.5, {0, 40, 0}, {1.5, 0.4, 0}, {1.05, 0, 0}, 45, 0.001f});
+    // Out of the window: the edge of its shadow is seen, the middle of it alone, and nothing.
+    const auto beside = [&](const char* name, vdtree::Lighting lighting, glm::dvec3 target, Setting::Seen seen) {
+        all.push_back(
+            {name, std::move(lighting), 0.5, {0, 0.6, 0}, target + glm::dvec3(0, 1.5, 0.4), target, 20, 0.8f, seen});
+    };
+    const vdtree::Lighting slanting = lit({sun({1, 1, 0}, 0.7)});
+    const vdtree::Lighting bulb = lit({lamp({1.2, 1.8, 0}, 0.5, 1.5)});
+    beside("EdgeOfUnseen", slanting, {-1.3, 0, 0}, Setting::Seen::shadow);
+    beside("MiddleOfUnseen", slanting, {-0.85, 0, 0}, Setting::Seen::shadow);
+    beside("AwayFromUnseen", slanting, {4, 0, 0}, Setting::Seen::nothing);
+    beside("BulbEdgeOfUnseen", bulb, {-1.45, 0, 0}, Setting::Seen::shadow);
+    beside("BulbAwayFromUnseen", bulb, {4, 0, 1}, Setting::Seen::nothing);
+    beside("EdgesOfTwoLights", lit({sun({1, 1, 0}, 0.4), lamp({1.2, 1.8, 0}, 0.3, 1.5)}), {-1.35, 0, 0},
+           Setting::Seen::shadow);
     return all;
 }
 
@@ -165,6 +180,19 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     if (setting.lighting.specular == 0) {
         EXPECT_LT(cut->stats.triangles, full->stats.triangles);
     }
+    if (setting.seen == Setting::Seen::nothing) {
+        EXPECT_EQ(cut->stats.triangles, 0u);
+    }
+    if (setting.seen == Setting::Seen::shadow) { // and not for the eye
+        EXPECT_GT(cut->stats.triangles, 0u);
+        EXPECT_LT(cut->stats.triangles, full->stats.triangles / 2);
+        const std::vector<vdtree::Cut> none = [&] {
+            std::vector<vdtree::Cut> cuts;
+            cuts.emplace_back(session->tree());
+            return cuts;
+        }();
+        EXPECT_GT(judged(none).visible_pixels, 0);
+    }
     RecordProperty("triangles", static_cast<int>(cut->stats.triangles));
     RecordProperty("of", static_cast<int>(full->stats.triangles));
     RecordProperty("ratio", std::to_string(judgement.max_ratio));
@@ -183,7 +211,7 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     RecordProperty("eyeratio", std::to_string(seen.max_ratio));
     EXPECT_GT(seen.visible_pixels, 0) << seen.max_ratio;
 }
-INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 6),
+INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 12),
                          [](const auto& of) { return std::string(settings()[of.param].name); });
 
 } // namespace

@@ -213,6 +213,26 @@ vdtree::Lighting in_world(vdtree::Lighting lighting, const Object& object) {
     return lighting;
 }
 
+std::vector<Standing> all_standing(const SceneShadows& all) {
+    std::vector<Standing> standing;
+    for (std::size_t i = 0; i < all.scene.objects.size(); ++i) {
+        const Object& object = all.scene.objects[i];
+        Standing one{&object, all.caches[i]->light_bounds.get()};
+        const bool shows_through = object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
+        one.hides_back_faces = !shows_through && object.tree.closedness() != vdtree::Closedness::open;
+        standing.push_back(one);
+    }
+    for (const Object& object : all.scene.backdrop) standing.push_back({&object});
+    return standing;
+}
+
+LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting) {
+    LitReceivers lit{std::move(lighting), {}};
+    for (const vdtree::LightSource& light : lit.lighting.lights)
+        if (light.casts_shadow) lit.of_lights.push_back(receivers.find_lit(light));
+    return lit;
+}
+
 // Where shadows count for a cut. Kept for views from nearby.
 std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& decision,
                                             const std::shared_ptr<const perception::ShadowEdges>& edges) {
@@ -221,8 +241,9 @@ std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& 
     std::span<const vdtree::Plane> window;
     if (decision.request.purpose == Purpose::picture) window = *sight.window;
     if (all.reach && all.reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return all.reach;
-    if (!all.receivers) all.receivers = ShadowReceivers::cover(all.scene);
-    all.reach = std::make_shared<const ShadowReach>(*all.receivers, lighting, edges, sight.view.eye, window);
+    if (!all.receivers) all.receivers.emplace(all_standing(all));
+    if (!all.lit || !is_alike(all.lit->lighting, lighting)) all.lit = lit_by(*all.receivers, lighting);
+    all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window);
     return all.reach;
 }
 

@@ -122,7 +122,7 @@ Session::State::State(Scene scene_, Observer observer_, Messages messages_, floa
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
       still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
-      shadows_(scene.objects.size()), scene_shadows_{scene} {
+      shadows_(scene.objects.size()), scene_shadows_{scene, caches} {
     share_caches();
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;

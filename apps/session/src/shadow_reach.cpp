@@ -1,6 +1,7 @@
 #include "shadow_reach.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -15,7 +16,8 @@ namespace {
 using vdtree::LightSource;
 using vdtree::NodeId;
 using Ball = ShadowReceivers::Ball;
-using Corners = ShadowReceivers::Corners;
+using Triangle = ShadowReceivers::Triangle;
+using Corners = std::array<glm::dvec3, 3>;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double outward = 1 + 1e-6; // far more than rounding in floats, and of lights that come from another frame
@@ -25,13 +27,16 @@ constexpr double outward = 1 + 1e-6; // far more than rounding in floats, and of
 constexpr std::size_t most_balls = 40'000;
 constexpr double finest = 1.0 / 500; // of the scene's radius: smaller balls are not parted
 
+// Of the scene's radius: half the width of drawn edges of shadows, by texels of the maps that are fitted to the scene.
+constexpr double edge_width = 1.0 / 300;
+
 // A node of an object's tree, or a part of a triangle.
 struct Piece {
     WorldSphere sphere;
     std::uint32_t object = 0;
     NodeId node = vdtree::no_node;
     Corners part = {};
-    std::uint32_t corners = Ball::none;
+    std::uint32_t triangle = 0;
     bool operator<(const Piece& other) const { return sphere.radius < other.sphere.radius; }
 };
 
@@ -48,9 +53,17 @@ WorldSphere around(const Corners& part) {
 // Parts the largest ones first.
 class Cover {
 public:
-    explicit Cover(const Scene& scene) {
-        for (const std::vector<Object>* all : {&scene.objects, &scene.backdrop})
-            for (const Object& object : *all) add(object);
+    explicit Cover(const std::vector<Standing>& standing) : standing_(standing) {
+        for (std::uint32_t i = 0; i < standing.size(); ++i) {
+            const Object& object = *standing[i].object;
+            auto sound = vdtree::SoundTree::of(object.tree); // else it stays whole
+            trees_.push_back(sound ? std::optional(std::move(*sound)) : std::nullopt);
+            Piece whole = piece_of(i, vdtree::VertexTree::root());
+            const WorldSphere all = world_sphere(object);
+            whole.sphere.radius =
+                std::max(whole.sphere.radius, glm::length(all.centre - whole.sphere.centre) + all.radius);
+            pieces_.push(whole);
+        }
     }
 
     void part(double least_radius, std::vector<Ball>& balls) {
@@ -59,91 +72,107 @@ public:
             pieces_.pop();
             const bool is_last = balls.size() + pieces_.size() >= most_balls || piece.sphere.radius <= least_radius;
             if (is_last || (piece.node != vdtree::no_node && !trees_[piece.object]))
-                balls.push_back({{piece.sphere.centre, piece.sphere.radius * outward}, piece.corners});
+                balls.push_back(
+                    {{piece.sphere.centre, piece.sphere.radius * outward}, piece.object, piece.node, piece.triangle});
             else if (piece.node != vdtree::no_node) part_node(piece);
             else part_triangle(piece);
         }
     }
-    std::vector<Corners> take_corners() { return std::move(corners_); }
+    std::vector<Triangle> take_triangles() { return std::move(triangles_); }
 
 private:
-    void add(const Object& object) {
-        auto sound = vdtree::SoundTree::of(object.tree); // else it stays whole
-        trees_.push_back(sound ? std::optional(std::move(*sound)) : std::nullopt);
-        objects_.push_back(&object);
-        const vdtree::Sphere around = object.tree.bounding_sphere();
-        Piece whole = piece_of(static_cast<std::uint32_t>(objects_.size() - 1), vdtree::VertexTree::root());
-        const double apart = glm::length(glm::dvec3(around.centre) -
-                                         glm::dvec3(object.tree.bounds()[vdtree::VertexTree::root()].ring.centre));
-        const double all = (apart + static_cast<double>(around.radius)) * object.placement.scale;
-        whole.sphere.radius = std::max(whole.sphere.radius, all);
-        pieces_.push(whole);
-    }
-
-    Piece piece_of(std::uint32_t object, NodeId node) const {
-        const Object& of = *objects_[object];
+    Piece piece_of(std::uint32_t standing, NodeId node) const {
+        const Object& of = *standing_[standing].object;
         const vdtree::Sphere ring = of.tree.bounds()[node].ring;
         return {{of.placement.to_world(of.tree.origin() + glm::dvec3(ring.centre)),
                  of.placement.scale * static_cast<double>(ring.radius)},
-                object,
+                standing,
                 node};
     }
 
     // Each triangle vanishes at one node, and is in the ring of every node below that has two of its corners.
     void part_node(const Piece& piece) {
         const vdtree::SoundTree& tree = *trees_[piece.object];
-        const Object& object = *objects_[piece.object];
+        const vdtree::Similarity& placement = standing_[piece.object].object->placement;
         tree.for_each_child(piece.node, [&](NodeId child) {
             if (!tree.is_leaf(child)) pieces_.push(piece_of(piece.object, child));
         });
-        const auto corner = [&](vdtree::Index leaf) {
-            return object.placement.to_world(tree.origin() +
-                                             glm::dvec3(tree.positions()[tree.interior_count() + leaf]));
-        };
         for (vdtree::Index t = tree.first_triangle()[piece.node]; t < tree.first_triangle()[piece.node + 1]; ++t) {
-            const vdtree::Triangle& triangle = tree.triangles()[t];
-            const Corners whole = {corner(triangle[0]), corner(triangle[1]), corner(triangle[2])};
-            corners_.push_back(whole);
+            Triangle whole;
+            for (int k = 0; k < 3; ++k) {
+                const NodeId leaf = tree.interior_count() + tree.triangles()[t][static_cast<std::size_t>(k)];
+                whole.corners[k] = placement.to_world(tree.origin() + glm::dvec3(tree.positions()[leaf]));
+                whole.normals[k] = placement.rotation * glm::dvec3(glm::vec3(tree.normals()[leaf]));
+            }
+            triangles_.push_back(whole);
+            const Corners all = {whole.corners[0], whole.corners[1], whole.corners[2]};
             pieces_.push(
-                {around(whole), piece.object, vdtree::no_node, whole, static_cast<std::uint32_t>(corners_.size() - 1)});
+                {around(all), piece.object, vdtree::no_node, all, static_cast<std::uint32_t>(triangles_.size() - 1)});
         }
     }
 
     void part_triangle(const Piece& piece) {
-        int longest = 0;
-        const auto side = [&](int i) { return glm::length(piece.part[(i + 1) % 3] - piece.part[i]); };
-        for (int i = 1; i < 3; ++i)
+        std::size_t longest = 0;
+        const auto side = [&](std::size_t i) { return glm::length(piece.part[(i + 1) % 3] - piece.part[i]); };
+        for (std::size_t i = 1; i < 3; ++i)
             if (side(i) > side(longest)) longest = i;
         const glm::dvec3 a = piece.part[longest], b = piece.part[(longest + 1) % 3], c = piece.part[(longest + 2) % 3];
         const glm::dvec3 middle = (a + b) * 0.5;
         for (const Corners& half : {Corners{a, middle, c}, Corners{middle, b, c}})
-            pieces_.push({around(half), piece.object, vdtree::no_node, half, piece.corners});
+            pieces_.push({around(half), piece.object, vdtree::no_node, half, piece.triangle});
     }
 
-    std::vector<const Object*> objects_;
+    const std::vector<Standing>& standing_;
     std::vector<std::optional<vdtree::SoundTree>> trees_;
-    std::vector<Corners> corners_;
+    std::vector<Triangle> triangles_;
     std::priority_queue<Piece> pieces_;
 };
+
+// ---- what lights do not reach
+
+bool faces_away(const LightSource& light, const Triangle& triangle) {
+    for (int k = 0; k < 3; ++k) {
+        const glm::dvec3 towards =
+            light.kind == LightSource::Kind::directional ? light.direction : light.position - triangle.corners[k];
+        if (!(glm::dot(triangle.normals[k], towards) <= 0)) return false; // a normal of 0 is lit by nothing
+    }
+    return true;
+}
+
+// The light's directions differ by so much from that at the ball's middle.
+bool faces_away(const LightSource& light, const Standing& standing, const Ball& ball) {
+    if (!standing.light_bounds) return false;
+    const vdtree::VertexCone& cone = standing.light_bounds->cones()[ball.node];
+    glm::dvec3 towards = light.direction;
+    double spread = 1e-3; // radians: cones are of floats
+    if (light.kind != LightSource::Kind::directional) {
+        const glm::dvec3 way = light.position - ball.sphere.centre;
+        const double distance = glm::length(way);
+        if (!(distance > ball.sphere.radius)) return false;
+        towards = way / distance;
+        spread += std::asin(ball.sphere.radius / distance);
+    }
+    if (!(cone.cosine > -1)) return false; // normals may point anywhere
+    const glm::dvec3 axis = standing.object->placement.rotation * glm::dvec3(cone.axis);
+    const double apart = std::acos(std::clamp(glm::dot(axis, towards), -1.0, 1.0));
+    return apart - std::acos(static_cast<double>(cone.cosine)) - spread >= std::numbers::pi / 2;
+}
 
 // ---- the window
 
 // Views from nearby: by this share of the way to the nearest ball that may be seen, but no more than this share of the
 // scene's radius, and no less than that one.
-constexpr double near_by = 1.0 / 16, farthest_near_by = 1.0 / 32, nearest_near_by = 1.0 / 5000;
-// Of the scene's radius: half the width of drawn edges of shadows, by texels of the maps that are fitted to the scene.
-constexpr double edge_width = 1.0 / 300;
+constexpr double share_near_by = 1.0 / 16, farthest_near_by = 1.0 / 32, nearest_near_by = 1.0 / 5000;
 constexpr double turned = 0.05; // radians, and what else may change of the window's planes
 
-// Rounding of lights that are the same in the world, but come from other objects' frames.
-bool is_same(const LightSource& a, const LightSource& b, double scene_radius) {
-    constexpr double rounding = 1e-9;
-    const double size = rounding * (scene_radius + glm::length(a.position));
-    return a.kind == b.kind && a.casts_shadow == b.casts_shadow &&
-           std::abs(a.intensity - b.intensity) <= rounding * a.intensity &&
-           (a.kind != LightSource::Kind::directional || glm::length(a.direction - b.direction) <= rounding) &&
-           (a.kind == LightSource::Kind::directional || (glm::length(a.position - b.position) <= size &&
-                                                         std::abs(a.distance - b.distance) <= rounding * a.distance));
+bool is_alike(const LightSource& a, const LightSource& b) {
+    constexpr double rounding = 1e-9; // of lights that are the same in the world, but come from other objects' frames
+    if (a.kind != b.kind || a.casts_shadow != b.casts_shadow ||
+        !(std::abs(a.intensity - b.intensity) <= rounding * a.intensity))
+        return false;
+    if (a.kind == LightSource::Kind::directional) return glm::length(a.direction - b.direction) <= rounding;
+    return glm::length(a.position - b.position) <= rounding * (a.distance + glm::length(a.position)) &&
+           std::abs(a.distance - b.distance) <= rounding * a.distance;
 }
 
 // ---- what a light sees
@@ -161,20 +190,31 @@ struct Range {
 
 } // namespace
 
-ShadowReceivers ShadowReceivers::cover(const Scene& scene) {
-    ShadowReceivers all;
-    WorldSphere scene_sphere{{}, 0};
-    for (const std::vector<Object>* objects : {&scene.objects, &scene.backdrop})
-        for (const Object& object : *objects) {
-            const WorldSphere own = world_sphere(object);
-            if (scene_sphere.radius == 0) scene_sphere = own;
-            scene_sphere.radius =
-                std::max(scene_sphere.radius, glm::length(own.centre - scene_sphere.centre) + own.radius);
-        }
-    Cover cover(scene);
-    cover.part(finest * scene_sphere.radius, all.balls_);
-    all.corners_ = cover.take_corners();
-    return all;
+ShadowReceivers::ShadowReceivers(std::vector<Standing> standing) : standing_(std::move(standing)) {
+    WorldSphere all{{}, 0};
+    for (const Standing& one : standing_) {
+        const WorldSphere own = world_sphere(*one.object);
+        if (all.radius == 0) all = own;
+        all.radius = std::max(all.radius, glm::length(own.centre - all.centre) + own.radius);
+    }
+    edge_ = edge_width * all.radius;
+    Cover cover(standing_);
+    cover.part(finest * all.radius, balls_);
+    triangles_ = cover.take_triangles();
+}
+
+std::vector<bool> ShadowReceivers::find_lit(const LightSource& light) const {
+    std::vector<bool> lit;
+    lit.reserve(balls_.size());
+    for (const Ball& ball : balls_)
+        lit.push_back(!(ball.node == vdtree::no_node ? faces_away(light, triangles_[ball.triangle])
+                                                     : faces_away(light, standing_[ball.standing], ball)));
+    return lit;
+}
+
+bool is_alike(const vdtree::Lighting& a, const vdtree::Lighting& b) {
+    return std::equal(a.lights.begin(), a.lights.end(), b.lights.begin(), b.lights.end(),
+                      [](const LightSource& one, const LightSource& other) { return is_alike(one, other); });
 }
 
 // The plane across a directional light, or the side of a cube around a light with a place, in cells, each with slabs
@@ -182,7 +222,7 @@ ShadowReceivers ShadowReceivers::cover(const Scene& scene) {
 // of four cells each.
 class ShadowReach::Map {
 public:
-    static constexpr std::size_t slabs = 16, plane_cells = 128, side_cells = 64;
+    static constexpr std::size_t slabs = 32, plane_cells = 128, side_cells = 64;
 
     static Map across(glm::dvec3 along) {
         Map map(plane_cells);
@@ -309,46 +349,83 @@ private:
     std::vector<float> values_;            // by level, slab, row and column
 };
 
-ShadowReach::ShadowReach(const ShadowReceivers& receivers, vdtree::Lighting lighting,
+ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                          std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
                          std::span<const vdtree::Plane> window)
-    : lighting_(std::move(lighting)), edges_(std::move(edges)), eye_(eye), window_(window.begin(), window.end()) {
+    : lighting_(lit.lighting), edges_(std::move(edges)), eye_(eye), window_(window.begin(), window.end()),
+      edge_(receivers.edge_) {
     if (receivers.balls().empty()) return;
     const glm::dvec3 middle = receivers.balls().front().sphere.centre;
     for (const Ball& ball : receivers.balls())
         scene_radius_ = std::max(scene_radius_, glm::length(ball.sphere.centre - middle) + ball.sphere.radius);
-    const std::vector<Seen> seen = find_seen(receivers.balls());
+    const std::vector<Seen> seen = find_seen(receivers);
     for (const LightSource& light : lighting_.lights)
-        if (light.casts_shadow) lights_.push_back(mapped(light, receivers, seen));
+        if (light.casts_shadow) lights_.push_back(mapped(light, receivers, lit.of_lights[lights_.size()], seen));
 }
 
 ShadowReach::~ShadowReach() = default;
 
-std::vector<ShadowReach::Seen> ShadowReach::find_seen(const std::vector<Ball>& balls) {
+namespace {
+
+// From all eyes that are so near to this one.
+bool is_back(const Standing& standing, const Ball& ball, const Triangle* triangle, glm::dvec3 eye, double near_by) {
+    const Object& object = *standing.object;
+    const WorldSphere whole = world_sphere(object);
+    if (!standing.hides_back_faces || !(glm::length(eye - whole.centre) > whole.radius + near_by)) return false;
+    const bool is_inside_out = object.tree.closedness() == vdtree::Closedness::closed_inward;
+    if (triangle) {
+        const glm::dvec3 across =
+            glm::cross(triangle->corners[1] - triangle->corners[0], triangle->corners[2] - triangle->corners[0]);
+        const double height = glm::dot(across, eye - triangle->corners[0]) * (is_inside_out ? -1 : 1);
+        return height < -glm::length(across) * near_by * outward;
+    }
+    const vdtree::NodeBounds& bounds = object.tree.bounds()[ball.node];
+    if (bounds.flags & vdtree::irregular_ring) return false;
+    const glm::dvec3 way = object.placement.to_mesh(eye) - object.tree.origin() - glm::dvec3(bounds.ring.centre);
+    const double distance = glm::length(way);
+    const double reach = static_cast<double>(bounds.ring.radius) + near_by / object.placement.scale * outward;
+    if (!(distance > reach)) return false;
+    const vdtree::Facing side = vdtree::facing(bounds.slabs, glm::vec3(way / distance), static_cast<float>(distance),
+                                               static_cast<float>(reach * outward));
+    return side == (is_inside_out ? vdtree::Facing::front : vdtree::Facing::back);
+}
+
+} // namespace
+
+std::vector<ShadowReach::Seen> ShadowReach::find_seen(const ShadowReceivers& receivers) {
+    const std::vector<Ball>& balls = receivers.balls();
     std::vector<Seen> seen;
-    const auto find = [&] {
+    const auto find = [&](bool without_backs) {
         seen.clear();
         for (std::size_t i = 0; i < balls.size(); ++i) {
-            const glm::dvec3 to = balls[i].sphere.centre - eye_;
-            const double distance = glm::length(to), radius = balls[i].sphere.radius;
+            const Ball& ball = balls[i];
+            const glm::dvec3 to = ball.sphere.centre - eye_;
+            const double distance = glm::length(to), radius = ball.sphere.radius;
             const double margin = radius + turned * distance + near_by_;
             if (std::any_of(window_.begin(), window_.end(),
                             [&](const vdtree::Plane& plane) { return glm::dot(plane.normal, to) < -margin; }))
+                continue;
+            if (without_backs &&
+                is_back(receivers.standing()[ball.standing], ball,
+                        ball.node == vdtree::no_node ? &receivers.triangles()[ball.triangle] : nullptr, eye_, near_by_))
                 continue;
             const double nearest = distance - radius - near_by_;
             seen.push_back({static_cast<std::uint32_t>(i), nearest > 0 ? nearest : 0}); // 0 for NaN
         }
     };
-    find();
+    find(false);
     double nearest = infinity;
     for (const Seen& ball : seen) nearest = std::min(nearest, ball.distance);
-    near_by_ = std::clamp(near_by * nearest, nearest_near_by * scene_radius_, farthest_near_by * scene_radius_);
-    find();
+    near_by_ = std::clamp(share_near_by * nearest, nearest_near_by * scene_radius_, farthest_near_by * scene_radius_);
+    find(!window_.empty());
     return seen;
 }
 
 ShadowReach::MappedLight ShadowReach::mapped(const LightSource& light, const ShadowReceivers& receivers,
-                                             const std::vector<Seen>& seen) const {
+                                             const std::vector<bool>& lit, const std::vector<Seen>& all_seen) const {
+    std::vector<Seen> seen;
+    for (const Seen& ball : all_seen)
+        if (lit[ball.ball]) seen.push_back(ball);
     MappedLight all{light, {}};
     const bool has_place = light.kind != LightSource::Kind::directional;
     if (has_place)
@@ -361,9 +438,9 @@ ShadowReach::MappedLight ShadowReach::mapped(const LightSource& light, const Sha
         const double middle = glm::length(ball.sphere.centre - light.position);
         // Light is interpolated between corners, which may be nearer.
         double nearest = middle - ball.sphere.radius;
-        if (ball.corners != Ball::none) {
+        if (ball.node == vdtree::no_node) {
             nearest = infinity;
-            for (const glm::dvec3& corner : receivers.corners()[ball.corners])
+            for (const glm::dvec3& corner : receivers.triangles()[ball.triangle].corners)
                 nearest = std::min(nearest, glm::length(corner - light.position));
         }
         if (!(nearest > 0)) return 0.0;
@@ -401,13 +478,12 @@ bool ShadowReach::holds_for(const vdtree::Lighting& lighting, const perception::
                       [](const vdtree::Plane& a, const vdtree::Plane& b) {
                           return glm::length(a.normal - b.normal) <= turned;
                       }) &&
-           std::equal(lighting.lights.begin(), lighting.lights.end(), lighting_.lights.begin(), lighting_.lights.end(),
-                      [&](const LightSource& a, const LightSource& b) { return is_same(a, b, scene_radius_); });
+           is_alike(lighting, lighting_);
 }
 
 double ShadowReach::unseen_shift(const WorldSphere& sphere) const {
     double least = infinity;
-    const WorldSphere wide{sphere.centre, sphere.radius * outward + edge_width * scene_radius_};
+    const WorldSphere wide{sphere.centre, sphere.radius * outward + edge_};
     for (const MappedLight& mapped : lights_) {
         double own = infinity;
         for (const Map& map : mapped.maps)

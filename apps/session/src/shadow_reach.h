@@ -5,7 +5,6 @@
 // light and the way to it: what casts a shadow looks up what lies behind it.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -16,35 +15,61 @@
 #include <session/session.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/lighting.h>
+#include <vdtree/vertex_tree.h>
 
 namespace unseen::session {
 
-// Balls around all triangles of all objects and of the backdrop. In world units.
+// One of all objects, and then of the backdrop.
+struct Standing {
+    const Object* object = nullptr;
+    const vdtree::LightBounds* light_bounds = nullptr; // null: not known
+    bool hides_back_faces = false; // where it is looked at from outside: closed, and nothing shows through
+};
+
+// Balls around all triangles of all that stands there. In world units.
 class ShadowReceivers {
 public:
     // Cost: some hundred milliseconds for the largest scenes.
-    static ShadowReceivers cover(const Scene& scene);
+    explicit ShadowReceivers(std::vector<Standing> standing);
 
     struct Ball {
         WorldSphere sphere;
-        std::uint32_t corners = none; // of the whole triangle that it is a part of; none: all is in the ball
-        static constexpr std::uint32_t none = 0xffffffff;
+        std::uint32_t standing = 0;
+        vdtree::NodeId node = vdtree::no_node; // whose ring it is, or ...
+        std::uint32_t triangle = 0;            // ... of which it is a part
     };
-    using Corners = std::array<glm::dvec3, 3>;
+    struct Triangle {
+        glm::dvec3 corners[3], normals[3]; // of the vertices
+    };
 
+    const std::vector<Standing>& standing() const noexcept { return standing_; }
     const std::vector<Ball>& balls() const noexcept { return balls_; }
-    const std::vector<Corners>& corners() const noexcept { return corners_; }
+    const std::vector<Triangle>& triangles() const noexcept { return triangles_; }
+
+    // By ball: whether a light may light any of it. What faces away is dark, in shadow or not.
+    std::vector<bool> find_lit(const vdtree::LightSource& light) const;
 
 private:
+    std::vector<Standing> standing_;
     std::vector<Ball> balls_;
-    std::vector<Corners> corners_;
+    std::vector<Triangle> triangles_;
+    double edge_ = 0; // world units: half the width of drawn edges of shadows
+    friend class ShadowReach;
+};
+
+// Whether shadows are the same, but for rounding from one object's frame to another's.
+bool is_alike(const vdtree::Lighting& a, const vdtree::Lighting& b);
+
+struct LitReceivers {
+    vdtree::Lighting lighting;                // in the world
+    std::vector<std::vector<bool>> of_lights; // of those that cast shadows
 };
 
 class ShadowReach {
 public:
     // `lighting`: in the world. `window`: the frustum's planes around the eye, in the world; what is out of it does not
     // count. None: all does. Cost: some milliseconds.
-    ShadowReach(const ShadowReceivers& receivers, vdtree::Lighting lighting,
+    ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                 std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
                 std::span<const vdtree::Plane> window);
     ShadowReach(const ShadowReach&) = delete;
@@ -69,8 +94,8 @@ private:
         vdtree::LightSource light;
         std::vector<Map> maps; // one of a directional light, six of others
     };
-    std::vector<Seen> find_seen(const std::vector<ShadowReceivers::Ball>& balls);
-    MappedLight mapped(const vdtree::LightSource& light, const ShadowReceivers& receivers,
+    std::vector<Seen> find_seen(const ShadowReceivers& receivers);
+    MappedLight mapped(const vdtree::LightSource& light, const ShadowReceivers& receivers, const std::vector<bool>& lit,
                        const std::vector<Seen>& seen) const;
 
     vdtree::Lighting lighting_;
@@ -78,7 +103,7 @@ private:
     glm::dvec3 eye_;
     std::vector<vdtree::Plane> window_;
     double near_by_ = 0; // world units: how far the eye may be from `eye_`
-    double scene_radius_ = 0;
+    double scene_radius_ = 0, edge_ = 0;
     std::vector<MappedLight> lights_;
 };
 

@@ -33,7 +33,9 @@ struct ObjectCache {
 // Of all objects of a scene whose lights cast shadows.
 struct SceneShadows {
     const Scene& scene;
+    const std::vector<std::shared_ptr<ObjectCache>>& caches;
     std::optional<ShadowReceivers> receivers = {};
+    std::optional<LitReceivers> lit = {}; // for the last lights
     // For views like this one; and what it is of.
     struct EdgesKey {
         int width = 0, height = 0;
