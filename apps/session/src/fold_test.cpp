@@ -243,7 +243,8 @@ std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& 
     if (all.reach && all.reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return all.reach;
     if (!all.receivers) all.receivers.emplace(all_standing(all));
     if (!all.lit || !is_alike(all.lit->lighting, lighting)) all.lit = lit_by(*all.receivers, lighting);
-    all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window);
+    const bool moves = all.reach && !all.reach->is_of(sight.view.eye, window); // the first view may be the only one
+    all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
     return all.reach;
 }
 
@@ -302,7 +303,7 @@ std::shared_ptr<const KeptCriterion>& criterion_of(const Sight& sight, const Key
 }
 
 // Of what may move unseen: so much is left to a moving eye before a criterion is made anew.
-constexpr double share_kept_back = 0.84; // 2^(-1/4)
+constexpr double share_left_to_motion = 0.7;
 // More nodes than this share beyond those that have to be are not kept.
 constexpr double most_kept_too_many = 0.25;
 
@@ -329,7 +330,8 @@ bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
         const auto most = static_cast<std::size_t>((1 + most_kept_too_many) * static_cast<double>(count(needed)));
         if (contains(state.kept, needed) && count(state.kept) <= most) return false;
     }
-    auto kept = shadowing_outlines(sight.object, state.shifts, *reach, share_kept_back * threshold);
+    const double share = reach->moves() ? share_left_to_motion : 1;
+    auto kept = shadowing_outlines(sight.object, state.shifts, *reach, share * threshold);
     const bool is_other = is_new || kept != state.kept;
     state.kept = std::move(kept);
     return is_other;

@@ -161,9 +161,9 @@ bool faces_away(const LightSource& light, const Standing& standing, const Ball& 
 // ---- the window
 
 // Views from nearby: by this share of the way to the nearest ball that may be seen, but no more than this share of the
-// scene's radius, and no less than that one.
-constexpr double share_near_by = 1.0 / 16, farthest_near_by = 1.0 / 32, nearest_near_by = 1.0 / 5000;
-constexpr double turned = 0.05; // radians, and what else may change of the window's planes
+// scene's radius, and no less than that one. Shadows that are nearer than that may be at the eye.
+constexpr double share_near_by = 1.0 / 4, farthest_near_by = 1.0 / 16, nearest_near_by = 1.0 / 100;
+constexpr double turned = 0.07; // radians, and what else may change of the window's planes
 
 bool is_alike(const LightSource& a, const LightSource& b) {
     constexpr double rounding = 1e-9; // of lights that are the same in the world, but come from other objects' frames
@@ -222,7 +222,7 @@ bool is_alike(const vdtree::Lighting& a, const vdtree::Lighting& b) {
 // of four cells each.
 class ShadowReach::Map {
 public:
-    static constexpr std::size_t slabs = 32, plane_cells = 128, side_cells = 64;
+    static constexpr std::size_t slabs = 16, plane_cells = 128, side_cells = 64;
 
     static Map across(glm::dvec3 along) {
         Map map(plane_cells);
@@ -255,9 +255,10 @@ public:
         if (!(distance > r)) return all;
         // No direction into it is farther than this from that to its centre; all of the side have at least this along
         // its axis.
-        const double spread = 2 * std::sin(std::asin(r / distance) / 2) * outward;
         constexpr double least_along = std::numbers::inv_sqrt3 / outward;
-        if (w / distance + spread < least_along) return std::nullopt;
+        if (w + std::numbers::sqrt2 * outward * r < least_along * distance) return std::nullopt;
+        const double sine = r / distance; // of half the angle under which it is seen
+        const double spread = std::sqrt(2 - 2 * std::sqrt((1 - sine) * (1 + sine))) * outward + 1e-7;
         const double least = std::max(w / distance - spread, least_along), most = w / distance + spread;
         for (int k = 0; k < 2; ++k) {
             const double low = (k == 0 ? u : v) / distance - spread, high = (k == 0 ? u : v) / distance + spread;
@@ -351,9 +352,9 @@ private:
 
 ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                          std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
-                         std::span<const vdtree::Plane> window)
+                         std::span<const vdtree::Plane> window, bool moves)
     : lighting_(lit.lighting), edges_(std::move(edges)), eye_(eye), window_(window.begin(), window.end()),
-      edge_(receivers.edge_) {
+      moves_(moves), edge_(receivers.edge_) {
     if (receivers.balls().empty()) return;
     const glm::dvec3 middle = receivers.balls().front().sphere.centre;
     for (const Ball& ball : receivers.balls())
@@ -401,7 +402,7 @@ std::vector<ShadowReach::Seen> ShadowReach::find_seen(const ShadowReceivers& rec
             const Ball& ball = balls[i];
             const glm::dvec3 to = ball.sphere.centre - eye_;
             const double distance = glm::length(to), radius = ball.sphere.radius;
-            const double margin = radius + turned * distance + near_by_;
+            const double margin = radius + (moves_ ? turned : 0) * distance + near_by_;
             if (std::any_of(window_.begin(), window_.end(),
                             [&](const vdtree::Plane& plane) { return glm::dot(plane.normal, to) < -margin; }))
                 continue;
@@ -413,10 +414,13 @@ std::vector<ShadowReach::Seen> ShadowReach::find_seen(const ShadowReceivers& rec
             seen.push_back({static_cast<std::uint32_t>(i), nearest > 0 ? nearest : 0}); // 0 for NaN
         }
     };
-    find(false);
-    double nearest = infinity;
-    for (const Seen& ball : seen) nearest = std::min(nearest, ball.distance);
-    near_by_ = std::clamp(share_near_by * nearest, nearest_near_by * scene_radius_, farthest_near_by * scene_radius_);
+    if (moves_) {
+        find(false);
+        double nearest = infinity;
+        for (const Seen& ball : seen) nearest = std::min(nearest, ball.distance);
+        near_by_ =
+            std::clamp(share_near_by * nearest, nearest_near_by * scene_radius_, farthest_near_by * scene_radius_);
+    }
     find(!window_.empty());
     return seen;
 }
@@ -473,12 +477,19 @@ ShadowReach::MappedLight ShadowReach::mapped(const LightSource& light, const Sha
 
 bool ShadowReach::holds_for(const vdtree::Lighting& lighting, const perception::ShadowEdges* edges, glm::dvec3 eye,
                             std::span<const vdtree::Plane> window) const {
+    const double largest_turn = moves_ ? turned : 0;
     return edges == edges_.get() && glm::length(eye - eye_) <= near_by_ &&
            std::equal(window.begin(), window.end(), window_.begin(), window_.end(),
-                      [](const vdtree::Plane& a, const vdtree::Plane& b) {
-                          return glm::length(a.normal - b.normal) <= turned;
+                      [&](const vdtree::Plane& a, const vdtree::Plane& b) {
+                          return glm::length(a.normal - b.normal) <= largest_turn;
                       }) &&
            is_alike(lighting, lighting_);
+}
+
+bool ShadowReach::is_of(glm::dvec3 eye, std::span<const vdtree::Plane> window) const {
+    return eye == eye_ &&
+           std::equal(window.begin(), window.end(), window_.begin(), window_.end(),
+                      [](const vdtree::Plane& a, const vdtree::Plane& b) { return a.normal == b.normal; });
 }
 
 double ShadowReach::unseen_shift(const WorldSphere& sphere) const {

@@ -68,17 +68,20 @@ struct LitReceivers {
 class ShadowReach {
 public:
     // `lighting`: in the world. `window`: the frustum's planes around the eye, in the world; what is out of it does not
-    // count. None: all does. Cost: some milliseconds.
+    // count. None: all does. `moves`: it is to hold for views from nearby, too. Cost: some milliseconds.
     ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                 std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
-                std::span<const vdtree::Plane> window);
+                std::span<const vdtree::Plane> window, bool moves);
     ShadowReach(const ShadowReach&) = delete;
     ShadowReach& operator=(const ShadowReach&) = delete;
     ~ShadowReach();
 
-    // Whether it holds for these, too: for views from nearby, turned by little.
+    // Whether it holds for these, too.
     bool holds_for(const vdtree::Lighting& lighting, const perception::ShadowEdges* edges, glm::dvec3 eye,
                    std::span<const vdtree::Plane> window) const;
+
+    bool is_of(glm::dvec3 eye, std::span<const vdtree::Plane> window) const; // this very view
+    bool moves() const noexcept { return moves_; }
 
     // World units: how far outlines of what is in this sphere may move. Infinite where no light casts a shadow of it that
     // can be seen; 0 where the eye may be in one. Cost: some hundred nanoseconds a light.
@@ -102,6 +105,7 @@ private:
     std::shared_ptr<const perception::ShadowEdges> edges_;
     glm::dvec3 eye_;
     std::vector<vdtree::Plane> window_;
+    bool moves_;
     double near_by_ = 0; // world units: how far the eye may be from `eye_`
     double scene_radius_ = 0, edge_ = 0;
     std::vector<MappedLight> lights_;
