@@ -226,10 +226,13 @@ std::vector<Standing> all_standing(const SceneShadows& all) {
     return standing;
 }
 
-LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting) {
+// Of lights that move: everywhere. To look at them anew in each frame takes longer than it spares.
+LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting, bool stands_still) {
     LitReceivers lit{std::move(lighting), {}};
     for (const vdtree::LightSource& light : lit.lighting.lights)
-        if (light.casts_shadow) lit.of_lights.push_back(receivers.find_lit(light));
+        if (light.casts_shadow)
+            lit.of_lights.push_back(stands_still ? receivers.find_lit(light)
+                                                 : std::vector<bool>(receivers.balls().size(), true));
     return lit;
 }
 
@@ -242,15 +245,11 @@ std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& 
     if (decision.request.purpose == Purpose::picture) window = *sight.window;
     if (all.reach && all.reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return all.reach;
     if (!all.receivers) all.receivers.emplace(all_standing(all));
-    if (!all.lit || !is_alike(all.lit->lighting, lighting)) all.lit = lit_by(*all.receivers, lighting);
+    if (!all.lit || !is_alike(all.lit->lighting, lighting))
+        all.lit = lit_by(*all.receivers, lighting, sight.lights->stands_still());
     const bool moves = all.reach && !all.reach->is_of(sight.view.eye, window); // the first view may be the only one
     all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
     return all.reach;
-}
-
-// Whether what is not seen may not fold, for nobody asks what its shadows show.
-bool may_cast_anything(const Sight& sight, const Decision& decision) {
-    return casts_shadows(sight) && !(is_perceptual(decision) && decision.request.keeps_shadows);
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
@@ -294,6 +293,10 @@ struct KeptCriterion {
 };
 
 bool casts_shadows(const Sight& sight) { return sight.lighting && vdtree::shadow_lights(*sight.lighting) > 0; }
+
+bool may_cast_anything(const Sight& sight, const Decision& decision) {
+    return casts_shadows(sight) && !(is_perceptual(decision) && decision.request.keeps_shadows);
+}
 
 namespace {
 
