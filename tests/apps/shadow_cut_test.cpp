@@ -21,6 +21,9 @@ using Kind = vdtree::LightSource::Kind;
 using vdtree::LightSource;
 
 constexpr int window_px = 256, samples = 64;
+// What an object out of the window may keep although its shadow is not in it, either: spheres around its largest nodes
+// are much larger than the object.
+constexpr vdtree::Index of_largest_nodes = 20;
 
 LightSource sun(glm::dvec3 towards, double intensity) {
     LightSource light;
@@ -72,6 +75,7 @@ struct Setting {
     glm::dvec3 eye = {0.6, 1.6, 2.6}, target = {-0.1, 0.35, 0};
     double fov_y_degrees = 30;
     float grey = 0.8f; // of the ball
+    enum class Seen { ball, shadow, nothing } seen = Seen::ball;
 };
 
 vdtree::Lighting lit(std::vector<LightSource> lights, double specular = 0) {
@@ -95,6 +99,20 @@ std::vector<Setting> settings() {
     narrow.inner_cosine = std::cos(0.03);
     narrow.outer_cosine = std::cos(0.04);
     all.push_back({"NearShadow", lit({narrow}), 0.5, {0, 40, 0}, {1.5, 0.4, 0}, {1.05, 0, 0}, 45, 0.001f});
+    // Out of the window: the edge of its shadow is seen, the middle of it alone, and nothing.
+    const auto beside = [&](const char* name, vdtree::Lighting lighting, glm::dvec3 target, Setting::Seen seen) {
+        all.push_back(
+            {name, std::move(lighting), 0.5, {0, 0.6, 0}, target + glm::dvec3(0, 1.5, 0.4), target, 20, 0.8f, seen});
+    };
+    const vdtree::Lighting slanting = lit({sun({1, 1, 0}, 0.7)});
+    const vdtree::Lighting bulb = lit({lamp({1.2, 1.8, 0}, 0.5, 1.5)});
+    beside("EdgeOfUnseen", slanting, {-1.3, 0, 0}, Setting::Seen::shadow);
+    beside("MiddleOfUnseen", slanting, {-0.85, 0, 0}, Setting::Seen::shadow);
+    beside("AwayFromUnseen", slanting, {4, 0, 0}, Setting::Seen::nothing);
+    beside("BulbEdgeOfUnseen", bulb, {-1.45, 0, 0}, Setting::Seen::shadow);
+    beside("BulbAwayFromUnseen", lit({lamp({2.4, 3, 0}, 0.5, 3)}), {4.5, 0, 1}, Setting::Seen::nothing);
+    beside("EdgesOfTwoLights", lit({sun({1, 1, 0}, 0.4), lamp({1.2, 1.8, 0}, 0.3, 1.5)}), {-1.35, 0, 0},
+           Setting::Seen::shadow);
     return all;
 }
 
@@ -122,10 +140,14 @@ protected:
 
     static perception::Image image_of(session::SceneRenderer& renderer, const std::vector<vdtree::Cut>& cuts,
                                       const vdtree::View& view, float background) {
+        return image_of(renderer, session::drawn_cuts(cuts), view, background);
+    }
+    static perception::Image image_of(session::SceneRenderer& renderer, const std::vector<session::DrawnCut>& cuts,
+                                      const vdtree::View& view, float background) {
         render::DrawOptions options;
         options.samples = samples;
         options.background = background;
-        const auto frame = renderer.draw(session::drawn_cuts(cuts), view, options);
+        const auto frame = renderer.draw(cuts, view, options);
         EXPECT_TRUE(frame) << frame.error().message;
         perception::Image image{frame->width, frame->height, 1, frame->luminance};
         for (float& value : image.values)
@@ -165,6 +187,28 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     if (setting.lighting.specular == 0) {
         EXPECT_LT(cut->stats.triangles, full->stats.triangles);
     }
+    if (setting.seen == Setting::Seen::nothing) {
+        EXPECT_LE(cut->stats.triangles, of_largest_nodes);
+    }
+    for (const session::Effect& effect : cut->effects) {
+        if (effect.name == "frustum culling") {
+            EXPECT_TRUE(effect.on) << effect.why;
+        }
+        if (effect.name == "shadows") {
+            const bool keeps_none = effect.why.find("as all do here") != std::string::npos;
+            EXPECT_TRUE(!keeps_none || setting.seen == Setting::Seen::nothing) << effect.why;
+        }
+    }
+    if (setting.seen == Setting::Seen::shadow) { // and not for the eye
+        EXPECT_GT(cut->stats.triangles, 0u);
+        EXPECT_LT(cut->stats.triangles, full->stats.triangles / 2);
+        const std::vector<vdtree::Cut> none = [&] {
+            std::vector<vdtree::Cut> cuts;
+            cuts.emplace_back(session->tree());
+            return cuts;
+        }();
+        EXPECT_GT(judged(none).visible_pixels, 0);
+    }
     RecordProperty("triangles", static_cast<int>(cut->stats.triangles));
     RecordProperty("of", static_cast<int>(full->stats.triangles));
     RecordProperty("ratio", std::to_string(judgement.max_ratio));
@@ -183,7 +227,43 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     RecordProperty("eyeratio", std::to_string(seen.max_ratio));
     EXPECT_GT(seen.visible_pixels, 0) << seen.max_ratio;
 }
-INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 6),
+// From where nothing of the shadow is seen past its edge and into its middle, frame by frame.
+TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
+    Setting setting = settings()[6];
+    ASSERT_STREQ(setting.name, "EdgeOfUnseen");
+    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(setting.grey), 1));
+    const vdtree::VertexTree ball = support::built(mesh), ground = support::built(floor(6, 48));
+    auto session = session::Session::create(scene_of(setting, ball, ground, true));
+    ASSERT_TRUE(session) << session.error().message;
+    auto renderer = session::SceneRenderer::create(context(), *session);
+    ASSERT_TRUE(renderer) << renderer.error().message;
+    session::Follower follower(*session);
+    session::Request request;
+    request.purpose = session::Purpose::picture;
+    std::vector<vdtree::Cut> full;
+    full.emplace_back(session->tree()).unfold_all();
+    constexpr int frames = 60, judged_every = 15;
+    for (int frame = 0; frame <= frames; ++frame) {
+        const double x = -4 + 3.0 * frame / frames;
+        setting.eye.x = setting.target.x = x;
+        const vdtree::View view = view_of(setting);
+        const auto report = follower.follow(view, request);
+        ASSERT_TRUE(report) << report.error().message;
+        if (frame == 0) {
+            EXPECT_LE(report->stats.triangles, of_largest_nodes);
+        }
+        if (frame % judged_every != 0) continue;
+        const auto difference =
+            perception::judge_modern(image_of(*renderer, full, view, session->background()),
+                                     image_of(*renderer, session::drawn_cuts(follower, 1), view, session->background()),
+                                     {.csf = perception::CsfModel::castle, .gain = perception::default_person.gain});
+        ASSERT_TRUE(difference);
+        EXPECT_EQ(difference->visible_pixels, 0) << "frame " << frame << ": " << difference->max_ratio;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 12),
                          [](const auto& of) { return std::string(settings()[of.param].name); });
 
 } // namespace

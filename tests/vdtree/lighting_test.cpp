@@ -453,6 +453,53 @@ TEST(Keeping, NodesNeverFoldFromWhereverTheyAreSeen) {
     EXPECT_FALSE(keeping(tree, *plain, std::span(none).first(1)));
 }
 
+TEST(Keeping, NodesStayOutOfFrustaAndBehindOccluders) {
+    const VertexTree tree = std::move(*build_tree(shapes::icosphere(4).view()));
+    const auto plain = displacement_criterion(tree, {}, 0.01);
+    ASSERT_TRUE(plain);
+    std::vector<std::uint64_t> some((tree.interior_count() + 63) / 64, 0);
+    for (NodeId node = tree.interior_count() / 2;; node = support::sound(tree).parents()[node]) {
+        some[node / 64] |= std::uint64_t{1} << (node % 64);
+        if (node == VertexTree::root()) break;
+    }
+    const auto kept = keeping(tree, *plain, some);
+    ASSERT_TRUE(kept);
+    // The mesh is behind the eye; and behind a sphere.
+    View view;
+    view.eye = {0, 0, 3};
+    view.target = {0, 0, 6};
+    Viewpoint away{.eye = eye_in_tree(tree, view, {})};
+    away.frusta = {frustum_of(tree, view)};
+    DistanceCriterion::Parts of_rings;
+    of_rings.switch_distance = {100};
+    const auto rings = DistanceCriterion::create(tree, of_rings);
+    ASSERT_TRUE(rings);
+    const auto kept_rings = keeping(tree, *rings, some);
+    ASSERT_TRUE(kept_rings);
+    Viewpoint behind{.eye = away.eye + glm::dvec3(0, 0, 7)};
+    behind.occluders = {{glm::vec3(glm::dvec3(0, 0, 5) + away.eye - glm::dvec3(0, 0, 3)), 4.0f}};
+    const auto triangles = [&](const DistanceCriterion& criterion, const Viewpoint& viewpoint) {
+        Cut cut(tree);
+        EXPECT_TRUE(cut.follow(criterion, viewpoint));
+        return cut.triangle_count();
+    };
+    EXPECT_EQ(triangles(*plain, away), 0u);
+    const Index least = triangles(*kept, away);
+    EXPECT_GT(least, 0u);
+    EXPECT_LT(least, tree.triangle_count());
+    EXPECT_EQ(triangles(*rings, behind), 0u);
+    EXPECT_EQ(triangles(*kept_rings, behind), least);
+    // One cut that follows through both finds the same.
+    Cut followed(tree);
+    Viewpoint towards = away;
+    view.target = {0, 0, 0};
+    towards.frusta = {frustum_of(tree, view)};
+    ASSERT_TRUE(followed.follow(*kept, towards));
+    EXPECT_GT(followed.triangle_count(), least);
+    ASSERT_TRUE(followed.follow(*kept, away));
+    EXPECT_EQ(followed.triangle_count(), least);
+}
+
 // Reaches that grow with contrast and luminance, about like those of an eye.
 DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {
     DistanceCriterion::Parts parts;

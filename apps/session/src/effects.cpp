@@ -151,7 +151,7 @@ Effect light_effect(const Sight& sight, const Decision& decision) {
             sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
 }
 
-Effect shadow_effect(const Sight& sight, const Decision& decision) {
+Effect shadow_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     if (!casts_shadows(sight)) return {"shadows", false, "no light casts a shadow: no pass"};
     const std::size_t casting = vdtree::shadow_lights(*sight.lighting), all = sight.lighting->lights.size();
     std::string why =
@@ -163,17 +163,25 @@ Effect shadow_effect(const Sight& sight, const Decision& decision) {
                     " does not look at them, so their edges may move visibly"};
     if (!decision.request.keeps_shadows)
         return {"shadows", true, why + "; without request.keeps_shadows their edges may move visibly"};
-    return {"shadows", true,
-            why + "; folds are tested with any of these hidden, and outlines that a light sees fold only where their "
-                  "shadows' edges move invisibly"};
+    why += "; folds are tested with any of these hidden, and outlines that a light sees fold only where their shadows' "
+           "edges move invisibly";
+    if (decision.request.purpose == Purpose::picture) why += " or out of the window";
+    if (facts && facts->outlines == 0) why += ": as all do here";
+    else if (facts)
+        why += ": " + grouped(facts->outlines) + " of " + grouped(sight.object.tree.interior_count()) +
+               " nodes are kept for that";
+    return {"shadows", true, why};
 }
+
+constexpr const char* but_shadows = ", but for outlines whose shadows would move visibly";
 
 Effect frustum_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
     if (decision.request.purpose == Purpose::mesh)
         return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
-    if (casts_shadows(sight)) return {"frustum culling", false, may_cast};
-    return {"frustum culling", true, "what lies outside of the window is folded"};
+    if (may_cast_anything(sight, decision)) return {"frustum culling", false, may_cast};
+    return {"frustum culling", true,
+            std::string("what lies outside of the window is folded") + (casts_shadows(sight) ? but_shadows : "")};
 }
 
 Effect culling_effect(const Sight& sight, Purpose purpose) {
@@ -231,10 +239,12 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
     if (folds_unseen(sight, decision))
         return {name, true,
                 std::string("what lies behind what this view shows is folded, by a picture of its depths") +
-                    (casts_shadows(sight) ? ", but for outlines whose shadows would move visibly" : "")};
+                    (casts_shadows(sight) ? but_shadows : "")};
     if (decision.hidden)
-        return {name, true, "what lies behind what an earlier picture showed is folded, for eyes near that one's"};
-    if (casts_shadows(sight)) return {name, false, may_cast};
+        return {name, true,
+                std::string("what lies behind what an earlier picture showed is folded, for eyes near that one's") +
+                    (casts_shadows(sight) ? but_shadows : "")};
+    if (may_cast_anything(sight, decision)) return {name, false, may_cast};
     if (!folds_hidden(sight, decision))
         return {name, false,
                 is_perceptual(decision) ? "nothing solid is looked at from outside"
@@ -242,7 +252,8 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
     if (!facts) return {name, true, "what is behind spheres inside the solid is folded"};
     if (facts->occluders == 0) return {name, false, "no sphere fits into the solid"};
     return {name, true,
-            "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded"};
+            "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded" +
+                (casts_shadows(sight) ? but_shadows : "")};
 }
 
 Effect masking_effect(const Sight& sight, const Decision& decision) {
@@ -280,7 +291,7 @@ std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, con
                                    motion_effect(sight, decision),        reach_effect(sight, decision),
                                    chroma_effect(sight, decision),        translucency_effect(sight, decision),
                                    texture_effect(sight, decision),       prelit_effect(sight),
-                                   light_effect(sight, decision),         shadow_effect(sight, decision),
+                                   light_effect(sight, decision),         shadow_effect(sight, decision, facts),
                                    frustum_effect(sight, decision),       culling_effect(sight, purpose),
                                    magnification_effect(sight, decision), distance_effect(decision, facts)};
     if (is_full(decision)) return effects;

@@ -16,6 +16,7 @@ struct CutFacts {
     double imperceptible_from_m = 0;
     bool is_complete = true;   // no time limit ended it
     std::size_t occluders = 0; // how many spheres could hide something
+    std::size_t outlines = 0;  // nodes that are kept for their shadows
 };
 
 // Without facts: as far as can be said before there is a cut.

@@ -183,26 +183,79 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
                : perception::error_distances(all, view, options);
 }
 
-Result<std::optional<perception::ShadowEdges>> edges_of(const Sight& sight, const Decision& decision, const Key& key) {
-    if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::optional<perception::ShadowEdges>();
+// Of all objects that are looked at alike.
+Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(const Sight& sight, const Decision& decision,
+                                                                const Key& key) {
+    if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::shared_ptr<const perception::ShadowEdges>();
+    // A highlight may be all there is on what is otherwise black.
+    const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
+    const SceneShadows::EdgesKey edges_key{key.width, key.height,           key.fov_y_degrees,
+                                           ambient,   key.farthest_gaze_px, key.csf};
+    SceneShadows& all = sight.scene_shadows;
+    if (all.edges && all.edges_key == edges_key) return all.edges;
     perception::FoldTestOptions options = test_options(sight, decision.request);
     if (key.farthest_gaze_px)
         options.gaze_px = glm::dvec2(sight.view.width * 0.5 + *key.farthest_gaze_px, sight.view.height * 0.5);
-    // A highlight may be all there is on what is otherwise black.
-    const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
     auto made = perception::ShadowEdges::create(sight.view, options, ambient);
     if (!made) return made.error();
-    return std::optional(std::move(*made));
+    all.edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
+    all.edges_key = edges_key;
+    return all.edges;
 }
 
-FrameBall in_frame(const WorldSphere& sphere, const Object& object) {
-    return {object.placement.to_mesh(sphere.centre) - object.tree.origin(), sphere.radius / object.placement.scale};
+vdtree::Lighting in_world(vdtree::Lighting lighting, const Object& object) {
+    const vdtree::Similarity& placement = object.placement;
+    for (vdtree::LightSource& light : lighting.lights) {
+        light.direction = glm::normalize(placement.rotation * light.direction);
+        light.position = placement.to_world(object.tree.origin() + light.position);
+        light.distance *= placement.scale;
+    }
+    return lighting;
+}
+
+std::vector<Standing> all_standing(const SceneShadows& all) {
+    std::vector<Standing> standing;
+    for (std::size_t i = 0; i < all.scene.objects.size(); ++i) {
+        const Object& object = all.scene.objects[i];
+        Standing one{&object, all.caches[i]->light_bounds.get()};
+        const bool shows_through = object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
+        one.hides_back_faces = !shows_through && object.tree.closedness() != vdtree::Closedness::open;
+        standing.push_back(one);
+    }
+    for (const Object& object : all.scene.backdrop) standing.push_back({&object});
+    return standing;
+}
+
+// Of lights that move: everywhere. To look at them anew in each frame takes longer than it spares.
+LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting, bool stands_still) {
+    LitReceivers lit{std::move(lighting), {}};
+    for (const vdtree::LightSource& light : lit.lighting.lights)
+        if (light.casts_shadow)
+            lit.of_lights.push_back(stands_still ? receivers.find_lit(light)
+                                                 : std::vector<bool>(receivers.balls().size(), true));
+    return lit;
+}
+
+// Where shadows count for a cut. Kept for views from nearby.
+std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& decision,
+                                            const std::shared_ptr<const perception::ShadowEdges>& edges) {
+    SceneShadows& all = sight.scene_shadows;
+    const vdtree::Lighting lighting = in_world(*sight.lighting, sight.object);
+    std::span<const vdtree::Plane> window;
+    if (decision.request.purpose == Purpose::picture) window = *sight.window;
+    if (all.reach && all.reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return all.reach;
+    if (!all.receivers) all.receivers.emplace(all_standing(all));
+    if (!all.lit || !is_alike(all.lit->lighting, lighting))
+        all.lit = lit_by(*all.receivers, lighting, sight.lights->stands_still());
+    const bool moves = all.reach && !all.reach->is_of(sight.view.eye, window); // the first view may be the only one
+    all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
+    return all.reach;
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
-    const bool window_only =
-        decision.request.purpose == Purpose::picture && !casts_shadows(sight) && !is_wholly_in_window(sight);
+    const bool window_only = decision.request.purpose == Purpose::picture && !may_cast_anything(sight, decision) &&
+                             !is_wholly_in_window(sight);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
@@ -237,44 +290,81 @@ bool is_same(const vdtree::View& a, const vdtree::View& b) {
 struct KeptCriterion {
     Key key;
     vdtree::DistanceCriterion criterion;
-    std::optional<perception::ShadowEdges> edges; // where lights cast shadows
+    std::shared_ptr<const perception::ShadowEdges> edges; // where lights cast shadows; else null
 };
 
 bool casts_shadows(const Sight& sight) { return sight.lighting && vdtree::shadow_lights(*sight.lighting) > 0; }
 
+bool may_cast_anything(const Sight& sight, const Decision& decision) {
+    return casts_shadows(sight) && !(is_perceptual(decision) && decision.request.keeps_shadows);
+}
+
 namespace {
 
+// Objects with one tree share all but what their own lights make of it.
+std::shared_ptr<const KeptCriterion>& criterion_of(const Sight& sight, const Key& key) {
+    return key.still_lights ? sight.lit_criterion : sight.cache.criterion;
+}
+
+// Of what may move unseen: so much is left to a moving eye before a criterion is made anew.
+constexpr double share_left_to_motion = 0.7;
+// More nodes than this share beyond those that have to be are not kept.
+constexpr double most_kept_too_many = 0.25;
+
 // Outlines whose shadows would move visibly, as of now in the sight's state. Whether they are others than before.
-bool find_shadowing_outlines(const Sight& sight, const std::shared_ptr<const KeptCriterion>& base, double threshold) {
+bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
+                             const std::shared_ptr<const KeptCriterion>& base) {
     const vdtree::VertexTree& tree = sight.object.tree;
     const vdtree::DistanceCriterion::Parts& parts = base->criterion.parts();
     const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
     const auto still = is_measured ? sight.lighting : nullptr;
+    const double threshold = decision.request.threshold;
     ShadowState& state = sight.shadow;
-    const bool is_new = state.of != base || state.lighting != still;
+    const bool is_new = state.of != base || state.lighting != still || state.threshold != threshold;
     if (is_new) {
-        state = {base, still, {}, 0, nullptr};
+        state = {base, still, {}, nullptr, threshold, {}, nullptr, nullptr};
         state.shifts = is_measured ? outline_shifts(tree, parts.silhouette_lengths, parts.facing, still.get())
                                    : outline_shifts(tree, tree.displacement(), {}, nullptr);
     }
-    const WorldSphere all = sphere_of_all(sight.object, sight.cache);
-    const double unseen = threshold * unseen_shift(*sight.lighting, *base->edges, in_frame(all, sight.object),
-                                                   in_frame(sight.scene_sphere, sight.object),
-                                                   vdtree::eye_in_tree(tree, sight.view, sight.object.placement));
-    const double before = state.limit;
-    state.limit = steady_limit(unseen, before);
-    return is_new || state.limit != before;
+    const auto reach = reach_of(sight, decision, base->edges);
+    if (!is_new && state.reach == reach) return false;
+    state.reach = reach;
+    if (!is_new) {
+        const auto needed = shadowing_outlines(sight.object, state.shifts, *reach, threshold);
+        const auto most = static_cast<std::size_t>((1 + most_kept_too_many) * static_cast<double>(count(needed)));
+        if (contains(state.kept, needed) && count(state.kept) <= most) return false;
+    }
+    const double share = reach->moves() ? share_left_to_motion : 1;
+    auto kept = shadowing_outlines(sight.object, state.shifts, *reach, share * threshold);
+    const bool is_other = is_new || kept != state.kept;
+    state.kept = std::move(kept);
+    return is_other;
 }
 
 // The criterion, and outlines kept whose shadows would move visibly.
 Result<std::shared_ptr<const vdtree::DistanceCriterion>>
-keep_outlines(const Sight& sight, const std::shared_ptr<const KeptCriterion>& base, double threshold) {
+keep_outlines(const Sight& sight, const Decision& decision, const std::shared_ptr<const KeptCriterion>& base) {
     ShadowState& state = sight.shadow;
-    if (!find_shadowing_outlines(sight, base, threshold) && state.criterion) return state.criterion;
-    auto kept = vdtree::keeping(sight.object.tree, base->criterion, beyond(state.shifts, state.limit));
+    if (!find_shadowing_outlines(sight, decision, base) && state.criterion) return state.criterion;
+    if (count(state.kept) == 0) {
+        state.criterion = {base, &base->criterion};
+        return state.criterion;
+    }
+    auto kept = vdtree::keeping(sight.object.tree, base->criterion, state.kept);
     if (!kept) return kept.error();
     state.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*kept));
     return state.criterion;
+}
+
+// What is hidden may cast shadows that are not. The same bits as long as nothing changes, so that nothing is tested again.
+std::shared_ptr<const std::vector<std::uint64_t>>
+without_kept(ShadowState& state, const std::shared_ptr<const std::vector<std::uint64_t>>& hidden) {
+    if (!hidden || count(state.kept) == 0) return hidden;
+    std::vector<std::uint64_t> left = *hidden;
+    for (std::size_t word = 0; word < left.size(); ++word) left[word] &= ~state.kept[word];
+    if (!state.hidden || *state.hidden != left)
+        state.hidden = std::make_shared<const std::vector<std::uint64_t>>(std::move(left));
+    return state.hidden;
 }
 
 } // namespace
@@ -311,7 +401,7 @@ const char* why_not_hidden(const Sight& sight, const Decision& decision) {
     const Request& request = decision.request;
     if (request.purpose == Purpose::mesh) return "the mesh may be looked at from elsewhere";
     if (!is_perceptual(decision)) return "only the perceptual fold tests know what a fold changes";
-    if (casts_shadows(sight) && request.keeps_shadows) return may_cast;
+    if (may_cast_anything(sight, decision)) return may_cast;
     if (sight.lighting && decision.test != FoldTest::error) return "under lights only the fold test error knows it";
     if (!request.hidden->holds_for(sight.view.eye)) return "the eye has gone beyond the reach of the last picture";
     return nullptr;
@@ -339,20 +429,25 @@ bool culls_back_faces(const Sight& sight) {
 }
 
 bool is_out_of_sight(const Sight& sight, const Decision& decision) {
-    if (decision.request.purpose != Purpose::picture || casts_shadows(sight)) return false;
+    if (decision.request.purpose != Purpose::picture || may_cast_anything(sight, decision)) return false;
     const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
     const glm::dvec3 away = sphere.centre - sight.view.eye;
     // Far more than planes and spheres in single floats are off by.
     const double margin = 1e-3 * sphere.radius + 1e-5 * glm::length(away);
-    return std::any_of(sight.window->begin(), sight.window->end(), [&](const vdtree::Plane& plane) {
+    const bool is_out = std::any_of(sight.window->begin(), sight.window->end(), [&](const vdtree::Plane& plane) {
         return glm::dot(plane.normal, away) < -(sphere.radius + margin);
     });
+    if (!is_out || !casts_shadows(sight)) return is_out;
+    const std::shared_ptr<const KeptCriterion>& last = criterion_of(sight, key_of(sight, decision));
+    const WorldSphere cast{sphere.centre, cast_radii * sphere.radius};
+    return last && last->key == key_of(sight, decision) && last->edges &&
+           std::isinf(reach_of(sight, decision, last->edges)->unseen_shift(cast));
 }
 
 // Extent and displacement look at supports, which do not contain all that a fold changes.
 bool folds_hidden(const Sight& sight, const Decision& decision) {
-    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && !casts_shadows(sight) &&
-           culls_back_faces(sight);
+    return decision.request.purpose == Purpose::picture && is_perceptual(decision) &&
+           !may_cast_anything(sight, decision) && culls_back_faces(sight);
 }
 
 bool folds_unseen(const Sight& sight, const Decision& decision) {
@@ -361,8 +456,8 @@ bool folds_unseen(const Sight& sight, const Decision& decision) {
 
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
-    // Objects with one tree share all but what their own lights make of it. What a view masks is of that view alone.
-    std::shared_ptr<const KeptCriterion>& last = key.still_lights ? sight.lit_criterion : sight.cache.criterion;
+    // What a view masks is of that view alone.
+    std::shared_ptr<const KeptCriterion>& last = criterion_of(sight, key);
     std::shared_ptr<const KeptCriterion> masked;
     if (decision.masking || !last || !(last->key == key)) {
         auto made = make_criterion(sight, decision, key);
@@ -376,9 +471,10 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
     if (!folds_unseen(sight, decision)) {
         if (!kept->edges || !decision.request.keeps_shadows) return recipe;
-        auto with_outlines = keep_outlines(sight, kept, decision.request.threshold);
+        auto with_outlines = keep_outlines(sight, decision, kept);
         if (!with_outlines) return with_outlines.error();
         recipe.criterion = std::move(*with_outlines);
+        recipe.viewpoint.hidden = without_kept(sight.shadow, recipe.viewpoint.hidden);
         return recipe;
     }
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
@@ -386,9 +482,9 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
     if (!without) return without.error();
     if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
-        find_shadowing_outlines(sight, kept, decision.request.threshold);
+        find_shadowing_outlines(sight, decision, kept);
         sight.shadow.criterion.reset();
-        without = vdtree::keeping(sight.object.tree, *without, beyond(sight.shadow.shifts, sight.shadow.limit));
+        without = vdtree::keeping(sight.object.tree, *without, sight.shadow.kept);
         if (!without) return without.error();
     }
     recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));

@@ -18,8 +18,9 @@ bool is_perceptual(const Decision& decision);
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision);
 
 // Why recipes are what they are.
-// Shadows of what is not seen may be: nothing folds for that then.
 bool casts_shadows(const Sight& sight);
+// Whether what is not seen may not fold: shadows of it may be seen, and nobody asks what they show.
+bool may_cast_anything(const Sight& sight, const Decision& decision);
 bool is_translucent(const Sight& sight);
 bool culls_back_faces(
     const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "session_state.h"
+#include "shadow_limit.h"
 
 namespace unseen::session {
 namespace {
@@ -210,6 +211,7 @@ void Follower::State::conclude(Report& report, const Prepared& prepared,
         facts.is_complete = stats[i].is_complete;
         if (decision.request.reasons && folds_hidden(sight, decision))
             facts.occluders = inner_spheres(sight.object, sight.cache).size();
+        if (decision.request.reasons && objects_[i].recipe) facts.outlines = count(sight.shadow.kept);
         if (decision.request.reasons) {
             for (Effect& effect : effects_of(sight, decision, facts)) {
                 effect.object = i;

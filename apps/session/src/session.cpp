@@ -122,14 +122,8 @@ Session::State::State(Scene scene_, Observer observer_, Messages messages_, floa
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
       still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
-      shadows_(scene.objects.size()) {
+      shadows_(scene.objects.size()), scene_shadows_{scene, caches} {
     share_caches();
-    bool is_first = true;
-    for (const std::vector<Object>* all : {&scene.objects, &scene.backdrop})
-        for (const Object& object : *all) {
-            sphere_ = is_first ? world_sphere(object) : united(sphere_, world_sphere(object));
-            is_first = false;
-        }
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;
     for (const Object& object : scene.objects) nodes += object.tree.interior_count();
@@ -265,7 +259,7 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], shadows_[i], sphere_, observer, view,
+        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], shadows_[i], scene_shadows_, observer, view,
                           scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }

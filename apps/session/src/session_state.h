@@ -63,7 +63,7 @@ private:
     std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
     std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
     std::vector<ShadowState> shadows_;                                  // likewise
-    WorldSphere sphere_;                                                // of all objects and of the backdrop
+    SceneShadows scene_shadows_;
     bool is_crowded_ = false;
     std::vector<vdtree::Plane> window_;                   // of the last look
     std::vector<vdtree::LuminanceRange> backdrop_ranges_; // of luminance, as they are lit

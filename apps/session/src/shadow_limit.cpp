@@ -1,8 +1,7 @@
 #include "shadow_limit.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <bit>
 
 #include <glm/geometric.hpp>
 
@@ -10,69 +9,17 @@ namespace unseen::session {
 namespace {
 
 using vdtree::LightSource;
+using vdtree::NodeId;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-// Of distances from a light, within which its shadows count as alike: as large as at the far end, as bright as at the
-// near one.
-constexpr double distance_step = 1.25;
 // What shadows fall on moves as well, by no more than what may move of what casts them.
 constexpr double share_of_casters = 0.5;
-constexpr double steps_per_octave = 2;
-constexpr double least_kept = 1.0 / 3;
-
-double distance_to_segment(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b) {
-    const glm::dvec3 along = b - a;
-    const double squared = glm::dot(along, along);
-    const double t = squared > 0 ? std::clamp(glm::dot(p - a, along) / squared, 0.0, 1.0) : 0;
-    return glm::length(p - (a + t * along));
-}
-
-double of_directional(const LightSource& light, const perception::ShadowEdges& edges, const FrameBall& object,
-                      const FrameBall& scene, glm::dvec3 eye) {
-    const double reach = glm::length(object.centre - scene.centre) + scene.radius + object.radius;
-    const double nearest =
-        distance_to_segment(eye, object.centre, object.centre - reach * light.direction) - object.radius;
-    return nearest > 0 ? nearest * edges.widest_unseen(light.intensity) : 0;
-}
-
-double of_placed(const LightSource& light, const perception::ShadowEdges& edges, const FrameBall& object,
-                 const FrameBall& scene, glm::dvec3 eye) {
-    const glm::dvec3 way = object.centre - light.position;
-    const double middle = glm::length(way), first = middle - object.radius;
-    if (!(first > 0)) return 0;
-    const glm::dvec3 along = way / middle;
-    const double last = std::max(glm::length(light.position - scene.centre) + scene.radius, middle + object.radius);
-    // At a distance r, the cone around the object is within so much of r from its axis.
-    const double spread = 2 * std::sin(std::asin(std::min(object.radius / middle, 1.0)) / 2);
-    double least = infinity;
-    for (double from = first; from < last; from *= distance_step) {
-        const double to = std::min(from * distance_step, last), ratio = light.distance / from;
-        const double nearest =
-            distance_to_segment(eye, light.position + from * along, light.position + to * along) - to * spread;
-        if (!(nearest > 0)) return 0;
-        least = std::min(least, nearest * edges.widest_unseen(light.intensity * ratio * ratio) * first / to);
-    }
-    return least;
-}
+constexpr NodeId looked_at_together = 16; // nodes with one limit: what lies behind all of them
 
 } // namespace
 
-double unseen_shift(const vdtree::Lighting& lighting, const perception::ShadowEdges& edges, const FrameBall& object,
-                    const FrameBall& scene, glm::dvec3 eye) {
-    double least = infinity;
-    for (const LightSource& light : lighting.lights) {
-        if (!light.casts_shadow) continue;
-        const double own = light.kind == LightSource::Kind::directional
-                               ? of_directional(light, edges, object, scene, eye)
-                               : of_placed(light, edges, object, scene, eye);
-        least = own >= 0 ? std::min(least, own) : 0; // 0 for NaN
-    }
-    return share_of_casters * least;
-}
-
 std::vector<float> outline_shifts(const vdtree::VertexTree& tree, std::span<const float> moved,
                                   std::span<const vdtree::NormalSlabs> facing, const vdtree::Lighting* lighting) {
-    const vdtree::NodeId nodes = tree.interior_count();
+    const NodeId nodes = tree.interior_count();
     const auto is_outline = [&](vdtree::NodeId node) {
         const vdtree::NodeBounds& bounds = tree.bounds()[node];
         if (!lighting || facing.empty() || (bounds.flags & vdtree::irregular_ring)) return true;
@@ -99,19 +46,47 @@ std::vector<float> outline_shifts(const vdtree::VertexTree& tree, std::span<cons
     return shifts;
 }
 
-double steady_limit(double limit, double before) {
-    if (!(limit > 0)) return 0;
-    if (!std::isfinite(limit)) return limit;
-    if (before <= limit && before >= least_kept * limit) return before;
-    return std::exp2(std::floor(std::log2(limit) * steps_per_octave) / steps_per_octave);
+std::vector<std::uint64_t> shadowing_outlines(const Object& object, std::span<const float> shifts,
+                                              const ShadowReach& reach, double share) {
+    constexpr NodeId word = 64;
+    const vdtree::VertexTree& tree = object.tree;
+    std::vector<std::uint64_t> kept((tree.interior_count() + word - 1) / word, 0);
+    struct Subtree {
+        NodeId node, end;
+    };
+    std::vector<Subtree> open = {{vdtree::VertexTree::root(), tree.interior_count()}};
+    while (!open.empty()) {
+        const Subtree subtree = open.back();
+        open.pop_back();
+        const vdtree::Sphere ring = tree.bounds()[subtree.node].ring;
+        const WorldSphere sphere{object.placement.to_world(tree.origin() + glm::dvec3(ring.centre)),
+                                 object.placement.scale * cast_radii * static_cast<double>(ring.radius)};
+        const double limit = share * share_of_casters * reach.unseen_shift(sphere) / object.placement.scale;
+        const auto moves = [&](NodeId node) { return !(static_cast<double>(shifts[node]) <= limit); };
+        if (!moves(subtree.node)) continue; // nor does anything below
+        const bool is_small = subtree.end - subtree.node <= looked_at_together;
+        for (NodeId node = subtree.node; node < (is_small ? subtree.end : subtree.node + 1); ++node)
+            if (moves(node)) kept[node / word] |= std::uint64_t{1} << (node % word);
+        if (is_small) continue;
+        const std::size_t first = open.size();
+        tree.for_each_child(subtree.node, [&](NodeId child) {
+            if (tree.is_leaf(child)) return;
+            if (open.size() > first) open.back().end = child;
+            open.push_back({child, subtree.end});
+        });
+    }
+    return kept;
 }
 
-std::vector<std::uint64_t> beyond(std::span<const float> shifts, double limit) {
-    constexpr std::size_t word = 64;
-    std::vector<std::uint64_t> bits((shifts.size() + word - 1) / word, 0);
-    for (std::size_t i = 0; i < shifts.size(); ++i)
-        if (!(static_cast<double>(shifts[i]) <= limit)) bits[i / word] |= std::uint64_t{1} << (i % word);
-    return bits;
+bool contains(std::span<const std::uint64_t> all, std::span<const std::uint64_t> some) {
+    return std::equal(all.begin(), all.end(), some.begin(), some.end(),
+                      [](std::uint64_t a, std::uint64_t b) { return (b & ~a) == 0; });
+}
+
+std::size_t count(std::span<const std::uint64_t> bits) {
+    std::size_t sum = 0;
+    for (const std::uint64_t word : bits) sum += static_cast<std::size_t>(std::popcount(word));
+    return sum;
 }
 
 } // namespace unseen::session

@@ -13,6 +13,8 @@
 #include <session/scene.h>
 #include <session/session.h>
 
+#include "shadow_reach.h"
+
 namespace unseen::session {
 
 struct KeptCriterion; // see fold_test.cpp
@@ -28,13 +30,34 @@ struct ObjectCache {
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
+// Of all objects of a scene whose lights cast shadows.
+struct SceneShadows {
+    const Scene& scene;
+    const std::vector<std::shared_ptr<ObjectCache>>& caches;
+    std::optional<ShadowReceivers> receivers = {};
+    std::optional<LitReceivers> lit = {}; // for the last lights
+    // For views like this one; and what it is of.
+    struct EdgesKey {
+        int width = 0, height = 0;
+        double fov_y_degrees = 0, ambient = 0;
+        std::optional<double> farthest_gaze_px = {};
+        std::shared_ptr<const perception::CsfTable> csf = {};
+        bool operator==(const EdgesKey&) const = default;
+    } edges_key = {};
+    std::shared_ptr<const perception::ShadowEdges> edges = {};
+    std::shared_ptr<const ShadowReach> reach = {}; // of the last views
+};
+
 // Of an object whose lights cast shadows.
 struct ShadowState {
     std::shared_ptr<const KeptCriterion> of = {};                    // what all of this is of
     std::shared_ptr<const vdtree::Lighting> lighting = {};           // likewise, where lights stand still
     std::vector<float> shifts = {};                                  // see outline_shifts()
-    double limit = 0;                                                // mesh units: outlines that move farther are kept
+    std::shared_ptr<const ShadowReach> reach = {};                   // for which `kept` is enough,
+    double threshold = 0;                                            // with this threshold
+    std::vector<std::uint64_t> kept = {};                            // see shadowing_outlines()
     std::shared_ptr<const vdtree::DistanceCriterion> criterion = {}; // that keeps them
+    std::shared_ptr<const std::vector<std::uint64_t>> hidden = {};   // of the last view, without what is kept
 };
 
 struct Sight {
@@ -42,7 +65,7 @@ struct Sight {
     ObjectCache& cache;
     std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
     ShadowState& shadow;                                 // likewise
-    const WorldSphere& scene_sphere;                     // of all objects and of the backdrop
+    SceneShadows& scene_shadows;
     const Observer& observer;
     const vdtree::View& view;
     const calibration::LightRig* lights;              // null: the tree's own light

@@ -117,8 +117,8 @@ private:
     ObjectId object_id_;
 };
 
-// The criterion with nodes that never fold, also where they face away; only frusta and occluders fold them. A bit each, of
-// whole words, lowest first; a parent of one should be one.
+// The criterion with nodes that never fold: not where they face away, nor out of all frusta, nor behind occluders. A bit
+// each, of whole words, lowest first; a parent of one should be one.
 // The cut of a criterion with lights must not be one of a viewpoint that shows nothing at all: there, only outlines keep
 // their nodes. Fails where sizes are not the tree's. Cost: a copy of the criterion.
 Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,

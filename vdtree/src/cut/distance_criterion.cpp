@@ -14,6 +14,7 @@
 #include <vdtree/internal/contrast_classes.h>
 #include <vdtree/internal/errors.h>
 
+#include "cut/kernel/fold_kernel.h"
 #include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
@@ -230,45 +231,35 @@ Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const V
 Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,
                                   std::span<const std::uint64_t> kept) {
     constexpr NodeId word = 64;
-    constexpr float longest = 1e30f; // mesh units: times any switch distance beyond every eye
     const NodeId nodes = tree.interior_count();
     if (criterion.interior_count() != nodes || kept.size() != (nodes + word - 1) / word)
         return invalid_argument("The criterion, or what is to be kept, is not of this tree.");
-    const auto is_kept = [&](NodeId node) { return (kept[node / word] >> (node % word) & 1) != 0; };
     DistanceCriterion::Parts parts = criterion.parts();
-    if (parts.lit) { // no classes of their own: outlines of the scene's contrast, from wherever they are looked at
-        if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
-        const bool has_lengths = !parts.silhouette_lengths.empty(), has_facing = !parts.facing.empty();
-        parts.silhouette_lengths.resize(nodes);
-        parts.facing.resize(nodes);
-        for (NodeId node = 0; node < nodes; ++node) {
-            const NodeBounds& bounds = tree.bounds()[node];
-            if (!has_lengths)
-                parts.silhouette_lengths[node] = parts.spheres == DistanceCriterion::Spheres::ring
-                                                     ? bounds.ring.radius
-                                                     : tree.support_spheres()[node].radius;
-            if (!has_facing) parts.facing[node] = bounds.slabs;
-            if (!is_kept(node)) continue;
-            parts.silhouette_lengths[node] = longest;
-            parts.facing[node] = NormalSlabs::everything();
-        }
-        return DistanceCriterion::create(tree, std::move(parts));
-    }
     const std::size_t rows = parts.switch_distance.size() / parts.eccentricity_bins;
     constexpr std::size_t most_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
-    if (rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
+    if (!parts.lit && rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
+    if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
+    if (parts.silhouette_lengths.empty())
+        for (NodeId node = 0; node < nodes; ++node)
+            parts.silhouette_lengths.push_back(parts.spheres == DistanceCriterion::Spheres::ring
+                                                   ? tree.bounds()[node].ring.radius
+                                                   : tree.support_spheres()[node].radius);
     if (parts.facing.empty())
         for (NodeId node = 0; node < nodes; ++node) parts.facing.push_back(tree.bounds()[node].slabs);
-    parts.classes.resize(nodes); // empty: the first row for all
-    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
-                                 DistanceCriterion::always_visible);
-    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
+    // With lights there are no classes: those that are kept are outlines of the scene's contrast.
+    if (!parts.lit) {
+        parts.classes.resize(nodes); // empty: the first row for all
+        parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
+                                     DistanceCriterion::always_visible);
+        if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
+    }
     const auto everywhere = static_cast<std::uint16_t>(rows);
-    for (NodeId node = 0; node < nodes; ++node)
-        if (is_kept(node)) { // whatever faces the eye
-            parts.classes[node] = {everywhere, everywhere};
-            parts.facing[node] = NormalSlabs::everything();
-        }
+    for (NodeId node = 0; node < nodes; ++node) {
+        if ((kept[node / word] >> (node % word) & 1) == 0) continue;
+        parts.silhouette_lengths[node] = kept_length;
+        parts.facing[node] = NormalSlabs::everything(); // whatever faces the eye
+        if (!parts.lit) parts.classes[node] = {everywhere, everywhere};
+    }
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

@@ -20,6 +20,9 @@ namespace unseen::vdtree {
 inline constexpr std::size_t kernel_lanes = 16;
 // Mesh units; stands for 0 where a division or an infinite switch distance would make no number of it.
 inline constexpr float least_length = 1e-30f;
+// Mesh units: an outline of this length, beyond every eye times any switch distance, marks what keeping() keeps. Frusta
+// and occluders do not fold it. In a mesh that is as large by itself, they fold nothing so.
+inline constexpr float kept_length = 1e30f;
 
 // What all nodes are measured from, and by.
 struct KernelView {

@@ -96,11 +96,12 @@ UNSEEN_INLINE Measures measures_of(const KernelView& view, const Nodes& of) {
     m.silhouette =
         view.nobody ? m.interior : max_of(m.interior, distances(view, of.silhouette_row, m.bin, of.silhouette_length));
 
-    m.height = height(view, m.to_eye) + of.radius;
+    const Ints is_kept = of.silhouette_length >= all(kept_length); // wherever it is
+    m.height = is_kept ? all(huge) : height(view, m.to_eye) + of.radius;
     m.uncovered = all(huge);
     // Far nodes fold anyway.
     if (!view.occluders.empty() && (view.everybody || any(m.gap < m.silhouette)))
-        m.uncovered = uncovered(view, m, of.radius);
+        m.uncovered = is_kept ? m.uncovered : uncovered(view, m, of.radius);
 
     m.is_inside = (m.height >= 0) & (m.uncovered >= 0);
     m.is_near = m.gap < m.interior;
