@@ -40,7 +40,6 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
         return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
     if (sight.lighting && sight.lighting->specular > 0)
         return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
-    if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
     if (sight.lighting && sight.is_crowded)
         return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
@@ -68,10 +67,6 @@ Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, boo
     if (chroma)
         return invalid_argument(
             "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
-    if (test == FoldTest::error)
-        return invalid_argument(
-            "request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
-            "load.without_textures.");
     return {};
 }
 

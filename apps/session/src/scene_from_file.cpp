@@ -83,7 +83,7 @@ private:
         auto read = read_part(part);
         if (!read) return read.error();
         if (!*read) return {};
-        const bool measures = measures_ && part.folds && (*read)->mesh.texture.texels.empty();
+        const bool measures = measures_ && part.folds;
         const std::string key = mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, measures);
         if (cache_.is_on()) {
             auto kept = cache_.find(key);

@@ -23,8 +23,8 @@ using namespace measurement;
 
 class BiasFinder {
 public:
-    BiasFinder(const SoundTree& tree, std::span<FoldError> errors)
-        : tree_(tree), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
+    BiasFinder(const SoundTree& tree, const TexturedLight& light, std::span<FoldError> errors)
+        : tree_(tree), of_texture_(light), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
           parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
 
     void run() {
@@ -63,6 +63,9 @@ private:
     }
 
     float mean_luminance(const Triangle& t) const {
+        if (of_texture_.texture)
+            return of_texture_.mean({luminance_[t[0]], luminance_[t[1]], luminance_[t[2]]},
+                                    {tree_.uvs()[t[0]], tree_.uvs()[t[1]], tree_.uvs()[t[2]]});
         return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
     }
 
@@ -207,6 +210,7 @@ private:
     };
 
     const SoundTree& tree_;
+    TexturedLight of_texture_;
     std::span<FoldError> errors_;
     NodeId interior_;
     std::span<const Unorm16> luminance_;
@@ -221,6 +225,8 @@ private:
 
 } // namespace
 
-void find_luminance_bias(const SoundTree& tree, std::span<FoldError> errors) { BiasFinder(tree, errors).run(); }
+void find_luminance_bias(const SoundTree& tree, const TexturedLight& light, std::span<FoldError> errors) {
+    BiasFinder(tree, light, errors).run();
+}
 
 } // namespace unseen::perception
