@@ -72,13 +72,14 @@ struct FoldTexture {
     // Contrasts of gratings over the local mean, by how many octaves their waves are narrower than what changes is wide;
     // narrower ones count as the last.
     float contrast[texture_octaves] = {};
-    float mean = 0; // of the texture's luminance on the mesh around the node, 0..1
+    float mean = 0;  // of the texture's luminance on the mesh around the node, 0..1
+    float slide = 0; // of the texture over the surface, in the mean over some cells: as a share of the width, 0..1
 
     bool operator==(const FoldTexture&) const = default;
 };
-static_assert(sizeof(FoldTexture) == (texture_octaves + 1) * sizeof(float));
+static_assert(sizeof(FoldTexture) == (texture_octaves + 2) * sizeof(float));
 inline bool is_sound(const FoldTexture& texture) {
-    bool sound = texture.mean >= 0 && texture.mean <= 1;
+    bool sound = texture.mean >= 0 && texture.mean <= 1 && texture.slide >= 0 && texture.slide <= 1;
     for (const float contrast : texture.contrast) sound &= contrast >= 0 && contrast <= most_texture_contrast;
     return sound;
 }

@@ -596,6 +596,9 @@ private:
         (void)worst;
         FoldTexture& found = found_[0].textures[node];
         found.mean = scratch.density.mean;
+        const float slide_in_widths = is_dense ? scratch.slide / (scratch.density.least * width) : 1.0f;
+        found.slide = std::max(found.slide, slide_in_widths < 1 ? slide_in_widths : 1.0f);
+        if (getenv("DBG")) fprintf(stderr,"node %u leaves %u width %g ring %g slide %g aside %g worst %g shift %g lv %zu dens %g %g amp %g %g\n", node, leaf_end_[node]-first_leaf_[node], width, tree_.bounds()[node].ring.radius, scratch.slide, aside, worst.slide, record.shift, scratch.level[0], scratch.density.least, scratch.density.most, record.farthest, worst.luminance[0]);
         const std::size_t measured_from = *std::min_element(scratch.level.begin(), scratch.level.end());
         for (std::size_t level = 0; level < texture.level_count(); ++level) {
             const float texel = std::exp2(static_cast<float>(level)); // in the texture's own
@@ -995,7 +998,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         tbb::parallel_for(std::size_t{0}, trees.size(), [&](std::size_t i) {
             MeasuredFolds& found = all.found[i];
             all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, found.textures, FoldModel());
-            find_luminance_bias(all.in_units[i], all.lights[i], all.errors[i]);
+            find_luminance_bias(all.in_units[i], all.lights[i], found.textures, all.errors[i]);
         });
     });
     if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
