@@ -173,7 +173,7 @@ UNSEEN_INLINE float find_largest_mean(Worktop& on) {
     return largest_of(most);
 }
 
-// The largest absolute values of the difference in each band, times the weights of their cells; null: 1.
+// The largest absolute values of the difference in each band, times the weights of its cells; null: 1.
 template <class Floats>
 UNSEEN_INLINE void split(Worktop& on, const float* weights, float* largest) {
     Framed *low = &on.difference, *lower = &on.seen; // take turns
@@ -185,7 +185,7 @@ UNSEEN_INLINE void split(Worktop& on, const float* weights, float* largest) {
         for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
             Floats amplitude =
                 magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
-            if (weights) amplitude *= floats_at<Floats>(weights + y * side + x);
+            if (weights) amplitude *= floats_at<Floats>(weights + (band * side + y) * side + x);
             most = most < amplitude ? amplitude : most;
         });
         largest[band] = largest_of(most);
@@ -198,7 +198,7 @@ struct Compared {
     const float *mesh_height, *folded_height;
     std::array<const float*, count> mesh_luminance, folded_luminance;
     std::size_t compared; // of the luminances
-    const float* weights; // of cells; null: 1
+    const float* weights; // by band and cell; null: 1
 };
 
 // Puts by how much one differs from the other where both are seen on the worktop.
@@ -336,7 +336,7 @@ float FoldPictureOf<count>::wavelength(std::size_t band) const {
 
 template <std::size_t count>
 typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference(std::size_t compared_count,
-                                                                           const Cells* weights) const {
+                                                                           const BandCells* weights) const {
     static const std::array<float, bands> gains = [] {
         std::array<float, bands> all;
         for (std::size_t band = 0; band < bands; ++band) all[band] = static_cast<float>(band_gain(band));
@@ -345,7 +345,7 @@ typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference(std::
     const auto& [mesh, folded] = pictures_;
     Difference difference{};
     Compared<count> compared{
-        mesh.height.data(), folded.height.data(), {}, {}, compared_count, weights ? weights->data() : nullptr};
+        mesh.height.data(), folded.height.data(), {}, {}, compared_count, weights ? weights->front().data() : nullptr};
     for (std::size_t i = 0; i < count; ++i) {
         compared.mesh_luminance[i] = mesh.luminance[i].data();
         compared.folded_luminance[i] = folded.luminance[i].data();
@@ -357,7 +357,7 @@ typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference(std::
 }
 
 template <std::size_t count>
-void FoldPictureOf<count>::find_means(Layer layer, const Cells& values, Cells& means) const {
+void FoldPictureOf<count>::find_means(Layer layer, const Cells& values, BandCells& means) const {
     const Cells& height = pictures_[static_cast<std::size_t>(layer)].height;
     Worktop& on = worktop;
     for (std::size_t cell = 0; cell < height.size(); ++cell) {
@@ -365,11 +365,16 @@ void FoldPictureOf<count>::find_means(Layer layer, const Cells& values, Cells& m
         on.difference.row(cell / side)[cell % side] = seen ? values[cell] : 0.0f;
         on.seen.row(cell / side)[cell % side] = seen ? 1.0f : 0.0f;
     }
-    smooth<vdtree::Float4>(on.difference, 1, on.half_smooth, on.smooth);
-    smooth<vdtree::Float4>(on.seen, 1, on.half_smooth, on.mean_seen);
-    for (std::size_t cell = 0; cell < height.size(); ++cell) {
-        const float share = on.mean_seen.row(cell / side)[cell % side];
-        means[cell] = share > least_seen ? on.smooth.row(cell / side)[cell % side] / share : -1.0f;
+    for (std::size_t band = 0; band < bands; ++band) {
+        const std::size_t step = std::size_t{1} << band;
+        for (Framed* const plane : {&on.difference, &on.seen}) // the next band's
+            smooth<vdtree::Float4>(*plane, step, on.half_smooth, *plane);
+        smooth<vdtree::Float4>(on.difference, step, on.half_smooth, on.smooth);
+        smooth<vdtree::Float4>(on.seen, step, on.half_smooth, on.mean_seen);
+        for (std::size_t cell = 0; cell < height.size(); ++cell) {
+            const float share = on.mean_seen.row(cell / side)[cell % side];
+            means[band][cell] = share > least_seen ? on.smooth.row(cell / side)[cell % side] / share : -1.0f;
+        }
     }
 }
 

@@ -61,9 +61,10 @@ public:
         // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
         float shift;
     };
-    // Of the first `compared` luminances alone, each difference times its cell's weight; null: 1.
+    // Of the first `compared` luminances alone, each band's difference times its cell's weight; null: 1.
     using Cells = std::array<float, side * side>;
-    Difference difference(std::size_t compared = count, const Cells* weights = nullptr) const;
+    using BandCells = std::array<Cells, bands>;
+    Difference difference(std::size_t compared = count, const BandCells* weights = nullptr) const;
     float wavelength(std::size_t band) const; // mesh units
 
     // What lies in the cells, to be changed before it is compared.
@@ -73,9 +74,9 @@ public:
     };
     Picture& picture(Layer layer) { return pictures_[static_cast<std::size_t>(layer)]; }
     static bool is_seen(float height) { return height > -std::numeric_limits<float>::infinity(); }
-    // Means over some cells, as outlines are seen: of the values where a layer is seen, by cell, negative where too
-    // little of it is; and the largest of the values where both are.
-    void find_means(Layer layer, const Cells& values, Cells& means) const;
+    // The means that bands are differences from, of values where a layer is seen; negative where too little of it is.
+    void find_means(Layer layer, const Cells& values, BandCells& means) const;
+    // The largest mean over some cells, as outlines are seen, of values where both layers are.
     float largest_mean(const Cells& values) const;
 
 private:

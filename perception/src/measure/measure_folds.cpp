@@ -376,7 +376,7 @@ private:
         // With a texture:
         TextureDensity density;
         std::array<std::size_t, picture_sizes.size()> level = {}; // that pictures show
-        std::array<typename FoldPicture::Cells, picture_sizes.size()> weights;
+        std::array<typename FoldPicture::BandCells, picture_sizes.size()> weights;
         float middle = 1; // of the texture's luminance in the ring
         float slide = 0;  // texels, as pictures show it, in the mean over some cells
 
@@ -560,8 +560,9 @@ private:
             typename FoldPicture::Cells textures;
             shade(picture, FoldPicture::Layer::mesh, scratch.level[size], &textures);
             picture.find_means(FoldPicture::Layer::mesh, textures, scratch.weights[size]);
-            for (float& weight : scratch.weights[size])
-                weight = weight >= 0 ? over_local_mean(scratch.middle, weight) : 1.0f;
+            for (typename FoldPicture::Cells& of_band : scratch.weights[size])
+                for (float& weight : of_band)
+                    weight = weight >= 0 ? over_local_mean(scratch.middle, weight) : 1.0f;
         }
     }
     // Of the folded surface's.
