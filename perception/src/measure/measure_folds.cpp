@@ -1037,7 +1037,8 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
     tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        if (!measured->texture) stages = find_stages(measured->in_units.front(), errors);
+        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
+                             errors);
     });
     std::vector<std::uint8_t> stage_of(errors.size());
     for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;

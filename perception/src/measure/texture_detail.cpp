@@ -104,6 +104,21 @@ float TextureDetail::at(std::size_t level, glm::vec2 uv) const {
     return bilinear(levels_[std::min(level, levels_.size() - 1)], static_cast<double>(uv.x), static_cast<double>(uv.y));
 }
 
+float TextureDetail::nearest(std::size_t number, glm::vec2 uv) const {
+    const Level& level = levels_[std::min(number, levels_.size() - 1)];
+    const float x = uv.x * static_cast<float>(level.width), y = uv.y * static_cast<float>(level.height);
+    constexpr auto farthest = static_cast<float>(farthest_coordinate);
+    if (!(std::abs(x) < farthest) || !(std::abs(y) < farthest)) return levels_.back().means[0];
+    const auto whole = [](float at) {
+        const auto towards_zero = static_cast<std::int64_t>(at);
+        return towards_zero - (static_cast<float>(towards_zero) > at);
+    };
+    const std::int64_t i = whole(x), j = whole(y);
+    if (i >= 0 && j >= 0 && i < level.width && j < level.height)
+        return level.means[static_cast<std::size_t>(j) * level.width + static_cast<std::size_t>(i)];
+    return mean_at(level, i, j);
+}
+
 std::size_t TextureDetail::level_of(float texels) const {
     std::size_t level = 0;
     while (level + 1 < levels_.size() && std::exp2(static_cast<float>(level)) < texels) ++level;

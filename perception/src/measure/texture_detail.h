@@ -24,6 +24,8 @@ public:
 
     // The mean luminance of a level's texels, bilinear, as renderers filter; beyond 0..1 as the texture repeats.
     float at(std::size_t level, glm::vec2 uv) const;
+    // Likewise, but of the nearest texel.
+    float nearest(std::size_t level, glm::vec2 uv) const;
     // The level whose texels are the first to be no narrower than so many of the texture's own.
     std::size_t level_of(float texels) const;
 
