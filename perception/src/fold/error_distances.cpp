@@ -691,7 +691,7 @@ Result<void> validate(const FoldModel& m) {
     for (const double factor :
          {m.neighbourhood, m.needed_by_areas, m.needed_by_outlines, m.needed_by_borders, m.peak_of_shift,
           m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
-          m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+          m.amplitude_of_shift_mean, m.longest_ring, m.between_directions, m.contrast_of_textures})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
     for (std::size_t i = 0; i < m.needed.size(); ++i)

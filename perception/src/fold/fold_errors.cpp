@@ -75,7 +75,8 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
                amplitude_of_point_mean = static_cast<float>(model.amplitude_of_point_mean),
                longest_ring = static_cast<float>(model.longest_ring),
                contact_reach = static_cast<float>(model.contact_reach),
-               least_sine = static_cast<float>(model.least_sine);
+               least_sine = static_cast<float>(model.least_sine),
+               contrast_of_textures = static_cast<float>(model.contrast_of_textures);
     std::vector<FoldError> errors(records.size());
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         const FoldRecord& record = records[node];
@@ -93,7 +94,10 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.luminance = std::max(error.luminance, record.largest_luminance);
             error.wide_luminance = std::max(error.wide_luminance, amplitude_of_point_mean * record.mean_luminance);
         }
-        if (!textures.empty()) find_texture(textures[node], tree.ring_luminance()[node], error);
+        if (!textures.empty()) {
+            find_texture(textures[node], tree.ring_luminance()[node], error);
+            error.luminance *= contrast_of_textures, error.wide_luminance *= contrast_of_textures;
+        }
         error.extent = std::max(error.extent, record.extent);
         error.outline = std::max(error.outline, record.border);
         error.facing |= facing[node].facing;
