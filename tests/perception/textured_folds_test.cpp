@@ -30,22 +30,22 @@ UvBox box(glm::vec2 a, glm::vec2 b) {
 }
 
 TEST(TextureDetail, IsThatOfTheTexture) {
-    const Texture texture = textures::checkerboard(64, 32, 8, 0, 255);
+    const Texture texture = textures::checkerboard(128, 64, 16, 0, 255);
     const TextureDetail detail(texture.view());
-    ASSERT_EQ(detail.level_count(), 7u);
-    EXPECT_FLOAT_EQ(detail.at(0, {4.0f / 64, 4.0f / 32}), 0);
-    EXPECT_FLOAT_EQ(detail.at(0, {12.0f / 64, 4.0f / 32}), 1);
-    EXPECT_FLOAT_EQ(detail.at(0, {1 + 12.0f / 64, 4.0f / 32 - 3}), 1); // it repeats
-    EXPECT_FLOAT_EQ(detail.nearest(0, {1 + 12.0f / 64, 4.0f / 32 - 3}), 1);
-    EXPECT_NEAR(detail.at(6, {0.3f, 0.3f}), 0.5f, 1e-6f);
+    ASSERT_EQ(detail.level_count(), 8u);
+    EXPECT_FLOAT_EQ(detail.at(0, {8.0f / 128, 8.0f / 64}), 0);
+    EXPECT_FLOAT_EQ(detail.at(0, {24.0f / 128, 8.0f / 64}), 1);
+    EXPECT_FLOAT_EQ(detail.at(0, {1 + 24.0f / 128, 8.0f / 64 - 3}), 1); // it repeats
+    EXPECT_FLOAT_EQ(detail.nearest(0, {1 + 24.0f / 128, 8.0f / 64 - 3}), 1);
+    EXPECT_NEAR(detail.at(7, {0.3f, 0.3f}), 0.5f, 1e-6f);
     EXPECT_EQ(detail.level_of(1), 0u);
     EXPECT_EQ(detail.level_of(1.1f), 1u);
-    EXPECT_EQ(detail.level_of(1e9f), 6u);
+    EXPECT_EQ(detail.level_of(1e9f), 7u);
     // Within a field nothing varies; its borders do.
-    EXPECT_LT(detail.contrast(0, box({3.9f / 64, 3.9f / 32}, {4.1f / 64, 4.1f / 32})), 1e-6f);
-    EXPECT_GT(detail.contrast(0, box({7.5f / 64, 3.9f / 32}, {8.5f / 64, 4.1f / 32})), 0.3f);
-    EXPECT_GT(detail.contrast(3, box({0, 0}, {1, 1})), 0.3f);
-    EXPECT_FLOAT_EQ(detail.contrast(6, box({0, 0}, {1, 1})), 0);
+    EXPECT_LT(detail.contrast(0, box({7.9f / 128, 7.9f / 64}, {8.1f / 128, 8.1f / 64})), 1e-6f);
+    EXPECT_GT(detail.contrast(0, box({15.5f / 128, 7.9f / 64}, {16.5f / 128, 8.1f / 64})), 0.3f);
+    EXPECT_GT(detail.contrast(4, box({0, 0}, {1, 1})), 0.3f);
+    EXPECT_FLOAT_EQ(detail.contrast(7, box({0, 0}, {1, 1})), 0);
     // A box within another shows no more.
     for (const Wrap wrap : {Wrap::repeat, Wrap::clamp, Wrap::mirror}) {
         Texture wrapped = textures::noise(37, 21, 4);
@@ -93,33 +93,36 @@ TEST(TexturedFolds, SlideWhereTheTextureIsUneven) {
     Mesh even = textures::textured_grid(20, texture), squeezed = even;
     for (glm::vec2& uv : squeezed.uvs) uv.x = uv.x * uv.x;
     const VertexTree of_even = measured(even), of_squeezed = measured(squeezed);
-    const auto inside = [](const VertexTree& tree) { // not at the border, where corners are cut
+    // Of pairs of vertices away from the border, where corners are cut.
+    const auto inside = [](const VertexTree& tree) {
         float most = 0;
         const auto all = tree.attribute<FoldTexture>(texture_name);
+        const SoundTree sound = *SoundTree::of(tree);
         for (NodeId node = 0; node < tree.interior_count(); ++node)
-            if (!(tree.bounds()[node].flags & irregular_ring)) most = std::max(most, all[node].slide);
+            if (sound.leaf_end()[node] - sound.first_leaf()[node] == 2 &&
+                !(tree.bounds()[sound.parents()[node]].flags & irregular_ring))
+                most = std::max(most, all[node].slide);
         return most;
     };
     EXPECT_LT(inside(of_even), 1e-3f);
-    EXPECT_GT(inside(of_squeezed), 0.01f);
+    EXPECT_GT(inside(of_squeezed), 3e-3f);
     EXPECT_GT(largest_contrast(of_squeezed), 0.5f);
 }
 
-// A texture that is white everywhere changes nothing, and one that is grey everywhere only scales.
-TEST(TexturedFolds, OfAnEvenTextureAreThoseOfTheMesh) {
+// A texture that is white everywhere changes nothing.
+TEST(TexturedFolds, OfAWhiteTextureAreThoseOfTheMesh) {
     Mesh mesh = shapes::bumpy_sphere(4, 0.02);
-    const VertexTree plain = measured(mesh, false);
     for (const glm::dvec3& p : mesh.positions) mesh.uvs.emplace_back(p.x, p.y);
     mesh.texture = textures::checkerboard(16, 16, 16, 255, 255);
-    const VertexTree textured = measured(mesh, false);
+    const VertexTree textured = measured(mesh, false), plain = *measure_folds(*textured.untextured(), 2);
+    EXPECT_LT(largest_contrast(textured), 1e-5f);
     const auto before = plain.attribute<FoldRecord>(record_name), after = textured.attribute<FoldRecord>(record_name);
     ASSERT_EQ(before.size(), after.size());
-    int differ = 0; // the builder looks at texture coordinates, too, and clusters others
+    // Without colours or a texture, surfaces are a light grey.
+    const float brighter = textured.luminance_range().hi / plain.luminance_range().hi;
     for (std::size_t i = 0; i < before.size(); ++i)
-        differ += !(std::abs(before[i].amplitudes[0][1] - after[i].amplitudes[0][1]) < 1e-3f);
-    if (plain.node_count() == textured.node_count() && std::ranges::equal(plain.positions(), textured.positions()))
-        EXPECT_EQ(differ, 0);
-    EXPECT_LT(largest_contrast(textured), 1e-5f);
+        for (std::size_t band = 0; band < measurement::picture_bands; ++band)
+            EXPECT_NEAR(brighter * before[i].amplitudes[0][band], after[i].amplitudes[0][band], 1e-3f) << i;
 }
 
 TEST(TexturedFolds, StayInFiles) {
