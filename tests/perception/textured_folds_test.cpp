@@ -152,6 +152,30 @@ TEST(TexturedFolds, StayInFiles) {
         }
 }
 
+// A red and a cyan of one luminance: on red vertices one of them is black.
+TEST(TexturedFolds, CountAsTheirVerticesTintThem) {
+    Texture texture = textures::checkerboard(64, 64, 4, 0, 255);
+    for (Texel& t : texture.texels) t = t[0] > 0 ? Texel{255, 0, 0, 255} : Texel{0, 139, 139, 255};
+    const TextureDetail plain(texture.view()), red(texture.view(), glm::vec3(0.4f, 0, 0));
+    const UvBox all = box({0, 0}, {1, 1});
+    EXPECT_LT(plain.contrast(0, all), 0.1f);
+    EXPECT_GT(red.contrast(0, all), 0.5f);
+    Mesh mesh = textures::textured_sphere(3, texture);
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(0.4f, 0, 0, 1));
+    mesh.colours[7] *= 0.5f; // darker, of the same hue
+    mesh.colours[7].a = 1;
+    EXPECT_TRUE(knows_texture(support::built(mesh)));
+    EXPECT_GT(largest_contrast(measured(mesh)), 0.3f);
+    mesh.colours[7] = glm::vec4(0, 0.4f, 0, 1);
+    const VertexTree of_two = support::built(mesh);
+    EXPECT_FALSE(knows_texture(of_two));
+    EXPECT_TRUE(knows_texture(*of_two.untextured()));
+    const auto refused = measure_folds(of_two);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("several hues"), std::string::npos) << refused.error().message;
+    EXPECT_FALSE(LitFolds::measure(of_two));
+}
+
 TEST(TexturedFolds, DoNotDependOnTheThreads) {
     const VertexTree tree =
         support::built(textures::with_seams(textures::textured_sphere(4, textures::noise(64, 64, 2))));

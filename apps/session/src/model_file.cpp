@@ -46,7 +46,7 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     if (!tree) return tree;
     if (const std::string hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
-    const bool measures = options.measures && tree->interior_count() <= most_measured;
+    const bool measures = options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
     return measures ? measured(*tree, 0, options.messages.progress) : std::move(tree);
 }
 

@@ -10,6 +10,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <perception/fold_measurement.h>
 #include <vdtree/builder.h>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_format.h>
@@ -100,7 +101,8 @@ private:
         building.prelit = options_.prelit;
         auto tree = vdtree::build_tree((*read)->mesh.view(), building);
         if (!tree) return in_file(name_, tree.error());
-        if (measures && tree->interior_count() <= most_measured) tree = measured(*tree);
+        if (measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree))
+            tree = measured(*tree);
         if (!tree) return in_file(name_, tree.error());
         const std::lock_guard lock(mutex_);
         ++built_;

@@ -17,6 +17,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <vdtree/colour.h>
 #include <vdtree/internal/scaled_geometry.h>
 #include <vdtree/internal/simd.h>
 #include <vdtree/internal/texture_bounds.h>
@@ -936,6 +937,28 @@ private:
 
 } // namespace
 
+namespace {
+
+// The colour that all vertices have but for their brightness; none where they have several. Black ones have any.
+std::optional<glm::vec3> common_tint(const VertexTree& tree) {
+    constexpr float alike = 1e-3f; // of channels, over the luminance: far less than a texture's luminance is wrong by
+    std::optional<glm::vec3> tint;
+    for (const glm::vec4& colour : tree.colours()) {
+        const glm::vec3 rgb(colour);
+        const auto luminance = static_cast<float>(rec709_luminance(glm::dvec3(rgb)));
+        if (!(luminance > 0)) continue;
+        const glm::vec3 own = rgb / luminance;
+        if (!tint) tint = own;
+        for (int k = 0; k < 3; ++k)
+            if (!(std::abs(own[k] - (*tint)[k]) <= alike)) return std::nullopt;
+    }
+    return tint ? *tint : glm::vec3(1);
+}
+
+} // namespace
+
+bool knows_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
+
 bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldRecord>(record_name).empty(); }
 
 std::span<const float> measurement_settings() noexcept { return settings; }
@@ -983,7 +1006,13 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         if (is_textured) found.textures.resize(nodes);
     }
     all.errors.resize(trees.size());
-    if (is_textured) all.texture = std::make_shared<const TextureDetail>(trees.front().texture());
+    if (is_textured) {
+        const auto tint = common_tint(trees.front());
+        if (!tint)
+            return Error{ErrorCode::unsupported, "What folds change of a texture over vertices of several hues is not "
+                                                 "measured: take another fold test, or the tree without its texture."};
+        all.texture = std::make_shared<const TextureDetail>(trees.front().texture(), *tint);
+    }
     for (std::size_t i = 0; i < trees.size(); ++i) all.lights.push_back({all.texture.get(), dark[i]});
     const auto measure_these = is_textured ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
                                : trees.size() == 1 ? measure_all<1, false>

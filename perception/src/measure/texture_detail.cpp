@@ -5,6 +5,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <vdtree/colour.h>
+
 #include "measure/fold_stages.h"
 
 namespace unseen::perception {
@@ -22,12 +24,17 @@ std::uint32_t tiles_of(std::uint32_t texels) { return (texels + tile_side - 1) /
 
 } // namespace
 
-TextureDetail::TextureDetail(const TextureView& texture)
+TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
     : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
     Level base{width_, height_, std::vector<float>(texture.texels.size()), {}};
+    const glm::dvec3 of_tint(tint);
+    const double own = rec709_luminance(of_tint);
     tbb::parallel_for(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
-        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i)
-            base.means[i] = static_cast<float>(linear_luminance(texture.texels[i]));
+        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
+            const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
+            base.means[i] = static_cast<float>(own > 0 ? rec709_luminance(of_tint * texel) / own
+                                                       : linear_luminance(texture.texels[i]));
+        }
     });
     levels_.push_back(std::move(base));
     while (levels_.back().width > 1 || levels_.back().height > 1) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
 #include <vdtree/texture.h>
 
@@ -16,8 +17,9 @@ namespace unseen::perception {
 // patterns of about four of its texels a wave.
 class TextureDetail {
 public:
-    // Of a valid texture that is not empty. Cost: some passes over the texels; 6 bytes of memory for each.
-    explicit TextureDetail(const vdtree::TextureView& texture);
+    // Of a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count). Cost:
+    // some passes over the texels; 6 bytes of memory for each.
+    explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
 
     std::size_t level_count() const { return levels_.size(); }
     glm::vec2 size() const { return glm::vec2(width_, height_); } // texels

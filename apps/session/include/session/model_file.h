@@ -24,7 +24,8 @@ struct LoadOptions {
     // A mesh's colours and textures are light that is baked in, not reflectance: see vdtree::BuildOptions. Not of trees.
     bool prelit = false;
     double unit_metres = 1; // world units (metres) a mesh unit; above 0. Of Scene::load()
-    // Of a mesh: measure what folds change, too (see measured()), where its tree has at most two million folds.
+    // Of a mesh: measure what folds change, too (see measured()), where its tree has at most two million folds
+    // and `error` knows its texture (perception::knows_texture()).
     bool measures = true;
     CacheOptions cache = {}; // where trees of meshes, and measurements, are kept for the next time
     Messages messages = {};
