@@ -76,9 +76,9 @@ Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, boo
         return invalid_argument(
             "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
     if (test == FoldTest::error && !knows_texture(sight))
-        return invalid_argument(
-            "request.fold_test = error does not measure textures over vertices of several hues: use request.fold_test = "
-            "luebke-hallen-safe, or add load.without_textures.");
+        return invalid_argument("request.fold_test = error does not measure textures over vertices of several hues: "
+                                "use request.fold_test = "
+                                "luebke-hallen-safe, or add load.without_textures.");
     return {};
 }
 

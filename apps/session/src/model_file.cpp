@@ -46,7 +46,8 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     if (!tree) return tree;
     if (const std::string hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
-    const bool measures = options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
+    const bool measures =
+        options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
     return measures ? measured(*tree, 0, options.messages.progress) : std::move(tree);
 }
 
@@ -178,7 +179,8 @@ std::string hint_at_baked_light(const vdtree::VertexTree& tree) {
 }
 
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads, const Progress& progress) {
-    if (!tree.texture().empty()) return perception::measure_folds(tree, threads, progress); // its light is the texture's
+    if (!tree.texture().empty())
+        return perception::measure_folds(tree, threads, progress); // its light is the texture's
     const auto conserved = vdtree::conserve_light(tree);
     if (!conserved) return conserved.error();
     return perception::measure_folds(*conserved, threads, progress);

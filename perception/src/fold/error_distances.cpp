@@ -497,9 +497,8 @@ double spread_of_vertices(const vdtree::SoundTree& tree, NodeId node) {
     const vdtree::LuminanceRange drawn = tree.ring_luminance()[node], texture = tree.ring_texture()[node];
     if (!(texture.hi > 0)) return 0;
     const NodeId around = node > 0 ? tree.parents()[node] : node;
-    const float darkest = texture.lo >= least_texture
-                              ? drawn.lo / texture.lo
-                              : vdtree::LuminanceRange(tree.support_luminance()[around]).lo;
+    const float darkest = texture.lo >= least_texture ? drawn.lo / texture.lo
+                                                      : vdtree::LuminanceRange(tree.support_luminance()[around]).lo;
     return static_cast<double>(std::max(drawn.hi - darkest * texture.hi, 0.0f));
 }
 
@@ -524,8 +523,8 @@ bool find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& option
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
         const double edge = levels.difference_in_cdm2(lit.edge_of_shadow(node)),
-                     moved = std::max(textured ? levels.difference_in_cdm2(spread_of_vertices(*lit.tree, node)) : hi - lo,
-                                      edge);
+                     moved = std::max(
+                         textured ? levels.difference_in_cdm2(spread_of_vertices(*lit.tree, node)) : hi - lo, edge);
         const auto change = [&](float luminance, double distance) {
             if (tree.bounds()[node].flags & vdtree::translucent_ring)
                 return brightest - darkest; // anything may show through

@@ -53,8 +53,7 @@ void find_texture(const FoldTexture& texture, LuminanceRange drawn, FoldError& e
     for (std::size_t octaves = 0; octaves < texture_octaves; ++octaves) {
         const float amplitude = texture.contrast[octaves] * middle;
         error.luminance = std::max(error.luminance, amplitude);
-        error.wide_luminance =
-            std::max(error.wide_luminance, amplitude * std::exp2(-2 * static_cast<float>(octaves)));
+        error.wide_luminance = std::max(error.wide_luminance, amplitude * std::exp2(-2 * static_cast<float>(octaves)));
     }
 }
 

@@ -353,8 +353,8 @@ class StageFinder {
 public:
     StageFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
                 std::span<FoldError> errors)
-        : tree_(tree), light_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()), parents_(tree.parents()),
-          triangles_(tree.triangles().begin(), tree.triangles().end()) {
+        : tree_(tree), light_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()),
+          parents_(tree.parents()), triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (NodeId& corner : t) corner += interior_;
         for (std::size_t i = 0; i < direction_count; ++i) cameras_.push_back(camera(tree.bounding_sphere(), i));

@@ -183,8 +183,7 @@ UNSEEN_INLINE void split(Worktop& on, const float* weights, float* largest) {
         smooth<Floats>(*lower, step, on.half_smooth, on.smooth);
         Floats most{};
         for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
-            Floats amplitude =
-                magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
+            Floats amplitude = magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
             if (weights) amplitude *= floats_at<Floats>(weights + (band * side + y) * side + x);
             most = most < amplitude ? amplitude : most;
         });

@@ -46,7 +46,8 @@ constexpr auto settings = [] {
     return all;
 }();
 constexpr std::string_view lit_record_name = "lit_folds", lit_facing_name = "lit_facing",
-                           lit_albedo_name = "lit_albedo", lit_texture_name = "lit_texture", lit_settings_name = "lit_measurement";
+                           lit_albedo_name = "lit_albedo", lit_texture_name = "lit_texture",
+                           lit_settings_name = "lit_measurement";
 
 // What a fold changes of a luminance: of FoldRecord.
 struct Shades {
@@ -164,7 +165,7 @@ glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
 struct LitFolds::State {
     std::vector<LitRecord> folds; // by interior node, as the others
     std::vector<FoldFacing> facing;
-    std::vector<Shades> albedo; // empty: the same everywhere
+    std::vector<Shades> albedo;        // empty: the same everywhere
     std::vector<FoldTexture> textures; // of textured trees; else empty
     LightBounds bounds;
 };
@@ -257,11 +258,13 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
                      "What folds change of highlights is not measured, for these follow the eye."};
     if (state_->folds.size() != tree.interior_count())
         return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
-    const auto lit = tree.shaded([&](NodeId node) {
-        return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
-                                                glm::dvec3(glm::vec3(tree.normals()[node])),
-                                                static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
-    }, true);
+    const auto lit = tree.shaded(
+        [&](NodeId node) {
+            return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
+                                                    glm::dvec3(glm::vec3(tree.normals()[node])),
+                                                    static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
+        },
+        true);
     if (!lit) return lit.error();
 
     std::vector<Lighting> alone; // each light by itself, of white
@@ -301,8 +304,7 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
         set(widest, widest + uneven);
         const LuminanceRange range = lit->support_luminance()[node];
         float middle = std::max((range.lo + range.hi) / 2, least_luminance);
-        if (!state_->textures.empty())
-            middle = std::max(middle * state_->textures[node].mean, least_luminance);
+        if (!state_->textures.empty()) middle = std::max(middle * state_->textures[node].mean, least_luminance);
         fold.bias = combined([&](const Shades& s) { return brightest * s.bias; }) / middle;
     });
     return with_records(*lit, {std::move(folds), state_->facing, state_->textures});

@@ -25,8 +25,9 @@ class BiasFinder {
 public:
     BiasFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
                std::span<FoldError> errors)
-        : tree_(tree), of_texture_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
-          parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
+        : tree_(tree), of_texture_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()),
+          luminance_(tree.luminance()), parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_),
+          found_(interior_) {}
 
     void run() {
         order();

@@ -279,11 +279,11 @@ class Measurer {
 
 public:
     Measurer(std::span<const SoundTree> trees, std::span<const TexturedLight> lights, std::span<MeasuredFolds> found)
-        : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()), leaf_end_(tree_.leaf_end()),
-          parents_(tree_.parents()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
-          support_(tree_.support_spheres()), interior_(tree_.interior_count()), of_leaf_(tree_),
-          border_(tree_, of_leaf_), crossing_(interior_), contacts_(find_contacts(trees)), witnesses_(interior_),
-          luminance_span_(interior_), most_changed_(interior_) {
+        : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()),
+          leaf_end_(tree_.leaf_end()), parents_(tree_.parents()), first_triangle_(tree_.first_triangle()),
+          triangles_(tree_.triangles()), support_(tree_.support_spheres()), interior_(tree_.interior_count()),
+          of_leaf_(tree_), border_(tree_, of_leaf_), crossing_(interior_), contacts_(find_contacts(trees)),
+          witnesses_(interior_), luminance_span_(interior_), most_changed_(interior_) {
         for (NodeId node = 0; node < interior_; ++node) {
             for (std::size_t i = 0; i < luminances; ++i) {
                 const PackedRange support = trees[i].support_luminance()[node];
@@ -562,8 +562,7 @@ private:
             shade(picture, FoldPicture::Layer::mesh, scratch.level[size], &textures);
             picture.find_means(FoldPicture::Layer::mesh, textures, scratch.weights[size]);
             for (typename FoldPicture::Cells& of_band : scratch.weights[size])
-                for (float& weight : of_band)
-                    weight = weight >= 0 ? over_local_mean(scratch.middle, weight) : 1.0f;
+                for (float& weight : of_band) weight = weight >= 0 ? over_local_mean(scratch.middle, weight) : 1.0f;
         }
     }
     // Of the folded surface's.
@@ -572,11 +571,11 @@ private:
                    &folded = picture.picture(FoldPicture::Layer::folded);
         typename FoldPicture::Cells slides;
         for (std::size_t cell = 0; cell < slides.size(); ++cell) {
-            const bool are_seen =
-                FoldPicture::is_seen(mesh.height[cell]) && FoldPicture::is_seen(folded.height[cell]);
-            slides[cell] = are_seen ? slide_between(mesh.luminance[u_channel][cell], mesh.luminance[v_channel][cell],
-                                                    folded.luminance[u_channel][cell], folded.luminance[v_channel][cell])
-                                    : 0.0f;
+            const bool are_seen = FoldPicture::is_seen(mesh.height[cell]) && FoldPicture::is_seen(folded.height[cell]);
+            slides[cell] = are_seen
+                               ? slide_between(mesh.luminance[u_channel][cell], mesh.luminance[v_channel][cell],
+                                               folded.luminance[u_channel][cell], folded.luminance[v_channel][cell])
+                               : 0.0f;
         }
         scratch.slide = std::max(scratch.slide, picture.largest_mean(slides));
         shade(picture, FoldPicture::Layer::folded, scratch.level[size], nullptr);
@@ -600,7 +599,13 @@ private:
         found.mean = scratch.density.mean;
         const float slide_in_widths = is_dense ? scratch.slide / (scratch.density.least * width) : 1.0f;
         found.slide = std::max(found.slide, slide_in_widths < 1 ? slide_in_widths : 1.0f);
-        if (getenv("DBG")) fprintf(stderr,"node %u leaves %u width %g ring %g slide %g aside %g worst %g shift %g lv %zu dens %g %g amp %g %g\n", node, leaf_end_[node]-first_leaf_[node], width, tree_.bounds()[node].ring.radius, scratch.slide, aside, worst.slide, record.shift, scratch.level[0], scratch.density.least, scratch.density.most, record.farthest, worst.luminance[0]);
+        if (getenv("DBG"))
+            fprintf(
+                stderr,
+                "node %u leaves %u width %g ring %g slide %g aside %g worst %g shift %g lv %zu dens %g %g amp %g %g\n",
+                node, leaf_end_[node] - first_leaf_[node], width, tree_.bounds()[node].ring.radius, scratch.slide,
+                aside, worst.slide, record.shift, scratch.level[0], scratch.density.least, scratch.density.most,
+                record.farthest, worst.luminance[0]);
         const std::size_t measured_from = *std::min_element(scratch.level.begin(), scratch.level.end());
         for (std::size_t level = 0; level < texture.level_count(); ++level) {
             const float texel = std::exp2(static_cast<float>(level)); // in the texture's own
@@ -610,8 +615,8 @@ private:
             if (!(slide > 0)) continue;
             const float contrast = 2 * std::min(1.0f, slide / texel) * texture.contrast(level, box);
             const float octaves = wave > 0 ? std::floor(std::log2(width / wave)) : 0.0f;
-            const auto finer = static_cast<std::size_t>(
-                std::clamp(octaves, 0.0f, static_cast<float>(texture_octaves - 1)));
+            const auto finer =
+                static_cast<std::size_t>(std::clamp(octaves, 0.0f, static_cast<float>(texture_octaves - 1)));
             found.contrast[finer] = std::max(found.contrast[finer], std::min(contrast, most_texture_contrast));
         }
     }
@@ -683,8 +688,8 @@ private:
                         t1 = texture.at(scratch.level[0], {there[u_channel], there[v_channel]});
             const float weight = over_local_mean(scratch.middle, (t0 + t1) / 2);
             for (std::size_t k = 0; k < luminances; ++k)
-                found.luminance[k] = weight * std::abs(lights_[k].with_texture(here[k], t0) -
-                                                       lights_[k].with_texture(there[k], t1));
+                found.luminance[k] =
+                    weight * std::abs(lights_[k].with_texture(here[k], t0) - lights_[k].with_texture(there[k], t1));
         } else {
             for (std::size_t k = 0; k < luminances; ++k) found.luminance[k] = std::abs(here[k] - there[k]);
         }
@@ -893,7 +898,7 @@ private:
     const SoundTree& tree_;
     std::span<const TexturedLight> lights_; // by tree, with a texture
     std::span<MeasuredFolds> found_;        // by tree
-    std::vector<Point> points_;      // of nodes
+    std::vector<Point> points_;             // of nodes
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
     std::span<const Index> first_triangle_;
@@ -1014,7 +1019,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         all.texture = std::make_shared<const TextureDetail>(trees.front().texture(), *tint);
     }
     for (std::size_t i = 0; i < trees.size(); ++i) all.lights.push_back({all.texture.get(), dark[i]});
-    const auto measure_these = is_textured ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
+    const auto measure_these = is_textured         ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
                                : trees.size() == 1 ? measure_all<1, false>
                                : trees.size() == 3 ? measure_all<3, false>
                                                    : measure_all<4, false>;
@@ -1066,8 +1071,8 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
     tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
-                             errors);
+        stages =
+            find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures, errors);
     });
     std::vector<std::uint8_t> stage_of(errors.size());
     for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
@@ -1075,8 +1080,7 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
 }
 
 Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::span<const Shading> shadings,
-                                                   std::span<const float> dark, int threads,
-                                                   const Progress& progress) {
+                                                   std::span<const float> dark, int threads, const Progress& progress) {
     std::vector<VertexTree> shaded;
     for (const Shading& luminance : shadings) {
         auto as_shaded = tree.shaded(luminance, !tree.texture().empty());

@@ -25,8 +25,7 @@ using Shading = Callback<float(vdtree::NodeId)>;
 // same for all, so they share what is measured of lengths, and where surfaces touch. By shading. Precondition: one,
 // three or four of them; of a textured tree one or four. `dark`: by shading, what it is where a texture is black.
 Result<std::vector<MeasuredFolds>> measure_records(const vdtree::VertexTree& tree, std::span<const Shading> shadings,
-                                                   std::span<const float> dark, int threads,
-                                                   const Progress& progress);
+                                                   std::span<const float> dark, int threads, const Progress& progress);
 
 // The tree with these as measure_folds() keeps them, and no stages.
 Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured);

@@ -166,8 +166,9 @@ float TextureDetail::contrast(std::size_t number, const UvBox& box) const {
             const Tiles& tiles = level.tiles[k];
             for (std::int64_t j = y.first >> k; j <= y.last >> k; ++j)
                 for (std::int64_t i = x.first >> k; i <= x.last >> k; ++i)
-                    largest =
-                        std::max(largest, tiles.largest[static_cast<std::size_t>(j) * tiles.width + static_cast<std::size_t>(i)]);
+                    largest = std::max(
+                        largest,
+                        tiles.largest[static_cast<std::size_t>(j) * tiles.width + static_cast<std::size_t>(i)]);
         }
     return largest;
 }

@@ -19,8 +19,8 @@ float TexturedLight::mean(const std::array<float, 3>& luminance, const std::arra
     const glm::vec2 low = glm::min(glm::min(uv[0], uv[1]), uv[2]), high = glm::max(glm::max(uv[0], uv[1]), uv[2]),
                     texels = (high - low) * texture->size();
     const float side = std::max(texels.x, texels.y);
-    const int parts =
-        static_cast<int>(std::clamp(std::ceil(side / texels_of_part), static_cast<float>(fewest_parts), static_cast<float>(most_parts)));
+    const int parts = static_cast<int>(
+        std::clamp(std::ceil(side / texels_of_part), static_cast<float>(fewest_parts), static_cast<float>(most_parts)));
     const auto count = static_cast<float>(parts);
     const std::size_t level = texture->level_of(side / count);
     float sum = 0;
