@@ -328,8 +328,9 @@ std::string quoted(const std::string& text) {
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) {
     std::vector<std::string> models = options.models;
     std::optional<MadeScenes> made;
-    if (models.empty()) {
-        models = installed_meshes();
+    const bool is_default = models.empty();
+    if (is_default) models = installed_meshes();
+    if (is_default || options.has_scenes) {
         made.emplace();
         auto scenes = made->make(options.scene_triangles);
         if (!scenes) return scenes.error();

@@ -11,6 +11,7 @@ namespace unseen::app {
 
 struct AccuracyBenchOptions {
     std::vector<std::string> models = {}; // meshes, trees and scenes; none: what is installed, and made scenes
+    bool has_scenes = false;              // the made ones, too, where there are models
     double seconds = 45;                  // for each model's ways to fold
     int samples = 64;                     // of pictures that are judged
     int window_px = 512;                  // of scenes

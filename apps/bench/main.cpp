@@ -468,6 +468,7 @@ Command accuracy_command(CLI::App& app) {
             "Meshes, trees and scenes (default: the meshes that are installed, and the scenes of 'unseen scene "
             "make')")
         ->type_name("MODEL");
+    verb->add_flag("--scenes", a->options.has_scenes, "Besides MODEL, the scenes of 'unseen scene make'");
     verb->add_option("--csv", a->csv, "One line a point")->type_name("FILE.csv");
     verb->add_option("--html", a->html, "A page with plots, for browsers; it needs no other file")
         ->type_name("FILE.html");
