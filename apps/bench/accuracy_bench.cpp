@@ -347,7 +347,9 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
     };
     if (auto ok = add(csf_points(options.repeats)); !ok) return ok.error();
     for (const std::string& file : models) {
-        auto scene = session::Scene::load(file);
+        session::LoadOptions load;
+        load.as = session::LoadAs::automatic;
+        auto scene = session::Scene::load(file, load);
         if (!scene) return scene.error();
         const bool is_scene = scene->is_of_file();
         auto session = session::Session::create(std::move(*scene));

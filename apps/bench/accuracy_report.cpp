@@ -9,7 +9,7 @@
 namespace unseen::app {
 namespace {
 
-std::string escaped(const std::string& text) {
+std::string html_text(const std::string& text) {
     std::string out;
     for (const char c : text) {
         if (c == '<') out += "&lt;";
@@ -21,7 +21,9 @@ std::string escaped(const std::string& text) {
     return out;
 }
 
-constexpr double width = 760, height = 340, left = 70, right = 20, top = 16, bottom = 46; // pixels
+// Pixels: of plots, and of the margins around their axes.
+constexpr double plot_width = 760, plot_height = 340, margin_left = 70, margin_right = 20, margin_top = 16,
+                 margin_bottom = 46;
 
 // A logarithmic axis with room for 0 at its beginning.
 struct Scale {
@@ -56,25 +58,26 @@ struct Scale {
 
 std::string text_at(double x, double y, const std::string& text, const char* anchor = "start", const char* more = "") {
     return "<text x=\"" + rounded(x, 5) + "\" y=\"" + rounded(y, 5) + "\" text-anchor=\"" + anchor + "\"" + more + ">" +
-           escaped(text) + "</text>";
+           html_text(text) + "</text>";
 }
 
 std::string plot_of(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
     std::vector<double> times, errors;
     for (const AccuracyPoint& p : points) times.push_back(p.time), errors.push_back(p.error);
-    const Scale x(times, left, width - right), y(errors, height - bottom, top);
-    std::string svg = "<svg viewBox=\"0 0 " + rounded(width, 4) + " " + rounded(height, 4) +
+    const Scale x(times, margin_left, plot_width - margin_right), y(errors, plot_height - margin_bottom, margin_top);
+    std::string svg = "<svg viewBox=\"0 0 " + rounded(plot_width, 4) + " " + rounded(plot_height, 4) +
                       "\" role=\"img\" xmlns=\"http://www.w3.org/2000/svg\">";
     for (const double tick : x.ticks())
-        svg += "<path class=\"grid\" d=\"M" + rounded(x.at(tick), 5) + " " + rounded(top, 4) + "V" +
-               rounded(height - bottom, 5) + "\"/>" +
-               text_at(x.at(tick), height - bottom + 14, rounded(tick, 2), "middle");
+        svg += "<path class=\"grid\" d=\"M" + rounded(x.at(tick), 5) + " " + rounded(margin_top, 4) + "V" +
+               rounded(plot_height - margin_bottom, 5) + "\"/>" +
+               text_at(x.at(tick), plot_height - margin_bottom + 14, rounded(tick, 2), "middle");
     for (const double tick : y.ticks())
-        svg += "<path class=\"grid\" d=\"M" + rounded(left, 4) + " " + rounded(y.at(tick), 5) + "H" +
-               rounded(width - right, 5) + "\"/>" + text_at(left - 6, y.at(tick) + 4, rounded(tick, 2), "end");
-    if (y.has_zero) svg += text_at(left - 6, y.at(0) + 4, "0", "end");
-    if (x.has_zero) svg += text_at(x.at(0), height - bottom + 14, "0", "middle");
-    svg += text_at(0.5 * (left + width - right), height - 10, axis.time_unit, "middle");
+        svg += "<path class=\"grid\" d=\"M" + rounded(margin_left, 4) + " " + rounded(y.at(tick), 5) + "H" +
+               rounded(plot_width - margin_right, 5) + "\"/>" +
+               text_at(margin_left - 6, y.at(tick) + 4, rounded(tick, 2), "end");
+    if (y.has_zero) svg += text_at(margin_left - 6, y.at(0) + 4, "0", "end");
+    if (x.has_zero) svg += text_at(x.at(0), plot_height - margin_bottom + 14, "0", "middle");
+    svg += text_at(0.5 * (margin_left + plot_width - margin_right), plot_height - 10, axis.time_unit, "middle");
     // The front, from fast to exact.
     std::vector<const AccuracyPoint*> front;
     for (const AccuracyPoint& p : points)
@@ -91,22 +94,23 @@ std::string plot_of(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& 
                 : p.is_on_front ? "best"
                                 : "other") +
                "\"><title>" +
-               escaped(p.name + ": " + rounded(p.time, 3) + ", " + (p.error == 0 ? "0" : rounded(p.error, 3)) +
-                       (p.note.empty() ? "" : " (" + p.note + ")")) +
+               html_text(p.name + ": " + rounded(p.time, 3) + ", " + (p.error == 0 ? "0" : rounded(p.error, 3)) +
+                         (p.note.empty() ? "" : " (" + p.note + ")")) +
                "</title></circle>";
-        const bool is_right = px > 0.7 * width;
+        const bool is_right = px > 0.7 * plot_width;
         svg += text_at(px + (is_right ? -7 : 7), py - 5, p.name, is_right ? "end" : "start", " class=\"name\"");
     }
     return svg + "</svg>";
 }
 
-std::string table_of(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
-    std::string html = "<table><tr><th></th><th>" + escaped(axis.time_unit) + "</th><th>" + escaped(axis.error_unit) +
-                       "</th><th></th><th></th></tr>";
+std::string html_table(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
+    std::string html = "<table><tr><th></th><th>" + html_text(axis.time_unit) + "</th><th>" +
+                       html_text(axis.error_unit) + "</th><th></th><th></th></tr>";
     for (const AccuracyPoint& p : points)
-        html += "<tr><td>" + escaped(p.name) + "</td><td class=\"n\">" + rounded(p.time, 3) + "</td><td class=\"n\">" +
-                (p.error == 0 ? "0" : rounded(p.error, 3)) + "</td><td>" + (p.is_on_front ? "front" : "") +
-                (p.is_default ? " default" : "") + "</td><td>" + escaped(p.note) + "</td></tr>";
+        html += "<tr><td>" + html_text(p.name) + "</td><td class=\"n\">" + rounded(p.time, 3) +
+                "</td><td class=\"n\">" + (p.error == 0 ? "0" : rounded(p.error, 3)) + "</td><td>" +
+                (p.is_on_front ? "front" : "") + (p.is_default ? " default" : "") + "</td><td>" + html_text(p.note) +
+                "</td></tr>";
     return html + "</table>";
 }
 
@@ -127,8 +131,8 @@ and nearer; red is what the program does by default. Points tell more under the 
 std::string to_html(const AccuracyBenchResult& result) {
     std::string html = head;
     for (const AccuracyAxis& axis : result.axes) {
-        html += "<h2>" + escaped(axis.name) + "</h2><p>" + escaped(axis.question) +
-                " Upwards: " + escaped(axis.error_unit) + ".</p>";
+        html += "<h2>" + html_text(axis.name) + "</h2><p>" + html_text(axis.question) +
+                " Upwards: " + html_text(axis.error_unit) + ".</p>";
         std::vector<std::string> subjects;
         for (const AccuracyPoint& p : result.points)
             if (p.axis == axis.name && std::ranges::find(subjects, p.subject) == subjects.end())
@@ -137,8 +141,8 @@ std::string to_html(const AccuracyBenchResult& result) {
             std::vector<AccuracyPoint> points;
             for (const AccuracyPoint& p : result.points)
                 if (p.axis == axis.name && p.subject == subject) points.push_back(p);
-            html += "<h3>" + escaped(subject) + "</h3>" + plot_of(axis, points) +
-                    "<details><summary>as a table</summary>" + table_of(axis, points) + "</details>";
+            html += "<h3>" + html_text(subject) + "</h3>" + plot_of(axis, points) +
+                    "<details><summary>as a table</summary>" + html_table(axis, points) + "</details>";
         }
     }
     return html + "</body></html>\n";
