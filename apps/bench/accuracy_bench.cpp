@@ -257,7 +257,8 @@ Result<std::vector<AccuracyPoint>> stale_points(session::Session& session, const
         }
         if (served == 0) without = triangles;
         AccuracyPoint point{stale_axis, subject,
-                            served == 0 ? "no pictures" : "serves " + std::to_string(served) + " frames"};
+                            served == 0 ? "no pictures"
+                                        : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames")};
         if (occlusion) point.time = static_cast<double>(occlusion->facts().pictures) / frames;
         point.error = triangles / std::max(without, 1.0);
         point.is_default = served == session::MovingOcclusionOptions().frames;
