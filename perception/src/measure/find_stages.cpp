@@ -321,8 +321,8 @@ FoldStage contrasts(const Bands& mesh, const Bands& difference) {
 
 class StageFinder {
 public:
-    StageFinder(const SoundTree& tree, std::span<FoldError> errors)
-        : tree_(tree), errors_(errors), interior_(tree.interior_count()), parents_(tree.parents()),
+    StageFinder(const SoundTree& tree, std::span<FoldError> errors, MeasuringProgress& progress)
+        : tree_(tree), errors_(errors), progress_(progress), interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (NodeId& corner : t) corner += interior_;
@@ -331,6 +331,9 @@ public:
 
     std::vector<FoldStage> run() {
         const std::size_t count = order();
+        // Each stage leaves about so many triangles of the one before.
+        const double fewer = std::exp2(-1 / stages_per_halving);
+        progress_.begin(1, direction_count * (1 - std::pow(fewer, count + 1)) / (1 - fewer));
         std::vector<std::optional<Picture>> pictures(direction_count);
         std::vector<std::optional<Bands>> bands(direction_count);
         for_each_picture([&](std::size_t i, Picture picture) {
@@ -339,7 +342,9 @@ public:
         });
         std::vector<FoldStage> stages(count);
         for (std::size_t stage = 0; stage < count; ++stage) {
+            if (progress_.is_cancelled()) return {};
             fold(stage);
+            dearness_ *= fewer;
             std::vector<FoldStage> found(direction_count);
             for_each_picture([&](std::size_t i, Picture picture) {
                 picture.subtract(*pictures[i]);
@@ -390,7 +395,9 @@ private:
     template <class F>
     void for_each_picture(F&& f) {
         tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
+            if (progress_.is_cancelled()) return;
             f(i, Painter(tree_, cameras_[i], surfaces_.local()).draw(triangles_));
+            progress_.add(dearness_);
         });
     }
 
@@ -403,6 +410,8 @@ private:
 
     const SoundTree& tree_;
     std::span<FoldError> errors_;
+    MeasuringProgress& progress_;
+    double dearness_ = 1; // of a picture, of the first ones'
     NodeId interior_;
     std::span<const NodeId> parents_;
     std::vector<Triangle> triangles_; // as folded, over nodes
@@ -415,11 +424,11 @@ private:
 
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 
-std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<FoldError> errors) {
+std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<FoldError> errors, MeasuringProgress& progress) {
     const float radius = tree.bounding_sphere().radius;
     const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
     if (is_translucent || !(radius > 0) || !std::isfinite(side / (2 * radius))) return {};
-    return StageFinder(tree, errors).run();
+    return StageFinder(tree, errors, progress).run();
 }
 
 } // namespace unseen::perception

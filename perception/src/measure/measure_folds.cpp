@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <cstring>
 #include <iterator>
 #include <limits>
 #include <string>
-#include <thread>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
@@ -30,6 +28,7 @@
 #include "measure/luminance_bias.h"
 #include "measure/measure_folds.h"
 #include "measure/measurement.h"
+#include "measure/measuring_progress.h"
 
 namespace unseen::perception {
 
@@ -262,11 +261,12 @@ class Measurer {
     using FoldPicture = FoldPictureOf<luminances>;
 
 public:
-    Measurer(std::span<const SoundTree> trees, std::span<MeasuredFolds> found)
+    // `contacts`: of the trees.
+    Measurer(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, std::vector<Contact> contacts)
         : tree_(trees.front()), found_(found), first_leaf_(tree_.first_leaf()), leaf_end_(tree_.leaf_end()),
           parents_(tree_.parents()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
           support_(tree_.support_spheres()), interior_(tree_.interior_count()), of_leaf_(tree_),
-          border_(tree_, of_leaf_), crossing_(interior_), contacts_(find_contacts(trees)), witnesses_(interior_),
+          border_(tree_, of_leaf_), crossing_(interior_), contacts_(std::move(contacts)), witnesses_(interior_),
           luminance_span_(interior_), most_changed_(interior_) {
         for (NodeId node = 0; node < interior_; ++node) {
             for (std::size_t i = 0; i < luminances; ++i) {
@@ -282,37 +282,31 @@ public:
         }
     }
 
-    // False where `progress` has cancelled; it is called on the calling thread only.
-    bool run(const Progress& progress) {
+    // False where it was cancelled.
+    bool run(MeasuringProgress& progress) {
         std::vector<NodeId> parts, above;
         for (NodeId node = 0; node < interior_;) {
             const bool is_part = leaf_end_[node] - first_leaf_[node] <= leaves_of_part;
             (is_part ? parts : above).push_back(node);
             node = is_part ? tree_.subtree_end()[node] : node + 1;
         }
-        const std::thread::id caller = std::this_thread::get_id();
-        std::atomic<NodeId> done = 0;
-        std::atomic<bool> is_cancelled = false;
-        const auto go_on = [&](NodeId more) {
-            const double share = static_cast<double>(done += more) / interior_;
-            if (progress && std::this_thread::get_id() == caller && !progress(share, stage)) is_cancelled = true;
-            return !is_cancelled;
-        };
+        constexpr NodeId at_once = 64; // nodes between looks at the clock
         tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-            if (is_cancelled) return;
             const NodeId begin = parts[i], end = tree_.subtree_end()[begin];
             Scratch scratch;
-            for (NodeId node = end; node-- > begin;) measure(node, scratch);
-            go_on(end - begin);
+            for (NodeId last = end; last > begin && !progress.is_cancelled();) {
+                const NodeId first = last - std::min(last - begin, at_once);
+                for (NodeId node = last; node-- > first;) measure(node, scratch);
+                progress.add(last - first);
+                last = first;
+            }
         });
         Scratch scratch;
-        for (std::size_t i = above.size(); i-- > 0 && go_on(1);) measure(above[i], scratch);
-        return go_on(0);
+        for (std::size_t i = above.size(); i-- > 0 && progress.add(1);) measure(above[i], scratch);
+        return !progress.is_cancelled();
     }
 
 private:
-    static constexpr const char* stage = "measuring folds";
-
     struct Mean {
         Difference sum;
         int count = 0;
@@ -770,6 +764,8 @@ std::span<const float> measurement_settings() noexcept { return settings; }
 
 namespace {
 
+Error cancelled_error() { return {ErrorCode::cancelled, "Measuring what folds change was cancelled."}; }
+
 // Of trees that are the same but for their luminances, with what follows from each.
 struct Measured {
     std::vector<MeasuredFolds> found;           // by tree
@@ -778,11 +774,17 @@ struct Measured {
 };
 
 template <std::size_t luminances>
-bool measure_all(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, const Progress& progress) {
-    return Measurer<luminances>(trees, found).run(progress);
+bool measure_all(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, double up_to,
+                 MeasuringProgress& progress) {
+    constexpr double contacts_done = 0.2; // of it
+    progress.begin(contacts_done * up_to, static_cast<double>(trees.front().triangles().size()));
+    std::vector<Contact> contacts = find_contacts(trees, progress);
+    progress.begin(up_to, trees.front().interior_count());
+    return Measurer<luminances>(trees, found, std::move(contacts)).run(progress);
 }
 
-Result<Measured> measure(std::span<const VertexTree> trees, int threads, const Progress& progress) {
+// `up_to`: the share of the whole that this is.
+Result<Measured> measure(std::span<const VertexTree> trees, int threads, double up_to, MeasuringProgress& progress) {
     assert(trees.size() == 1 || trees.size() == 3 || trees.size() == 4);
     Measured all;
     std::shared_ptr<const TreeGeometry> geometry; // scaled, of all
@@ -809,7 +811,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, int threads, const P
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = measure_these(all.in_units, all.found, progress);
+        is_whole = measure_these(all.in_units, all.found, up_to, progress);
         if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
@@ -819,7 +821,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, int threads, const P
             find_luminance_bias(all.in_units[i], all.errors[i]);
         });
     });
-    if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
+    if (!is_whole) return cancelled_error();
     for (std::size_t i = 0; i < trees.size(); ++i)
         for (NodeId node = 0; node < nodes; ++node) {
             FoldRecord& fold = all.found[i].folds[node];
@@ -846,13 +848,16 @@ Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measure
 } // namespace
 
 Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
-    auto measured = measure(std::span(&tree, 1), threads, progress);
+    constexpr double before_stages = 0.8;
+    MeasuringProgress told(progress);
+    auto measured = measure(std::span(&tree, 1), threads, before_stages, told);
     if (!measured) return measured.error();
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
     tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        stages = find_stages(measured->in_units.front(), errors);
+        stages = find_stages(measured->in_units.front(), errors, told);
     });
+    if (told.is_cancelled()) return cancelled_error();
     std::vector<std::uint8_t> stage_of(errors.size());
     for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
     return with_attributes(tree, std::move(measured->found.front()), std::move(stage_of), std::move(stages));
@@ -866,7 +871,8 @@ Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::
         if (!as_shaded) return as_shaded.error();
         shaded.push_back(std::move(*as_shaded));
     }
-    auto measured = measure(shaded, threads, progress);
+    MeasuringProgress told(progress);
+    auto measured = measure(shaded, threads, 1, told);
     if (!measured) return measured.error();
     return std::move(measured->found);
 }
