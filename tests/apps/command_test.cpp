@@ -699,7 +699,7 @@ TEST_F(SimplifyTest, MakesTheFoldersOfItsOutputs) {
 }
 
 TEST_F(SimplifyTest, AReplacedFileKeepsItsPermissions) {
-    constexpr auto secret = fs::perms::owner_read;
+    constexpr auto secret = fs::perms::owner_read | fs::perms::owner_write;
     write_text(path("o.ply"), "");
     fs::permissions(path("o.ply"), secret);
     ASSERT_EQ(run({"simplify", "ball.vdt", "-o", "o.ply"}).status, 0);
@@ -707,10 +707,42 @@ TEST_F(SimplifyTest, AReplacedFileKeepsItsPermissions) {
     EXPECT_EQ(run({"info", "o.ply", "--json"}).json()["kind"], "mesh");
 }
 
-TEST_F(UsageTest, NamesThatAreTooLongAreRefusedFirst) {
-    const Outcome outcome = run({"build", "missing.ply", "-o", std::string(300, 'a') + ".vdt"});
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, HasSubstr("name too long"));
+// Also where the folder would let it be replaced. Root may write to any file: then nobody tries.
+TEST_F(SimplifyTest, AFileThatMayNotBeWrittenToIsRefused) {
+    write_text(path("o.ply"), "old");
+    fs::permissions(path("o.ply"), fs::perms::owner_read);
+    fs::permissions(folder(), fs::perms::all);
+    std::string nobody;
+    if (::geteuid() == 0) nobody = "setpriv --reuid=65534 --regid=65534 --clear-groups ";
+    if (run_shell(nobody + "'" UNSEEN_COMMAND "' --version").status != 0) GTEST_SKIP() << "nobody cannot run it";
+    const Outcome refused =
+        run_shell(nobody + "'" UNSEEN_COMMAND "' simplify ball.vdt --triangles 100 -o o.ply");
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.err, AllOf(IsAnErrorForPeople(), HasSubstr("'o.ply', which is there: Permission denied")));
+    EXPECT_EQ(read_text(path("o.ply")), "old");
+    EXPECT_THAT(files(), ::testing::Each(Not(StartsWith("."))));
+}
+
+// Before there is anything to be waited for: here, a look at what is read.
+TEST_F(UsageTest, NamesThatCannotBeAreRefusedFirst) {
+    const std::string name(300, 'a');
+    for (const std::vector<std::string>& words :
+         std::vector<std::vector<std::string>>{{"build", "missing.ply", "-o", name + ".vdt"},
+                                               {"simplify", "missing.ply", "-o", name + ".ply"},
+                                               {"simplify", "missing.ply", "-o", "o.ply", "--json", name},
+                                               {"render", "missing.ply", "-o", name + ".png"},
+                                               {"render", "missing.ply", "--path", "orbit", "-o", name + "%04d.png"},
+                                               {"sheet", "missing.ply", "-o", name + ".png"},
+                                               {"scene", "make", "museum", "-o", name + ".glb"},
+                                               {"make", "subdivide", "missing.ply", "-o", name + ".ply"}}) {
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 1) << words[0];
+        EXPECT_THAT(outcome.err, HasSubstr("name too long")) << words[0];
+    }
+    const Outcome nowhere = run({"build", "missing.ply", "-o", "/proc/nothing/here.vdt"});
+    EXPECT_EQ(nowhere.status, 1);
+    EXPECT_THAT(nowhere.err, AllOf(IsAnErrorForPeople(), HasSubstr("'/proc/nothing'"), Not(HasSubstr("missing.ply"))));
+    EXPECT_TRUE(files().empty());
 }
 
 TEST_F(SimplifyTest, AFullStandardOutputIsAnErrorThatSaysWhatIsThere) {
@@ -721,6 +753,16 @@ TEST_F(SimplifyTest, AFullStandardOutputIsAnErrorThatSaysWhatIsThere) {
     EXPECT_EQ(run({"info", "q.vdt", "--verify"}).status, 0);
     for (const std::string words : {"--help", "--version", "simplify --help", "help", "help build"})
         EXPECT_EQ(run_shell(unseen + " " + words + " > /dev/full").status, 1) << words;
+}
+
+TEST_F(SimplifyTest, AClosedStandardOutputIsAnErrorThatSaysWhatIsThere) {
+    const std::string unseen = "'" UNSEEN_COMMAND "'";
+    const std::string closed = " 2>err.txt; echo $? >status.txt; } | true; cat status.txt; cat err.txt";
+    const Outcome built = run_shell("{ sleep 0.2; " + unseen + " build ball.obj -o q.vdt" + closed);
+    EXPECT_THAT(built.out, AllOf(StartsWith("1\n"), HasSubstr("has closed it"), HasSubstr("Written: q.vdt")));
+    EXPECT_EQ(run({"info", "q.vdt", "--verify"}).status, 0);
+    const Outcome help = run_shell("{ sleep 0.2; " + unseen + " --help" + closed);
+    EXPECT_THAT(help.out, AllOf(StartsWith("1\n"), HasSubstr("has closed it")));
 }
 
 TEST_F(UsageTest, NamesDoNotSteerTheTerminal) {
