@@ -14,7 +14,8 @@ std::string json_text(const Json& json) {
     constexpr const char* digits = "0123456789abcdef";
     for (std::size_t i = 0; i < plain.size(); ++i) {
         auto code = static_cast<unsigned char>(plain[i]);
-        if (code == 0xc2 && static_cast<unsigned char>(plain[i + 1]) < 0xa0) code = static_cast<unsigned char>(plain[++i]);
+        if (code == 0xc2 && static_cast<unsigned char>(plain[i + 1]) < 0xa0)
+            code = static_cast<unsigned char>(plain[++i]);
         else if (code != 0x7f) {
             text += plain[i];
             continue;

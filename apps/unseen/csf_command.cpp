@@ -177,7 +177,8 @@ std::size_t control_character(std::string_view line) {
     for (std::size_t i = 0; i < line.size(); ++i) {
         const auto byte = static_cast<unsigned char>(line[i]);
         const auto next = static_cast<unsigned char>(i + 1 < line.size() ? line[i + 1] : 0);
-        if ((byte < 0x20 && byte != '\t') || byte == 0x7f || (byte == 0xc2 && next >= 0x80 && next < 0xa0)) return i + 1;
+        if ((byte < 0x20 && byte != '\t') || byte == 0x7f || (byte == 0xc2 && next >= 0x80 && next < 0xa0))
+            return i + 1;
     }
     return 0;
 }
@@ -204,7 +205,7 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
         if (columns.empty()) {
             columns = cells;
             for (auto column = columns.begin(); column != columns.end(); ++column)
-                if (std::find(columns.begin(), column, *column) != column)
+                if (!column->empty() && std::find(columns.begin(), column, *column) != column)
                     return complain("column " + std::to_string(column - columns.begin() + 1) + ", '" + *column +
                                     "', is there before: remove or rename one of them.");
             out += line + ",sensitivity\n";

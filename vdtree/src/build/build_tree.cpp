@@ -38,8 +38,8 @@ constexpr double clustering_begins = 0.1, clustering_ends = 0.7;
 // Positions beyond this, relative to the origin, leave no room for spheres around them in floats.
 constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
 
-// Of a mesh, mesh units: below, products of lengths vanish in floats, and what is stored cannot be checked any more.
-constexpr double smallest_size = 1e-19;
+// Of a mesh, mesh units: floats, which end at 1.4e-45, place what is smaller more coarsely than what is larger.
+constexpr double smallest_size = 1e-36;
 
 // Places that doubles tell apart along the mesh, at least: fewer, far away from the origin, leave no surface.
 constexpr double fewest_places = 256;
@@ -223,10 +223,10 @@ Result<void> check_size(std::span<const glm::dvec3> positions) {
                                                       text(smallest_size) +
                                                       " are needed: scale it up, or write it in a smaller unit."};
     for (int axis = 0; axis < 3; ++axis) {
-        if (sides[axis] == 0) continue; // as exact as anywhere
         const double farthest = std::max(std::abs(low[axis]), std::abs(high[axis]));
         const double step = std::nextafter(farthest, std::numeric_limits<double>::infinity()) - farthest;
-        if (step * fewest_places > size)
+        const double places = sides[axis] > 0 ? fewest_places : 1; // flat walls are as exact there as anywhere
+        if (step * places > size)
             return Error{ErrorCode::invalid_argument,
                          "The mesh is " + text(size) + " units large and lies " + text(farthest) +
                              " from the origin, where coordinates are " + text(step) +
