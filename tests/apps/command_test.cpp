@@ -756,6 +756,26 @@ TEST_F(SimplifyTest, AFullStandardOutputIsAnErrorThatSaysWhatIsThere) {
         EXPECT_EQ(run_shell(unseen + " " + words + " > /dev/full").status, 1) << words;
 }
 
+// Files of two blocks of 512 bytes at most, as of a disk that has no more room.
+TEST_F(SimplifyTest, AFullDiskLeavesTheOldOutputs) {
+    const std::string unseen = "ulimit -f 2; exec '" UNSEEN_COMMAND "' ";
+    for (const auto& [out, words] : std::vector<std::pair<std::string, std::string>>{
+             {"o.ply", "simplify ball.vdt --triangles 500 -o o.ply"},
+             {"o.glb", "simplify ball.vdt --triangles 500 -o o.glb"},
+             {"o.obj", "make subdivide ball.obj --times 1 -o o.obj"},
+             {"m.glb", "scene make museum -o m.glb"},
+             {"t.json", "csf --table --save-table t.json"},
+             {"r.json", "simplify ball.vdt --triangles 500 -o s.ply --verbose --json r.json"}}) {
+        write_text(path(out), "old");
+        const auto before = files();
+        const Outcome full = run_shell(unseen + words);
+        EXPECT_EQ(full.status, 1) << words << full.err;
+        EXPECT_THAT(full.err, IsAnErrorForPeople()) << words;
+        EXPECT_EQ(read_text(path(out)), "old") << words;
+        EXPECT_EQ(files(), before) << words;
+    }
+}
+
 TEST_F(SimplifyTest, AClosedStandardOutputIsAnErrorThatSaysWhatIsThere) {
     const std::string unseen = "'" UNSEEN_COMMAND "'";
     const std::string closed = " 2>err.txt; echo $? >status.txt; } | true; cat status.txt; cat err.txt";

@@ -112,7 +112,7 @@ Result<AtomicFile> AtomicFile::create(const fs::path& target) {
                      "Cannot write to '" + target.string() + "': it is no regular file; give another name."};
     }
     // Renaming would go against what others are told with it.
-    if (fs::exists(status) && ::access(target.c_str(), W_OK) != 0)
+    if (fs::exists(status) && ::faccessat(AT_FDCWD, target.c_str(), W_OK, AT_EACCESS) != 0)
         return Error{ErrorCode::io_failure, "Cannot write to '" + target.string() +
                                                 "', which is there: " + std::generic_category().message(errno) +
                                                 ". Allow it, remove the file, or give another name."};
