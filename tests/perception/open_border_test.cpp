@@ -191,7 +191,7 @@ TEST(FoldedBorders, MoveByNoMoreThanIsCounted) {
 // Rings of random triangles lie through each other: that none of the others' edges is nearer, no sphere around some of
 // them tells.
 TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
-    const VertexTree tree = support::built(shapes::unwelded(shapes::random_soup(36000, 12000, 1)));
+    const VertexTree tree = support::built(shapes::unwelded(shapes::random_soup(72000, 24000, 1)));
     const SoundTree sound = support::sound(tree);
     const LeafTriangles of_leaf(sound);
     const BorderShifts shifts(sound, of_leaf);
