@@ -10,6 +10,7 @@
 #include <perception/csf.h>
 #include <vdtree/internal/number_text.h>
 
+#include "accuracy_bench.h"
 #include "bench_tools.h"
 #include "budget_bench.h"
 #include "effects_bench.h"
@@ -433,6 +434,60 @@ Command scenes_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct AccuracyArguments {
+    AccuracyBenchOptions options;
+    std::string csv, html;
+    ReportArguments report;
+    bool quick = false;
+};
+
+// Written whole or not at all.
+Result<void> write_text(const std::string& file, const std::string& text) {
+    if (file.empty()) return {};
+    auto out = vdtree::AtomicFile::create(file);
+    if (!out) return out.error();
+    if (auto written = out->write(text); !written) return written;
+    return out->commit();
+}
+
+Result<int> run(AccuracyArguments& a) {
+    auto bench = BenchRun::open(a.options.models, {a.csv, a.html}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_accuracy(a.options);
+    if (!result) return result.error();
+    if (auto ok = write_text(a.csv, to_csv(*result)); !ok) return ok.error();
+    if (auto ok = write_text(a.html, to_html(*result)); !ok) return ok.error();
+    return bench->close(result->json, result->tables);
+}
+
+Command accuracy_command(CLI::App& app) {
+    auto a = std::make_shared<AccuracyArguments>();
+    CLI::App* verb = app.add_subcommand("accuracy", "What accuracy costs in time: error against time for each choice");
+    verb->add_option(
+            "MODEL", a->options.models,
+            "Meshes, trees and scenes (default: the meshes that are installed, and the scenes of 'unseen scene "
+            "make')")
+        ->type_name("MODEL");
+    verb->add_flag("--scenes", a->options.has_scenes, "Besides MODEL, the scenes of 'unseen scene make'");
+    verb->add_option("--csv", a->csv, "One line a point")->type_name("FILE.csv");
+    verb->add_option("--html", a->html, "A page with plots, for browsers; it needs no other file")
+        ->type_name("FILE.html");
+    verb->add_option("--seconds", a->options.seconds, "For the ways to fold of each model (default: 45)")
+        ->type_name("T")
+        ->check(positive());
+    verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
+        ->type_name("PIXELS")
+        ->check(whole(64, 4096));
+    verb->add_flag("--quick", a->quick, "Fewer samples a pixel, and less time");
+    add_report_options(*verb, a->report);
+    verb->callback([a] {
+        if (a->quick) a->options.samples = 16, a->options.seconds = std::min(a->options.seconds, 15.0);
+    });
+    verb->footer("Examples:\n  unseen-bench accuracy --quick\n"
+                 "  unseen-bench accuracy mine.glb part.stl --html accuracy.html --csv accuracy.csv");
+    return {verb, [a] { return run(*a); }};
+}
+
 constexpr const char* about =
     "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
 constexpr const char* examples = R"(Examples:
@@ -449,6 +504,6 @@ int main(int argc, char** argv) {
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
         return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
                                     budget_command(app), requests_command(app),   fit_command(app),
-                                    people_command(app), scenes_command(app)};
+                                    people_command(app), scenes_command(app),     accuracy_command(app)};
     });
 }

@@ -1,4 +1,5 @@
 // The benchmarks that draw, in a build without OpenGL: they say so.
+#include "accuracy_bench.h"
 #include "budget_bench.h"
 #include "fit_bench.h"
 #include "perception_bench.h"
@@ -21,6 +22,9 @@ Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pi
 Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }
+Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions&) { return no_pictures(); }
+std::string to_csv(const AccuracyBenchResult&) { return {}; }
+std::string to_html(const AccuracyBenchResult&) { return {}; }
 std::vector<std::string> fit_factors() { return {}; }
 
 } // namespace unseen::app

@@ -7,8 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include <unistd.h>
-
 #include <perception/judge.h>
 #include <session/session.h>
 #include <session_gpu/as_seen.h>
@@ -18,7 +16,7 @@
 
 #include "bench_tools.h"
 #include "frame_image.h"
-#include "make_scene.h"
+#include "made_scenes.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -482,41 +480,6 @@ Json to_json(const Walk& walk, const std::string& scene) {
             {"control_ms", walk.times.control_ms},
             {"texture_bytes", walk.texture_bytes}};
 }
-
-// A folder that goes with this.
-class MadeScenes {
-public:
-    MadeScenes() : folder_(std::filesystem::temp_directory_path() / ("unseen-scenes-" + std::to_string(getpid()))) {}
-    MadeScenes(const MadeScenes&) = delete;
-    MadeScenes& operator=(const MadeScenes&) = delete;
-    ~MadeScenes() {
-        std::error_code ignored;
-        std::filesystem::remove_all(folder_, ignored);
-    }
-
-    Result<std::vector<std::string>> make(std::uint64_t triangles) const {
-        std::error_code failed;
-        std::filesystem::create_directories(folder_, failed);
-        if (failed)
-            return Error{ErrorCode::io_failure,
-                         "Cannot make the folder '" + folder_.string() + "': " + failed.message() + "."};
-        std::vector<std::string> files;
-        for (const auto& [kind, name] : {std::pair{SceneKind::museum, "museum"},
-                                         {SceneKind::treasure, "treasure"},
-                                         {SceneKind::house, "house"},
-                                         {SceneKind::forest, "forest"}}) {
-            MakeSceneOptions options;
-            options.kind = kind;
-            options.triangles = triangles;
-            files.push_back((folder_ / (std::string(name) + ".glb")).string());
-            if (const auto made = make_scene(files.back(), options); !made) return made.error();
-        }
-        return files;
-    }
-
-private:
-    std::filesystem::path folder_;
-};
 
 } // namespace
 

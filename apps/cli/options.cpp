@@ -403,6 +403,13 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         group.add_option("--pixels", goal.tolerance_px, "Fold what is smaller than E pixels, seen or not")
             ->type_name("E")
             ->check(positive());
+    CLI::Option* threshold =
+        group
+            .add_option("--threshold", o.request.threshold,
+                        "With --imperceptible: fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be "
+                        "seen from twice the distance")
+            ->type_name("X")
+            ->check(positive());
     add_fold_test_option(group, o.request.fold_test,
                          std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe,
                                     FoldTest::extent, FoldTest::displacement},
@@ -421,6 +428,9 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
             full->count() + imperceptible->count() + triangles->count() + ratio->count() + pixels->count();
         if (given > 1)
             refuse("--full, --imperceptible, --triangles, --ratio and --pixels exclude each other: give one of them.");
+        if (*threshold && (*full || *pixels || o.budget.is_given()))
+            refuse("--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is "
+                   "folded.");
         if (*fill && !o.budget.is_given()) refuse("--fill-budget needs --triangles N or --ratio SHARE.");
         if (o.request.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
         if (*full) kind = Goal::Kind::full;

@@ -82,7 +82,8 @@ private:
     void bars(const std::string& name, glm::dvec3 foot, double width, double height, bool along_z) {
         const double spacing = 1 / options_.bars_per_metre;
         const auto count = static_cast<int>(std::floor(width / spacing + 1e-9)) + 1;
-        const std::size_t mesh = draft_.add_mesh(name, bar(height, spacing / 5, 10), 0.25);
+        constexpr double wrought_iron = 0.05;
+        const std::size_t mesh = draft_.add_mesh(name, bar(height, spacing / 5, 10), wrought_iron);
         for (int i = 0; i < count; ++i) {
             const double off = spacing * (i - 0.5 * (count - 1));
             draft_.add(mesh, name, {.at = foot + (along_z ? glm::dvec3(0, 0, off) : glm::dvec3(off, 0, 0))}, true);
@@ -106,7 +107,7 @@ private:
         wall("left wall before", {0.3, 2.2, 2.8}, {-4.15, 1.2, 2.6});
         const bool has_gate = options_.bars == MuseumBars::both || options_.bars == MuseumBars::gate;
         const bool has_window = options_.bars == MuseumBars::both || options_.bars == MuseumBars::window;
-        if (has_gate) bars("gate", {0, 0, 1.6}, 3, 2.8, false);
+        if (has_gate) bars("gate", {0, 0, 1}, 3, 2.8, false); // close to the statue: as fine as its window's shadow
         if (has_window) bars("window bars", {-4.15, 1.2, 0}, 2.4, 2.2, true);
         draft_.add_sun({-0.85, 0.3, 0.05}, sun_lux, true); // so that its beam meets the statue
         draft_.add_lamp({1.5, 3.2, 2.5}, 1.2);

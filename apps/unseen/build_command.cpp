@@ -167,9 +167,10 @@ Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& r
 }
 
 Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&& tree) {
-    if (!tree.texture().empty()) {
-        print_note(a.mesh + " has a texture, and what folds change of it is not measured: the fold test is then "
-                            "luebke-hallen-safe (--no-texture leaves the texture out).");
+    if (!perception::knows_texture(tree)) {
+        print_note(a.mesh +
+                   " has a texture over vertices of several hues, and what folds change of it is not measured: "
+                   "the fold test is then luebke-hallen-safe (--no-texture leaves the texture out).");
         return std::move(tree);
     }
     ProgressBar bar("measuring what folds change");
@@ -177,9 +178,11 @@ Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&&
 }
 
 Result<vdtree::VertexTree> measure_under_lights(const BuildArguments& a, const vdtree::VertexTree& tree) {
-    if (!tree.texture().empty())
-        return Error{ErrorCode::unsupported, a.mesh + " has a texture, and what folds change of it under lights is not "
-                                                      "measured: leave out --lit-fold-errors, or add --no-texture."};
+    if (!perception::knows_texture(tree))
+        return Error{ErrorCode::unsupported,
+                     a.mesh +
+                         " has a texture over vertices of several hues, and what folds change of it under lights is "
+                         "not measured: leave out --lit-fold-errors, or add --no-texture."};
     ProgressBar bar("measuring what folds change under lights");
     return session::measured_under_lights(tree, a.threads, std::ref(bar));
 }
@@ -273,9 +276,8 @@ Command build_command(CLI::App& app) {
                                         "Leave out the following: faster, and a smaller file; the default fold test "
                                         "measures then when it first needs to");
     verb->add_flag("--fold-errors")
-        ->description(
-            "The default, where there is no texture: measure what every fold changes, for the fold test 'error', "
-            "and give proxies the luminance that keeps the surface's light")
+        ->description("The default: measure what every fold changes, for the fold test 'error', "
+                      "and give proxies the luminance that keeps the surface's light")
         ->excludes(leave);
     verb->add_flag("--lit-fold-errors", a->lit_fold_errors,
                    "Measure also what every fold changes under lights, for scenes with lights that stand still; else "

@@ -420,7 +420,6 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     const vdtree::View first_view = make_view(*session, view);
     session::Request request = options.what.request_for(session->triangle_count());
     request.purpose = session::Purpose::picture;
-    request.threshold = options.threshold;
     if (const auto ready = session->prepare(first_view, request); !ready) return ready.error();
 
     if (options.judges_changes && session->scene().is_of_file())

@@ -14,7 +14,6 @@ struct FlyThroughOptions {
     std::string path;     // see camera_path.h
     std::string pictures; // a name with one %d (or %04d, ...) for the frame's number; empty: none
     std::string csv, plot, json;
-    double threshold = 1;      // fold costs up to it
     std::optional<bool> draws; // default: where there are pictures to write
     bool is_verbose = false;
     bool judges_changes = false; // whether one sees the cut change, frame by frame: draws, see flight_changes.h

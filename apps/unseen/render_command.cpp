@@ -157,12 +157,6 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
     group.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
         ->type_name("FILE.png|.svg")
         ->check(ending_in({".png", ".svg"}));
-    group
-        .add_option(
-            "--threshold", o.threshold,
-            "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
-        ->type_name("X")
-        ->check(positive());
     group.add_flag("--changes", o.judges_changes,
                    "Say whether the cut could be seen changing from frame to frame, although each picture passes; some "
                    "seconds a frame");
@@ -191,7 +185,7 @@ void check_levels(const RenderArguments& a) {
     if (a.what.request.goal.kind != Goal::Kind::imperceptible)
         refuse("--full, --triangles and --pixels are of cuts, and exclude --method: give --bias to have as many "
                "triangles.");
-    if (o.threshold != 1 || o.geomorph_seconds || o.judges_changes || !o.csv.empty() || !o.plot.empty())
+    if (a.what.request.threshold != 1 || o.geomorph_seconds || o.judges_changes || !o.csv.empty() || !o.plot.empty())
         refuse(
             "--threshold, --geomorph, --changes, --csv and --plot are of cuts, and exclude --method; --json says all.");
     if (o.gaze.source != GazeSource::none)
@@ -220,9 +214,6 @@ void check(const RenderArguments& a) {
     check_geomorph(o.geomorph_seconds, a.view);
     const bool may_have_gaze = a.what.gaze_px || o.gaze.source != GazeSource::none || !o.path.empty();
     if (o.gaze.tracker.error_deg > 0 && !may_have_gaze) refuse("--gaze-error needs a gaze: --gaze or --gaze-mode.");
-    if (o.threshold != 1 && a.what.request.goal.kind != Goal::Kind::imperceptible)
-        refuse(
-            "--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.what.visibility == Visibility::where_it_saves_time)
@@ -234,8 +225,8 @@ void check(const RenderArguments& a) {
             refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.show.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
-        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || o.draws || o.geomorph_seconds || o.judges_changes)
-            refuse("--csv, --plot, --threshold, --geomorph, --changes and --draw need --path.");
+        if (!o.csv.empty() || !o.plot.empty() || o.draws || o.geomorph_seconds || o.judges_changes)
+            refuse("--csv, --plot, --geomorph, --changes and --draw need --path.");
         return;
     }
     if (a.show.map) refuse("--show is for single pictures, and excludes --path.");

@@ -118,8 +118,12 @@ TEST_F(MuseumTest, TheFinerTheBarsShadowsTheCoarserTheLevel) {
         before = now;
     }
     EXPECT_GE(before, without + 1);
-    // Fine bars before it mask more than their shadows do. Of coarse ones the shadows mask more, for they are on it.
-    EXPECT_GT(level(MuseumBars::gate, 32), before);
+}
+
+TEST_F(MuseumTest, TheLevelFallsAgainFromShadowToGate) {
+    EXPECT_GE(level(MuseumBars::gate, 8), level(MuseumBars::window, 8));
+    for (const double bars_per_metre : {16.0, 32.0})
+        EXPECT_GT(level(MuseumBars::gate, bars_per_metre), level(MuseumBars::window, bars_per_metre)) << bars_per_metre;
 }
 
 TEST_F(MuseumTest, CutsBehindBarsNeedFewerTriangles) {
@@ -133,6 +137,7 @@ TEST_F(MuseumTest, CutsBehindBarsNeedFewerTriangles) {
     EXPECT_LT(fine.masked, 0.99 * coarse.masked);
     // A cut holds what it promises wherever the shadows are: theirs take nothing from it, and add nothing.
     EXPECT_LE(shadows.masked, shadows.unmasked);
+    EXPECT_LT(fine.masked / fine.unmasked, shadows.masked / shadows.unmasked);
     RecordProperty("triangles", std::to_string(coarse.unmasked) + " " + std::to_string(coarse.masked) + " " +
                                     std::to_string(fine.masked) + " " + std::to_string(shadows.masked));
 }

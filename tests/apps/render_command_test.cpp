@@ -334,7 +334,6 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
                                                          {"--path", "orbit:1", "-o", "same.png"},
                                                          {"--path", "orbit:1", "-o", "%d%d.png"},
                                                          {"--path", "orbit:1", "-o", "%s.png"},
-                                                         {"--threshold", "2", "-o", "a.png"},
                                                          {"--path", "orbit:1", "--threshold", "0"},
                                                          {"--geomorph", "0.2", "-o", "a.png"},
                                                          {"--path", "orbit:1", "--geomorph", "-1"},

@@ -214,4 +214,41 @@ TEST_F(TexturedSceneTest, GoesThroughTheCommandFromEndToEnd) {
     }
 }
 
+// As one model, under its own light: nothing is seen, and aside or far away little is kept.
+TEST_F(TexturedSceneTest, FoldsWhereNobodySeesIt) {
+    const auto draw = [&](const std::vector<std::string>& view, const std::vector<std::string>& how) {
+        std::vector<std::string> words = {"render", "in/scene.gltf", "--as",   "model",
+                                          "--size", "256x256",       "--json", "-"};
+        words.insert(words.end(), view.begin(), view.end());
+        words.insert(words.end(), how.begin(), how.end());
+        return run(words);
+    };
+    const auto aside = [](std::vector<std::string> view) {
+        view.insert(view.end(), {"--gaze", "1200", "128"});
+        return view;
+    };
+    struct Far {
+        std::vector<std::string> view;
+        double most_kept; // of the triangles
+    };
+    const Far far[] = {{{"--direction", "0", "0.2", "1", "--fill", "0.5"}, 1.01},
+                       {{"--direction", "-1", "0.5", "-0.4", "--fill", "0.1"}, 0.97},
+                       {aside({"--direction", "1", "-0.3", "0.2", "--fill", "0.3"}), 0.32},
+                       {aside({"--direction", "0", "0.2", "1", "--fill", "0.1"}), 0.15},
+                       {{"--direction", "0", "0.2", "1", "--fill", "0.02"}, 0.18}};
+    for (const Far& look : far) {
+        const Outcome whole = draw(look.view, {"--full", "-o", "whole.pfm"});
+        if (whole.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << whole.err;
+        ASSERT_EQ(whole.status, 0) << whole.err;
+        const Outcome cut = draw(look.view, {"-o", "cut.pfm"});
+        ASSERT_EQ(cut.status, 0) << cut.err;
+        EXPECT_THAT(effect_named(cut.json(), "fold test")["why"].get<std::string>(), ::testing::StartsWith("error:"));
+        std::vector<std::string> words = {"compare", "whole.pfm", "cut.pfm", "--json", "-"};
+        if (look.view.size() > 6) words.insert(words.end(), look.view.end() - 3, look.view.end());
+        EXPECT_EQ(succeed(words).json()["visible_pixels"], 0);
+        const double kept = cut.json()["triangles"].get<double>() / whole.json()["triangles"].get<double>();
+        EXPECT_LT(kept, look.most_kept);
+    }
+}
+
 } // namespace

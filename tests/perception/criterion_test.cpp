@@ -409,7 +409,12 @@ TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
     mesh.texture = textures::noise(8, 8, 1);
     const auto textured = vdtree::build_tree(mesh.view());
     ASSERT_TRUE(textured);
-    for (const VertexTree* tree : {&*measured, &*coloured, &*textured}) {
+    mesh.colours.clear(); // of several hues, what folds change of the texture is not measured
+    const auto uncoloured = vdtree::build_tree(mesh.view());
+    ASSERT_TRUE(uncoloured);
+    const auto measured_texture = measure_folds(*uncoloured, 1);
+    ASSERT_TRUE(measured_texture);
+    for (const VertexTree* tree : {&*measured, &*coloured, &*textured, &*measured_texture}) {
         const auto [taken, refused] = survive_random_lies(*tree, 3);
         EXPECT_GT(taken, 50);
         EXPECT_GT(refused, 15);

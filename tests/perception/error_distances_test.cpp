@@ -190,7 +190,7 @@ TEST(ErrorDistances, RefuseFactorsThatAreNone) {
              {&FoldModel::needed_by_areas, &FoldModel::peak_of_shift, &FoldModel::moved_by_neighbours,
               &FoldModel::contact_reach, &FoldModel::least_sine, &FoldModel::sampled_shift_px,
               &FoldModel::amplitude_of_point_mean, &FoldModel::amplitude_of_shift_mean, &FoldModel::longest_ring,
-              &FoldModel::between_directions}) {
+              &FoldModel::between_directions, &FoldModel::contrast_of_textures}) {
             options.model = {};
             options.model.*factor = none;
             EXPECT_FALSE(error_distances(tree, view, options));

@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include <perception/fold_measurement.h>
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 #include <vdtree/texture.h>
@@ -146,14 +145,6 @@ TEST(TexturedRings, MoveByNoMoreThanTheirDeviation) {
         }
     }
     EXPECT_GT(smaller, looked / 4);
-}
-
-TEST(TexturedRings, AreNotMeasuredByFolds) {
-    const VertexTree tree = built(textures::textured_grid(4, textures::checkerboard(8, 8, 2, 0, 255)));
-    const auto measured = measure_folds(tree);
-    ASSERT_FALSE(measured);
-    EXPECT_NE(measured.error().message.find("texture"), std::string::npos);
-    EXPECT_TRUE(measure_folds(*tree.untextured()));
 }
 
 } // namespace

@@ -97,7 +97,7 @@ TEST_F(DepthCellsTest, AreTheExtremesOfTheirPixels) {
             }
             EXPECT_GT(background, 10);
             EXPECT_GT(edges, 10);
-            EXPECT_TRUE(unseen::vdtree::OcclusionMap::create(view(), **cells, 0.1));
+            EXPECT_TRUE(unseen::vdtree::OcclusionMap::create(view(), **cells, {.around = 0.1}));
         }
     }
 }

@@ -125,6 +125,9 @@ Effect texture_effect(const Sight& sight, const Decision& decision) {
         return {"texture", false,
                 sight.object.texture_left_out ? "load.without_textures leaves it out" : "the model has none"};
     if (!is_perceptual(decision)) return {"texture", true, "drawn; folds are not tested against it"};
+    if (decision.test == FoldTest::error)
+        return {"texture", true,
+                "folds are tested against what they change of it, and its detail against how far they move it"};
     if (decision.test == FoldTest::luebke_hallen_safe)
         return {"texture", true,
                 "folds are tested against its darkest and brightest texels around them, and by how far they move it"};

@@ -28,6 +28,12 @@ perception::FoldTestOptions test_options(const Sight& sight, const Request& requ
 
 // ---- which test
 
+bool knows_texture(const Sight& sight) {
+    std::optional<bool>& known = sight.cache.knows_texture;
+    if (!known) known = perception::knows_texture(sight.object.tree);
+    return *known;
+}
+
 struct Choice {
     FoldTest test = FoldTest::error;
     std::string_view why = {};
@@ -40,8 +46,9 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
         return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
     if (sight.lighting && sight.lighting->specular > 0)
         return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
-    if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
+    if (!knows_texture(sight))
+        return {FoldTest::luebke_hallen_safe, "the test error does not know textures over vertices of several hues"};
     if (sight.lighting && sight.is_crowded)
         return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
     if (sight.lighting && sight.cache.lit_folds) return {};
@@ -68,10 +75,10 @@ Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, boo
     if (chroma)
         return invalid_argument(
             "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
-    if (test == FoldTest::error)
-        return invalid_argument(
-            "request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
-            "load.without_textures.");
+    if (test == FoldTest::error && !knows_texture(sight))
+        return invalid_argument("request.fold_test = error does not measure textures over vertices of several hues: "
+                                "use request.fold_test = "
+                                "luebke-hallen-safe, or add load.without_textures.");
     return {};
 }
 

@@ -33,7 +33,7 @@ struct LoadedTree {
 // open_tree() where `may_map`, else load_tree().
 Result<LoadedTree> load(const std::filesystem::path& file, const LoadOptions& options, bool may_map);
 
-// Null where nothing is kept, and of textured trees.
+// Null where nothing is kept.
 std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, const std::string& key,
                                                       const std::filesystem::path& file,
                                                       const vdtree::VertexTree& tree);

@@ -46,7 +46,8 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     if (!tree) return tree;
     if (const std::string hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
-    const bool measures = options.measures && tree->texture().empty() && tree->interior_count() <= most_measured;
+    const bool measures =
+        options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
     return measures ? measured(*tree, 0, options.messages.progress) : std::move(tree);
 }
 
@@ -149,7 +150,7 @@ Result<LoadedTree> load(const fs::path& file, const LoadOptions& options, bool m
     LoadedTree loaded{std::move(*tree), TreeOrigin::file};
     TreeCache cache(options.cache);
     const bool has_all = perception::has_fold_measurement(loaded.tree) && perception::has_lit_folds(loaded.tree);
-    if (!cache.is_on() || is_large || has_all || !loaded.tree.texture().empty()) return loaded;
+    if (!cache.is_on() || is_large || has_all) return loaded;
     if (auto key = cache_key(file, options))
         loaded.measurement = std::make_shared<const MeasurementPlace>(
             MeasurementPlace{std::move(cache), std::move(*key), file, loaded.tree.share()});
@@ -178,6 +179,8 @@ std::string hint_at_baked_light(const vdtree::VertexTree& tree) {
 }
 
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads, const Progress& progress) {
+    if (!tree.texture().empty())
+        return perception::measure_folds(tree, threads, progress); // its light is the texture's
     const auto conserved = vdtree::conserve_light(tree);
     if (!conserved) return conserved.error();
     return perception::measure_folds(*conserved, threads, progress);
@@ -196,7 +199,7 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
 
 std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, const std::string& key,
                                                       const fs::path& file, const vdtree::VertexTree& tree) {
-    if (!cache.is_on() || !tree.texture().empty()) return nullptr;
+    if (!cache.is_on()) return nullptr;
     return std::make_shared<const MeasurementPlace>(MeasurementPlace{cache, key, file, tree.share(), false});
 }
 

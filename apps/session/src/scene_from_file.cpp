@@ -10,6 +10,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <perception/fold_measurement.h>
 #include <vdtree/builder.h>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_format.h>
@@ -83,7 +84,7 @@ private:
         auto read = read_part(part);
         if (!read) return read.error();
         if (!*read) return {};
-        const bool measures = measures_ && part.folds && (*read)->mesh.texture.texels.empty();
+        const bool measures = measures_ && part.folds;
         const std::string key = mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, measures);
         if (cache_.is_on()) {
             auto kept = cache_.find(key);
@@ -100,7 +101,8 @@ private:
         building.prelit = options_.prelit;
         auto tree = vdtree::build_tree((*read)->mesh.view(), building);
         if (!tree) return in_file(name_, tree.error());
-        if (measures && tree->interior_count() <= most_measured) tree = measured(*tree);
+        if (measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree))
+            tree = measured(*tree);
         if (!tree) return in_file(name_, tree.error());
         const std::lock_guard lock(mutex_);
         ++built_;

@@ -24,6 +24,7 @@ struct ObjectCache {
     std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
     std::optional<perception::CutRings> cut_rings = {};
     std::optional<vdtree::Sphere> all = {}; // see sphere_of_all()
+    std::optional<bool> knows_texture = {}; // see perception::knows_texture()
     bool rings_have_chroma = false;         // few requests look at colours, and bounding them takes time
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
     std::optional<perception::LitFolds> lit_folds = {};  // measured where the default test asks for it

@@ -23,11 +23,18 @@ namespace unseen::perception {
 // A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the pictures' cells and the
 // points are few.
 //
-// Fails where check() does, and on trees with a texture, of which nothing is measured. Cost: some 25 us a node, and a
-// second; in parallel. The result does not depend on the threads. `threads`: 0: all cores. Progress is told, and can
+// With a texture, what is seen of it at the texture coordinates that the surfaces have there is compared, and detail finer
+// than the pictures' cells counts by how far the fold slides it over the surface (fold_texture).
+//
+// Fails where check() does, and where knows_texture() is false. Cost: some 25 us a node, and a second; some two to four
+// times that with a texture; in parallel. The result does not depend on the threads. `threads`: 0: all cores. Progress is told, and can
 // cancel, up to the whole mesh's pictures.
 Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0,
                                          const Progress& progress = {});
+
+// Whether a tree has no texture, or one over vertices of one hue. Those of several hues show different luminances of one
+// texel, which is not measured. Cost: a pass over the nodes, where there are colours and a texture.
+bool knows_texture(const vdtree::VertexTree& tree);
 
 // Whether a tree comes from there. What files say is looked at when a criterion is made.
 bool has_fold_measurement(const vdtree::VertexTree& tree);

@@ -490,6 +490,18 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
+// Of a textured tree: by how much the light of a ring's vertices differs where the texture is brightest. What is moved of
+// the texture is measured.
+double spread_of_vertices(const vdtree::SoundTree& tree, NodeId node) {
+    constexpr float least_texture = 1.0f / 64; // that tells the vertices' luminance well
+    const vdtree::LuminanceRange drawn = tree.ring_luminance()[node], texture = tree.ring_texture()[node];
+    if (!(texture.hi > 0)) return 0;
+    const NodeId around = node > 0 ? tree.parents()[node] : node;
+    const float darkest = texture.lo >= least_texture ? drawn.lo / texture.lo
+                                                      : vdtree::LuminanceRange(tree.support_luminance()[around]).lo;
+    return static_cast<double>(std::max(drawn.hi - darkest * texture.hi, 0.0f));
+}
+
 // What nodes show, no less than their children: patches, and strips where they are outlines. Of several trees, which
 // are one under different lights, whatever shows more. False where the rows do not suffice.
 bool find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& options, const Levels& levels,
@@ -504,12 +516,15 @@ bool find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& option
                               summation_gain(CyclesPerDegree(highest_cpd), disc(180), csf.samples().summation);
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
+    const bool textured = !tree.texture().empty();
     const auto patch_of = [&](const LitErrors& lit, NodeId node) {
         const std::span<const FoldError> errors = lit.errors;
         const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
-        const double edge = levels.difference_in_cdm2(lit.edge_of_shadow(node)), moved = std::max(hi - lo, edge);
+        const double edge = levels.difference_in_cdm2(lit.edge_of_shadow(node)),
+                     moved = std::max(
+                         textured ? levels.difference_in_cdm2(spread_of_vertices(*lit.tree, node)) : hi - lo, edge);
         const auto change = [&](float luminance, double distance) {
             if (tree.bounds()[node].flags & vdtree::translucent_ring)
                 return brightest - darkest; // anything may show through
@@ -675,7 +690,7 @@ Result<void> validate(const FoldModel& m) {
     for (const double factor :
          {m.neighbourhood, m.needed_by_areas, m.needed_by_outlines, m.needed_by_borders, m.peak_of_shift,
           m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
-          m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+          m.amplitude_of_shift_mean, m.longest_ring, m.between_directions, m.contrast_of_textures})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
     for (std::size_t i = 0; i < m.needed.size(); ++i)

@@ -47,6 +47,16 @@ void find_luminance(const FoldRecord& record, const BandShares& shares, FoldErro
     error.luminance = std::max(error.luminance, error.wide_luminance);
 }
 
+// Detail is of parts of the patch, as many octaves narrower as its waves are.
+void find_texture(const FoldTexture& texture, LuminanceRange drawn, FoldError& error) {
+    const float middle = (drawn.lo + drawn.hi) / 2 + FoldStage::black; // that a criterion divides by
+    for (std::size_t octaves = 0; octaves < texture_octaves; ++octaves) {
+        const float amplitude = texture.contrast[octaves] * middle;
+        error.luminance = std::max(error.luminance, amplitude);
+        error.wide_luminance = std::max(error.wide_luminance, amplitude * std::exp2(-2 * static_cast<float>(octaves)));
+    }
+}
+
 Error refused(const std::string& what) {
     return {ErrorCode::malformed_data, "The measurement of the tree's folds is damaged: " + what +
                                            " Measure it again, or build the tree again from its mesh."};
@@ -55,7 +65,8 @@ Error refused(const std::string& what) {
 } // namespace
 
 std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const FoldRecord> records,
-                                     std::span<const FoldFacing> facing, const FoldModel& model) {
+                                     std::span<const FoldFacing> facing, std::span<const FoldTexture> textures,
+                                     const FoldModel& model) {
     const BandShares shares(model.most_side_by_side);
     // Errors are floats, and so are the factors of them.
     const auto peak_of_shift = static_cast<float>(model.peak_of_shift),
@@ -63,7 +74,8 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
                amplitude_of_point_mean = static_cast<float>(model.amplitude_of_point_mean),
                longest_ring = static_cast<float>(model.longest_ring),
                contact_reach = static_cast<float>(model.contact_reach),
-               least_sine = static_cast<float>(model.least_sine);
+               least_sine = static_cast<float>(model.least_sine),
+               contrast_of_textures = static_cast<float>(model.contrast_of_textures);
     std::vector<FoldError> errors(records.size());
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         const FoldRecord& record = records[node];
@@ -80,6 +92,10 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.distance = std::max({error.distance, shift, moved_point});
             error.luminance = std::max(error.luminance, record.largest_luminance);
             error.wide_luminance = std::max(error.wide_luminance, amplitude_of_point_mean * record.mean_luminance);
+        }
+        if (!textures.empty()) {
+            find_texture(textures[node], tree.ring_luminance()[node], error);
+            error.luminance *= contrast_of_textures, error.wide_luminance *= contrast_of_textures;
         }
         error.extent = std::max(error.extent, record.extent);
         error.outline = std::max(error.outline, record.border);
@@ -108,6 +124,7 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
     const auto facing = tree.attribute<FoldFacing>(facing_name);
     const auto stage_of = tree.attribute<std::uint8_t>(stage_of_name);
     const auto settings = tree.attribute<float>(settings_name);
+    const auto textures = tree.attribute<FoldTexture>(texture_name);
     if (records.empty())
         return Error{ErrorCode::invalid_argument,
                      "The errors of the tree's folds have not been measured (perception::measure_folds)."};
@@ -115,7 +132,8 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
         return Error{ErrorCode::unsupported, "The tree's folds were measured with other settings than this program "
                                              "knows: measure them again (perception::measure_folds)."};
     const std::size_t nodes = tree.interior_count();
-    if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes)
+    if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
+        textures.size() != (tree.texture().empty() ? 0 : nodes))
         return refused("a part of it is missing.");
     FoldErrors all;
     all.stages = tree.attribute<FoldStage>(stages_name);
@@ -123,11 +141,12 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
         if (!is_sound(stage)) return refused("a contrast of a stage is negative or not finite.");
     for (NodeId node = 0; node < nodes; ++node) {
         const bool has_stage = all.stages.empty() || stage_of[node] < all.stages.size();
-        if (!is_sound(records[node]) || facing[node].fading > most_fading)
+        if (!is_sound(records[node]) || facing[node].fading > most_fading ||
+            !(textures.empty() || is_sound(textures[node])))
             return refused("an error of node " + std::to_string(node) + " is negative or not finite.");
         if (!has_stage) return refused("node " + std::to_string(node) + " folds in a stage that is not there.");
     }
-    all.of_nodes = nested_errors(tree, records, facing, model);
+    all.of_nodes = nested_errors(tree, records, facing, textures, model);
     for (NodeId node = tree.interior_count(); node-- > 0;) {
         FoldError& error = all.of_nodes[node];
         error.stage = std::max(error.stage, stage_of[node]);

@@ -34,7 +34,8 @@ struct FoldError {
 
 // The model's errors of measured folds, all of them numbers, without stages. Cost: one pass over the nodes.
 std::vector<FoldError> nested_errors(const vdtree::SoundTree& tree, std::span<const FoldRecord> records,
-                                     std::span<const FoldFacing> facing, const FoldModel& model = {});
+                                     std::span<const FoldFacing> facing, std::span<const FoldTexture> textures = {},
+                                     const FoldModel& model = {});
 
 struct FoldErrors {
     std::vector<FoldError> of_nodes;

@@ -127,6 +127,7 @@ public:
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
           boxes_(interior_), of_leaf_(tree_),
           boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
+        is_textured_ = !trees.front().texture().empty();
         for (const SoundTree& tree : trees) luminances_.push_back(tree.luminance().subspan(interior_));
         const auto leaves = tree_.positions().subspan(interior_);
         positions_.assign(leaves.begin(), leaves.end());
@@ -169,6 +170,7 @@ private:
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
     bool look_alike(Index a, Index b) const {
+        if (is_textured_) return false; // whatever their vertices do
         const Triangle &s = triangles_[a], &t = triangles_[b];
         return std::all_of(luminances_.begin(), luminances_.end(), [&](std::span<const Unorm16> luminance) {
             const auto mean = [&](const Triangle& of) {
@@ -300,6 +302,7 @@ private:
     float scale_;                                      // in which they are measured
     std::vector<glm::vec3> positions_;                 // of leaves
     std::vector<std::span<const Unorm16>> luminances_; // likewise, by tree
+    bool is_textured_ = false;
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
     LeafTriangles of_leaf_;

@@ -147,12 +147,37 @@ UNSEEN_AVX2 void draw_avx2(const Shown& t, float* heights, float* lights) { draw
 constexpr auto draw_avx2 = draw_plain;
 #endif
 
+// The same with a texture, sample by sample, of texels no wider than the samples are apart: the cells' means smooth them.
+void draw_textured(const Shown& t, const TexturedLight& light, const std::array<glm::vec2, 3>& uv, float* heights,
+                   float* lights) {
+    const glm::vec2 ub = uv[1] - uv[0], uc = uv[2] - uv[0], size = light.texture->size();
+    const glm::vec2 along_x = (ub * t.v_by.x + uc * t.w_by.x) * size, along_y = (ub * t.v_by.y + uc * t.w_by.y) * size;
+    const float texels = std::max({std::abs(along_x.x), std::abs(along_x.y), std::abs(along_y.x), std::abs(along_y.y)});
+    const std::size_t first_wider = light.texture->level_of(texels), level = first_wider > 0 ? first_wider - 1 : 0;
+    const float left = std::min({t.a[0], t.b[0], t.c[0]}), right = std::max({t.a[0], t.b[0], t.c[0]});
+    for (std::size_t y = t.first; y < t.end; ++y) {
+        const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - t.a[1];
+        const std::size_t x0 = count_before(left - offset), x1 = count_before(right - offset);
+        for (std::size_t x = x0; x < x1; ++x) {
+            const float px = static_cast<float>(x) + offset - t.a[0];
+            const float v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
+            if (!(v >= 0 && w >= 0 && u >= 0)) continue;
+            const float height = u * t.a[2] + v * t.b[2] + w * t.c[2];
+            const std::size_t sample = y * samples + x;
+            if (!(height > heights[sample])) continue;
+            heights[sample] = height;
+            lights[sample] = light.with_texture(u * t.of_a + v * t.of_b + w * t.of_c,
+                                                light.texture->nearest(level, uv[0] + v * ub + w * uc));
+        }
+    }
+}
+
 class Painter {
 public:
     // The surfaces' memory is used again.
-    Painter(const VertexTree& tree, const Camera& camera, Surfaces& surfaces)
-        : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), closedness_(tree.closedness()),
-          surfaces_(surfaces) {
+    Painter(const VertexTree& tree, const TexturedLight& light, const Camera& camera, Surfaces& surfaces)
+        : light_(light), camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), uvs_(tree.uvs()),
+          closedness_(tree.closedness()), surfaces_(surfaces) {
         surfaces_.clear();
     }
 
@@ -210,12 +235,17 @@ private:
         t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
         t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
         t.of_a = luminance_[corners[0]], t.of_b = luminance_[corners[1]], t.of_c = luminance_[corners[2]];
+        if (light_.texture)
+            return draw_textured(t, light_, {uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]},
+                                 surfaces_.height.data(), surfaces_.light.data());
         (has_avx2() ? draw_avx2 : draw_plain)(t, surfaces_.height.data(), surfaces_.light.data());
     }
 
+    const TexturedLight& light_;
     const Camera& camera_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
+    std::span<const glm::vec2> uvs_;
     Closedness closedness_;
     Surfaces& surfaces_;
 };
@@ -321,8 +351,10 @@ FoldStage contrasts(const Bands& mesh, const Bands& difference) {
 
 class StageFinder {
 public:
-    StageFinder(const SoundTree& tree, std::span<FoldError> errors, MeasuringProgress& progress)
-        : tree_(tree), errors_(errors), progress_(progress), interior_(tree.interior_count()), parents_(tree.parents()),
+    StageFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
+                std::span<FoldError> errors, MeasuringProgress& progress)
+        : tree_(tree), light_(light), textures_(textures), errors_(errors), progress_(progress),
+          interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (NodeId& corner : t) corner += interior_;
@@ -352,6 +384,7 @@ public:
             });
             for (const FoldStage& from : found) unite(stages[stage], from);
         }
+        if (!textures_.empty()) add_detail(stages);
         return stages;
     }
 
@@ -380,6 +413,33 @@ private:
         return std::size_t{stage} + 1;
     }
 
+    // With a texture, patterns finer than the pictures' cells may change as no outline does, which the cells' means do
+    // not show: those of any node that has been folded count. Whoever looks at contrasts finer than the first band takes
+    // twice its contrast for each octave, up to three.
+    void add_detail(std::vector<FoldStage>& stages) const {
+        constexpr float most_octaves = 3;
+        const float cell = 2 * margin * tree_.bounding_sphere().radius / static_cast<float>(side);
+        const float first_wave = cell / static_cast<float>(nominal_frequency(0));
+        std::vector<float> most(stages.size(), 0.0f); // contrasts of the first band
+        for (NodeId node = 0; node < interior_; ++node) {
+            const float width = changed_radius(tree_, errors_, node);
+            const auto note = [&](float contrast, float wave) {
+                if (!(wave < first_wave)) return;
+                const float octaves = std::min(std::floor(std::log2(first_wave / wave)), most_octaves);
+                float& to = most[errors_[node].stage];
+                to = std::max(to, contrast * std::exp2(-octaves));
+            };
+            const LuminanceRange drawn = tree_.ring_luminance()[node];
+            note(errors_[node].luminance / ((drawn.lo + drawn.hi) / 2 + FoldStage::black), width);
+            for (std::size_t k = 0; k < texture_octaves; ++k)
+                note(textures_[node].contrast[k], width * std::exp2(-static_cast<float>(k)));
+        }
+        for (std::size_t stage = 0; stage < stages.size(); ++stage) {
+            if (stage > 0) most[stage] = std::max(most[stage], most[stage - 1]);
+            for (auto& by_band : stages[stage].contrast) by_band[0][0] = std::max(by_band[0][0], most[stage]);
+        }
+    }
+
     void fold(std::size_t stage) {
         const auto goes_on = [&](NodeId node) {
             return parents_[node] != no_node && errors_[parents_[node]].stage <= stage;
@@ -396,7 +456,7 @@ private:
     void for_each_picture(F&& f) {
         tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
             if (progress_.is_cancelled()) return;
-            f(i, Painter(tree_, cameras_[i], surfaces_.local()).draw(triangles_));
+            f(i, Painter(tree_, light_, cameras_[i], surfaces_.local()).draw(triangles_));
             progress_.add(dearness_);
         });
     }
@@ -409,6 +469,8 @@ private:
     }
 
     const SoundTree& tree_;
+    TexturedLight light_;
+    std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
     MeasuringProgress& progress_;
     double dearness_ = 1; // of a picture, of the first ones'
@@ -424,11 +486,13 @@ private:
 
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 
-std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<FoldError> errors, MeasuringProgress& progress) {
+std::vector<FoldStage> find_stages(const SoundTree& tree, const TexturedLight& light,
+                                   std::span<const FoldTexture> textures, std::span<FoldError> errors,
+                                   MeasuringProgress& progress) {
     const float radius = tree.bounding_sphere().radius;
     const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
     if (is_translucent || !(radius > 0) || !std::isfinite(side / (2 * radius))) return {};
-    return StageFinder(tree, errors, progress).run();
+    return StageFinder(tree, light, textures, errors, progress).run();
 }
 
 } // namespace unseen::perception

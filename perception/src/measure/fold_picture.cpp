@@ -17,6 +17,7 @@ namespace {
 
 constexpr float nothing = -std::numeric_limits<float>::infinity(); // seen in a cell
 constexpr std::size_t side = FoldPicture::side, bands = FoldPicture::bands;
+constexpr float least_seen = 0.05f; // of the cells around, for a mean over them to say anything
 
 // ---- drawing
 
@@ -172,9 +173,9 @@ UNSEEN_INLINE float find_largest_mean(Worktop& on) {
     return largest_of(most);
 }
 
-// The largest absolute values of the difference in each band.
+// The largest absolute values of the difference in each band, times the weights of its cells; null: 1.
 template <class Floats>
-UNSEEN_INLINE void split(Worktop& on, float* largest) {
+UNSEEN_INLINE void split(Worktop& on, const float* weights, float* largest) {
     Framed *low = &on.difference, *lower = &on.seen; // take turns
     for (std::size_t band = 0; band < bands; ++band, std::swap(low, lower)) {
         const std::size_t step = std::size_t{1} << band;
@@ -182,8 +183,8 @@ UNSEEN_INLINE void split(Worktop& on, float* largest) {
         smooth<Floats>(*lower, step, on.half_smooth, on.smooth);
         Floats most{};
         for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
-            const Floats amplitude =
-                magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
+            Floats amplitude = magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
+            if (weights) amplitude *= floats_at<Floats>(weights + (band * side + y) * side + x);
             most = most < amplitude ? amplitude : most;
         });
         largest[band] = largest_of(most);
@@ -195,6 +196,8 @@ template <std::size_t count>
 struct Compared {
     const float *mesh_height, *folded_height;
     std::array<const float*, count> mesh_luminance, folded_luminance;
+    std::size_t compared; // of the luminances
+    const float* weights; // by band and cell; null: 1
 };
 
 // Puts by how much one differs from the other where both are seen on the worktop.
@@ -215,9 +218,9 @@ UNSEEN_INLINE void compare_cells(const Compared<count>& c, typename FoldPictureO
     Worktop& on = worktop;
     subtract<Floats>(c, c.folded_height, c.mesh_height, on);
     difference.shift = find_largest_mean<Floats>(on);
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < c.compared; ++i) {
         subtract<Floats>(c, c.folded_luminance[i], c.mesh_luminance[i], on);
-        split<Floats>(on, difference.amplitudes[i].data());
+        split<Floats>(on, c.weights, difference.amplitudes[i].data());
     }
 }
 template <std::size_t count>
@@ -331,15 +334,17 @@ float FoldPictureOf<count>::wavelength(std::size_t band) const {
 }
 
 template <std::size_t count>
-typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference() const {
+typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference(std::size_t compared_count,
+                                                                           const BandCells* weights) const {
     static const std::array<float, bands> gains = [] {
         std::array<float, bands> all;
         for (std::size_t band = 0; band < bands; ++band) all[band] = static_cast<float>(band_gain(band));
         return all;
     }();
     const auto& [mesh, folded] = pictures_;
-    Difference difference;
-    Compared<count> compared{mesh.height.data(), folded.height.data(), {}, {}};
+    Difference difference{};
+    Compared<count> compared{
+        mesh.height.data(), folded.height.data(), {}, {}, compared_count, weights ? weights->front().data() : nullptr};
     for (std::size_t i = 0; i < count; ++i) {
         compared.mesh_luminance[i] = mesh.luminance[i].data();
         compared.folded_luminance[i] = folded.luminance[i].data();
@@ -350,8 +355,43 @@ typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference() con
     return difference;
 }
 
+template <std::size_t count>
+void FoldPictureOf<count>::find_means(Layer layer, const Cells& values, BandCells& means) const {
+    const Cells& height = pictures_[static_cast<std::size_t>(layer)].height;
+    Worktop& on = worktop;
+    for (std::size_t cell = 0; cell < height.size(); ++cell) {
+        const bool seen = is_seen(height[cell]);
+        on.difference.row(cell / side)[cell % side] = seen ? values[cell] : 0.0f;
+        on.seen.row(cell / side)[cell % side] = seen ? 1.0f : 0.0f;
+    }
+    for (std::size_t band = 0; band < bands; ++band) {
+        const std::size_t step = std::size_t{1} << band;
+        for (Framed* const plane : {&on.difference, &on.seen}) // the next band's
+            smooth<vdtree::Float4>(*plane, step, on.half_smooth, *plane);
+        smooth<vdtree::Float4>(on.difference, step, on.half_smooth, on.smooth);
+        smooth<vdtree::Float4>(on.seen, step, on.half_smooth, on.mean_seen);
+        for (std::size_t cell = 0; cell < height.size(); ++cell) {
+            const float share = on.mean_seen.row(cell / side)[cell % side];
+            means[band][cell] = share > least_seen ? on.smooth.row(cell / side)[cell % side] / share : -1.0f;
+        }
+    }
+}
+
+template <std::size_t count>
+float FoldPictureOf<count>::largest_mean(const Cells& values) const {
+    const auto& [mesh, folded] = pictures_;
+    Worktop& on = worktop;
+    for (std::size_t cell = 0; cell < values.size(); ++cell) {
+        const bool seen = is_seen(mesh.height[cell]) && is_seen(folded.height[cell]);
+        on.difference.row(cell / side)[cell % side] = seen ? values[cell] : 0.0f;
+        on.seen.row(cell / side)[cell % side] = seen ? 1.0f : 0.0f;
+    }
+    return find_largest_mean<vdtree::Float4>(on);
+}
+
 template class FoldPictureOf<1>;
 template class FoldPictureOf<3>;
 template class FoldPictureOf<4>;
+template class FoldPictureOf<6>;
 
 } // namespace unseen::perception

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -13,10 +14,10 @@
 namespace unseen::perception {
 
 // What is measured of several luminances at once fills whole registers.
-constexpr std::size_t luminances_kept(std::size_t count) { return count == 1 ? 1 : 5; }
+constexpr std::size_t luminances_kept(std::size_t count) { return count == 1 ? 1 : count <= 5 ? 5 : 9; }
 
 template <std::size_t count>
-struct alignas(16) LitPointOf { // one register, or two
+struct alignas(16) LitPointOf { // one register, two or three
     glm::vec3 position;
     float luminance[luminances_kept(count)];
 };
@@ -60,16 +61,25 @@ public:
         // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
         float shift;
     };
-    Difference difference() const;
+    // Of the first `compared` luminances alone, each band's difference times its cell's weight; null: 1.
+    using Cells = std::array<float, side * side>;
+    using BandCells = std::array<Cells, bands>;
+    Difference difference(std::size_t compared = count, const BandCells* weights = nullptr) const;
     float wavelength(std::size_t band) const; // mesh units
 
-private:
-    using Cells = std::array<float, side * side>;
+    // What lies in the cells, to be changed before it is compared.
     struct Picture {
         std::array<Cells, count> luminance;
         Cells height; // none: nothing is seen
     };
+    Picture& picture(Layer layer) { return pictures_[static_cast<std::size_t>(layer)]; }
+    static bool is_seen(float height) { return height > -std::numeric_limits<float>::infinity(); }
+    // The means that bands are differences from, of values where a layer is seen; negative where too little of it is.
+    void find_means(Layer layer, const Cells& values, BandCells& means) const;
+    // The largest mean over some cells, as outlines are seen, of values where both layers are.
+    float largest_mean(const Cells& values) const;
 
+private:
     glm::vec3 centre_;
     glm::mat3 axes_; // right, up, normal
     float cell_ = 1; // mesh units
@@ -80,5 +90,6 @@ using FoldPicture = FoldPictureOf<1>;
 extern template class FoldPictureOf<1>;
 extern template class FoldPictureOf<3>;
 extern template class FoldPictureOf<4>;
+extern template class FoldPictureOf<6>;
 
 } // namespace unseen::perception

@@ -15,7 +15,7 @@ namespace unseen::perception {
 
 inline constexpr std::string_view record_name = "fold_errors", facing_name = "fold_facing",
                                   stage_of_name = "fold_stage", stages_name = "fold_stages",
-                                  settings_name = "fold_measurement";
+                                  settings_name = "fold_measurement", texture_name = "fold_texture";
 
 // Of an interior node. Lengths in mesh units, luminances relative, 0..1. Neighbours: folded as far as nodes that are no
 // larger than this one and not much richer in luminance, or not at all; the larger of the two counts.
@@ -62,6 +62,27 @@ struct FoldFacing {
 };
 static_assert(sizeof(FoldFacing) == 16);
 inline constexpr std::uint8_t most_fading = 3;
+
+// What a fold changes of a texture's detail; of textured trees alone.
+inline constexpr std::size_t texture_octaves = 8;
+inline constexpr float most_texture_contrast = 8;
+struct FoldTexture {
+    using Component = float;
+
+    // Contrasts of gratings over the local mean, by how many octaves their waves are narrower than what changes is wide;
+    // narrower ones count as the last.
+    float contrast[texture_octaves] = {};
+    float mean = 0;  // of the texture's luminance on the mesh around the node, 0..1
+    float slide = 0; // of the texture over the surface, in the mean over some cells: as a share of the width, 0..1
+
+    bool operator==(const FoldTexture&) const = default;
+};
+static_assert(sizeof(FoldTexture) == (texture_octaves + 2) * sizeof(float));
+inline bool is_sound(const FoldTexture& texture) {
+    bool sound = texture.mean >= 0 && texture.mean <= 1 && texture.slide >= 0 && texture.slide <= 1;
+    for (const float contrast : texture.contrast) sound &= contrast >= 0 && contrast <= most_texture_contrast;
+    return sound;
+}
 
 // Whether all of it are numbers that a measurement can give.
 inline bool is_sound(const FoldRecord& r) {

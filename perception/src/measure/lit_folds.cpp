@@ -46,7 +46,8 @@ constexpr auto settings = [] {
     return all;
 }();
 constexpr std::string_view lit_record_name = "lit_folds", lit_facing_name = "lit_facing",
-                           lit_albedo_name = "lit_albedo", lit_settings_name = "lit_measurement";
+                           lit_albedo_name = "lit_albedo", lit_texture_name = "lit_texture",
+                           lit_settings_name = "lit_measurement";
 
 // What a fold changes of a luminance: of FoldRecord.
 struct Shades {
@@ -109,6 +110,9 @@ void include(const FoldFacing& other, FoldFacing& facing) {
     facing.is_height_field &= other.is_height_field;
 }
 
+// Whether albedo is not the same everywhere.
+bool has_albedo(const VertexTree& tree) { return !tree.colours().empty() || !tree.texture().empty(); }
+
 Error refused(const std::string& what) {
     return {ErrorCode::malformed_data, "What the tree's folds change under lights is damaged: " + what +
                                            " Measure it again, or build the tree again from its mesh."};
@@ -161,7 +165,8 @@ glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
 struct LitFolds::State {
     std::vector<LitRecord> folds; // by interior node, as the others
     std::vector<FoldFacing> facing;
-    std::vector<Shades> albedo; // empty: the same everywhere
+    std::vector<Shades> albedo;        // empty: the same everywhere
+    std::vector<FoldTexture> textures; // of textured trees; else empty
     LightBounds bounds;
 };
 
@@ -171,8 +176,10 @@ Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Pr
         shadings.push_back([&tree, axis](NodeId node) {
             return (offset + albedo_of(tree, node) * glm::vec3(tree.normals()[node])[axis]) / scale;
         });
-    if (!tree.colours().empty()) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
-    auto measured = measure_records(tree, shadings, threads, progress);
+    if (has_albedo(tree)) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
+    constexpr float unlit = offset / scale; // what a vertex is in the pictures that no light makes bright
+    constexpr float dark[] = {unlit, unlit, unlit, 0};
+    auto measured = measure_records(tree, shadings, std::span(dark).first(shadings.size()), threads, progress);
     if (!measured) return measured.error();
     auto state = std::make_shared<State>();
     const auto& axes = *measured;
@@ -188,6 +195,7 @@ Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Pr
         }
     if (axes.size() > 3)
         for (const FoldRecord& fold : axes[3].folds) state->albedo.push_back(shades_of(fold));
+    state->textures = axes[0].textures;
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
     state->bounds = std::move(*bounds);
@@ -208,11 +216,14 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     const auto folds = tree.attribute<LitRecord>(lit_record_name);
     const auto facing = tree.attribute<FoldFacing>(lit_facing_name);
     const auto albedo = tree.attribute<Shades>(lit_albedo_name);
+    const auto textures = tree.attribute<FoldTexture>(lit_texture_name);
     const std::size_t nodes = tree.interior_count();
-    if (folds.size() != nodes || facing.size() != nodes || albedo.size() != (tree.colours().empty() ? 0 : nodes))
+    if (folds.size() != nodes || facing.size() != nodes || albedo.size() != (has_albedo(tree) ? nodes : 0) ||
+        textures.size() != (tree.texture().empty() ? 0 : nodes))
         return refused("a part of it is missing.");
     for (std::size_t node = 0; node < nodes; ++node)
-        if (!is_sound(folds[node]) || facing[node].fading > most_fading || !(albedo.empty() || is_sound(albedo[node])))
+        if (!is_sound(folds[node]) || facing[node].fading > most_fading ||
+            !(albedo.empty() || is_sound(albedo[node])) || !(textures.empty() || is_sound(textures[node])))
             return refused("a number of node " + std::to_string(node) + " is negative or not finite.");
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
@@ -220,12 +231,14 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     state->folds.assign(folds.begin(), folds.end());
     state->facing.assign(facing.begin(), facing.end());
     state->albedo.assign(albedo.begin(), albedo.end());
+    state->textures.assign(textures.begin(), textures.end());
     state->bounds = std::move(*bounds);
     return LitFolds(std::move(state));
 }
 
 Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
-    if (state_->folds.size() != tree.interior_count() || state_->albedo.empty() != tree.colours().empty())
+    if (state_->folds.size() != tree.interior_count() || state_->albedo.empty() == has_albedo(tree) ||
+        state_->textures.empty() != tree.texture().empty())
         return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
     auto with = tree.with_attribute(lit_settings_name, AttributeDomain::tree,
                                     std::vector<float>(settings.begin(), settings.end()));
@@ -233,6 +246,8 @@ Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
     if (with) with = with->with_attribute(lit_facing_name, AttributeDomain::interior_node, state_->facing);
     if (with && !state_->albedo.empty())
         with = with->with_attribute(lit_albedo_name, AttributeDomain::interior_node, state_->albedo);
+    if (with && !state_->textures.empty())
+        with = with->with_attribute(lit_texture_name, AttributeDomain::interior_node, state_->textures);
     return with;
 }
 
@@ -243,11 +258,13 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
                      "What folds change of highlights is not measured, for these follow the eye."};
     if (state_->folds.size() != tree.interior_count())
         return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
-    const auto lit = tree.shaded([&](NodeId node) {
-        return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
-                                                glm::dvec3(glm::vec3(tree.normals()[node])),
-                                                static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
-    });
+    const auto lit = tree.shaded(
+        [&](NodeId node) {
+            return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
+                                                    glm::dvec3(glm::vec3(tree.normals()[node])),
+                                                    static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
+        },
+        true);
     if (!lit) return lit.error();
 
     std::vector<Lighting> alone; // each light by itself, of white
@@ -286,10 +303,11 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
         float& widest = fold.amplitudes[measurement::picture_sizes.size() - 1][measurement::picture_bands - 1];
         set(widest, widest + uneven);
         const LuminanceRange range = lit->support_luminance()[node];
-        const float middle = std::max((range.lo + range.hi) / 2, least_luminance);
+        float middle = std::max((range.lo + range.hi) / 2, least_luminance);
+        if (!state_->textures.empty()) middle = std::max(middle * state_->textures[node].mean, least_luminance);
         fold.bias = combined([&](const Shades& s) { return brightest * s.bias; }) / middle;
     });
-    return with_records(*lit, {std::move(folds), state_->facing});
+    return with_records(*lit, {std::move(folds), state_->facing, state_->textures});
 }
 
 } // namespace unseen::perception

@@ -23,9 +23,11 @@ using namespace measurement;
 
 class BiasFinder {
 public:
-    BiasFinder(const SoundTree& tree, std::span<FoldError> errors)
-        : tree_(tree), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
-          parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
+    BiasFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
+               std::span<FoldError> errors)
+        : tree_(tree), of_texture_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()),
+          luminance_(tree.luminance()), parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_),
+          found_(interior_) {}
 
     void run() {
         order();
@@ -63,6 +65,9 @@ private:
     }
 
     float mean_luminance(const Triangle& t) const {
+        if (of_texture_.texture)
+            return of_texture_.mean({luminance_[t[0]], luminance_[t[1]], luminance_[t[2]]},
+                                    {tree_.uvs()[t[0]], tree_.uvs()[t[1]], tree_.uvs()[t[2]]});
         return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
     }
 
@@ -84,15 +89,42 @@ private:
         std::sort(sequence.begin(), sequence.end(),
                   [&](NodeId a, NodeId b) { return order_[a] != order_[b] ? order_[a] < order_[b] : a > b; });
         for (const NodeId node : sequence) {
-            glm::vec3 light(0);
-            mesh_.fold(node, [&](const Triangle& t) { light -= light_of(t); });
-            for (const Index t : mesh_.ring(node)) light += light_of(mesh_.corners(t));
-            light_[node] = light;
+            glm::vec3 light(0), of_vertices(0);
+            float area = 0;
+            mean_texture_ = textures_.empty() ? 1.0f : textures_[node].mean;
+            mesh_.fold(node, [&](const Triangle& t) {
+                light -= light_of(t);
+                of_vertices -= light_of_vertices(t);
+            });
+            for (const Index t : mesh_.ring(node)) {
+                light += light_of(mesh_.corners(t));
+                of_vertices += light_of_vertices(mesh_.corners(t));
+                area += glm::length(mesh_.vector_area(mesh_.corners(t)));
+            }
+            light_[node] = textures_.empty() ? light : of_vertices + from_slide(node, light - of_vertices, area);
         }
         for (NodeId node = interior_; node-- > 1;) light_[parents_[node]] += light_[node];
     }
 
     glm::vec3 light_of(const Triangle& t) const { return mean_luminance(t) * mesh_.vector_area(t); }
+
+    // ---- with a texture
+
+    // With the texture's mean all over it.
+    glm::vec3 light_of_vertices(const Triangle& t) const {
+        if (textures_.empty()) return glm::vec3(0);
+        const float vertices = (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
+        return of_texture_.with_texture(vertices, mean_texture_) * mesh_.vector_area(t);
+    }
+    // No more light comes and goes with a texture than lies where it slides to; what is measured of it above that is what
+    // means over parts of triangles are wrong by.
+    glm::vec3 from_slide(NodeId node, const glm::vec3& measured, float area) const {
+        constexpr float perimeter = 2; // of a disc, over its area, in radii
+        const LuminanceRange drawn = tree_.ring_luminance()[node];
+        const float most = std::min(1.0f, perimeter * textures_[node].slide) * drawn.hi * area,
+                    length = glm::length(measured);
+        return length > most ? measured * (most / length) : measured;
+    }
 
     // What the folds up to here make of every node that is not below one of them.
     void compare(float up_to) {
@@ -207,9 +239,12 @@ private:
     };
 
     const SoundTree& tree_;
+    TexturedLight of_texture_;
+    std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
     NodeId interior_;
     std::span<const Unorm16> luminance_;
+    float mean_texture_ = 1;
     std::span<const NodeId> parents_;
     FoldSequence mesh_;
     std::vector<float> order_;
@@ -221,6 +256,9 @@ private:
 
 } // namespace
 
-void find_luminance_bias(const SoundTree& tree, std::span<FoldError> errors) { BiasFinder(tree, errors).run(); }
+void find_luminance_bias(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
+                         std::span<FoldError> errors) {
+    BiasFinder(tree, light, textures, errors).run();
+}
 
 } // namespace unseen::perception

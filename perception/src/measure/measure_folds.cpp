@@ -8,14 +8,18 @@
 #include <cstring>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <vdtree/colour.h>
 #include <vdtree/internal/scaled_geometry.h>
 #include <vdtree/internal/simd.h>
+#include <vdtree/internal/texture_bounds.h>
+#include <vdtree/internal/tree_parts.h>
 #include <vdtree/internal/vertex_tree_data.h>
 
 #include "fold/fold_errors.h"
@@ -29,6 +33,8 @@
 #include "measure/measure_folds.h"
 #include "measure/measurement.h"
 #include "measure/measuring_progress.h"
+#include "measure/texture_density.h"
+#include "measure/textured_light.h"
 
 namespace unseen::perception {
 
@@ -45,10 +51,11 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 template <std::size_t count>
 struct Difference {
     float distance = 0;
+    float slide = 0; // of a texture: texels
     std::array<float, count> luminance = {};
 
     void include(const Difference& other) {
-        distance = std::max(distance, other.distance);
+        distance = std::max(distance, other.distance), slide = std::max(slide, other.slide);
         for (std::size_t i = 0; i < count; ++i) luminance[i] = std::max(luminance[i], other.luminance[i]);
     }
     float largest_luminance() const { return *std::max_element(luminance.begin(), luminance.end()); }
@@ -124,13 +131,17 @@ public:
         }
         return blocks_;
     }
-    // Once the blocks are compared.
-    Difference<count> difference(std::size_t i) const {
-        const Block& at = blocks_[i / lanes];
-        Difference<count> found{std::sqrt(at.squared[i % lanes]), {}};
-        for (std::size_t k = 0; k < count; ++k)
-            found.luminance[k] = std::abs(points_[i].luminance[k] - at.luminance[k][i % lanes]);
-        return found;
+    // Once the blocks are compared: the distance to the nearest point, and what is here and there.
+    float distance(std::size_t i) const { return std::sqrt(blocks_[i / lanes].squared[i % lanes]); }
+    std::array<float, count> here(std::size_t i) const {
+        std::array<float, count> all;
+        for (std::size_t k = 0; k < count; ++k) all[k] = points_[i].luminance[k];
+        return all;
+    }
+    std::array<float, count> there(std::size_t i) const {
+        std::array<float, count> all;
+        for (std::size_t k = 0; k < count; ++k) all[k] = blocks_[i / lanes].luminance[k][i % lanes];
+        return all;
     }
 
 private:
@@ -251,23 +262,29 @@ private:
 // Of trees that are the same but for their luminances. Which neighbours are folded with a node depends on these: what a
 // light makes of several of them may let as many fold as any of them does, or as few as all do. Both are measured where
 // they differ, of all luminances.
-template <std::size_t luminances>
+//
+// Of textured trees, points have their texture coordinates besides, and what is compared is the texture's luminance
+// there, times theirs.
+template <std::size_t luminances, bool is_textured>
 class Measurer {
-    using Point = LitPointOf<luminances>;
+    static constexpr std::size_t channels = luminances + (is_textured ? 2 : 0), u_channel = luminances,
+                                 v_channel = luminances + 1;
+    using Point = LitPointOf<channels>;
     using Difference = perception::Difference<luminances>;
-    using RingTriangle = perception::RingTriangle<luminances>;
-    using Points = perception::Points<luminances>;
-    using Surface = perception::Surface<luminances>;
-    using FoldPicture = FoldPictureOf<luminances>;
+    using RingTriangle = perception::RingTriangle<channels>;
+    using Points = perception::Points<channels>;
+    using Surface = perception::Surface<channels>;
+    using FoldPicture = FoldPictureOf<channels>;
 
 public:
     // `contacts`: of the trees.
-    Measurer(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, std::vector<Contact> contacts)
-        : tree_(trees.front()), found_(found), first_leaf_(tree_.first_leaf()), leaf_end_(tree_.leaf_end()),
-          parents_(tree_.parents()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
-          support_(tree_.support_spheres()), interior_(tree_.interior_count()), of_leaf_(tree_),
-          border_(tree_, of_leaf_), crossing_(interior_), contacts_(std::move(contacts)), witnesses_(interior_),
-          luminance_span_(interior_), most_changed_(interior_) {
+    Measurer(std::span<const SoundTree> trees, std::span<const TexturedLight> lights, std::span<MeasuredFolds> found,
+             std::vector<Contact> contacts)
+        : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()),
+          leaf_end_(tree_.leaf_end()), parents_(tree_.parents()), first_triangle_(tree_.first_triangle()),
+          triangles_(tree_.triangles()), support_(tree_.support_spheres()), interior_(tree_.interior_count()),
+          of_leaf_(tree_), border_(tree_, of_leaf_), crossing_(interior_), contacts_(std::move(contacts)),
+          witnesses_(interior_), luminance_span_(interior_), most_changed_(interior_) {
         for (NodeId node = 0; node < interior_; ++node) {
             for (std::size_t i = 0; i < luminances; ++i) {
                 const PackedRange support = trees[i].support_luminance()[node];
@@ -279,6 +296,16 @@ public:
         for (NodeId node = 0; node < tree_.node_count(); ++node) {
             points_[node].position = tree_.positions()[node];
             for (std::size_t i = 0; i < luminances; ++i) points_[node].luminance[i] = trees[i].luminance()[node];
+            if constexpr (is_textured) {
+                const glm::vec2 uv = tree_.uvs()[node];
+                points_[node].luminance[u_channel] = uv.x, points_[node].luminance[v_channel] = uv.y;
+            }
+        }
+        if constexpr (is_textured) {
+            densities_.emplace(tree_, *lights_.front().texture);
+            TreeParts parts(links_of(*tree_.data().geometry));
+            parts.assign_triangles(tree_.first_triangle(), tree_.triangles());
+            footprints_ = bound_footprints(*tree_.data().geometry, parts);
         }
     }
 
@@ -311,13 +338,13 @@ private:
         Difference sum;
         int count = 0;
         void include(const Difference& other) {
-            sum.distance += other.distance;
+            sum.distance += other.distance, sum.slide += other.slide;
             for (std::size_t i = 0; i < luminances; ++i) sum.luminance[i] += other.luminance[i];
             ++count;
         }
         Difference value() const {
             const float share = 1 / static_cast<float>(std::max(count, 1));
-            Difference mean{sum.distance * share, sum.luminance};
+            Difference mean{sum.distance * share, sum.slide * share, sum.luminance};
             for (float& luminance : mean.luminance) luminance *= share;
             return mean;
         }
@@ -342,6 +369,12 @@ private:
         std::vector<Child> children;
         std::array<FoldPicture, picture_sizes.size()> pictures;
         bool compares_fine = false; // the fine ones are few enough, and others
+        // With a texture:
+        TextureDensity density;
+        std::array<std::size_t, picture_sizes.size()> level = {}; // that pictures show
+        std::array<typename FoldPicture::BandCells, picture_sizes.size()> weights;
+        float middle = 1; // of the texture's luminance in the ring
+        float slide = 0;  // texels, as pictures show it, in the mean over some cells
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
@@ -431,6 +464,7 @@ private:
         facing.is_height_field = 1;
         FoldRecord record;
         std::array<FoldRecord, luminances> records; // of the luminances alone
+        if constexpr (is_textured) found_[0].textures[node] = {};
         measure(node, Says::any, scratch, record, records, facing);
         if constexpr (luminances > 1) {
             scratch.shown_before.swap(scratch.shown);
@@ -444,6 +478,7 @@ private:
             own.largest_luminance = records[i].largest_luminance, own.mean_luminance = records[i].mean_luminance;
             std::memcpy(own.amplitudes, records[i].amplitudes, sizeof own.amplitudes);
             found_[i].facing[node] = facing;
+            if constexpr (is_textured) found_[i].textures[node] = found_[0].textures[node];
         }
     }
 
@@ -455,19 +490,133 @@ private:
         facing.facing |= turned;
         const Point proxy = point(node);
         if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+        const auto raise = [](float& to, float value) { to = std::max(to, value); };
+        const float extent = mean_reach(scratch.after, proxy) / 2, width = std::max(support_[node].radius, extent);
+        if constexpr (is_textured) look_at_texture(node, width, scratch);
         Difference worst;
         const Difference mean = compare_surfaces(scratch, worst);
-        const auto raise = [](float& to, float value) { to = std::max(to, value); };
         raise(record.farthest, worst.distance), raise(record.mean_distance, mean.distance);
-        const float extent = mean_reach(scratch.after, proxy) / 2;
         raise(record.extent, extent);
         raise(record.border,
               border_.shift(node, crossing_[node], [&](Index leaf) { return stand_in(leaf, node, says); }));
         for (std::size_t i = 0; i < luminances; ++i)
             raise(records[i].largest_luminance, worst.luminance[i]),
                 raise(records[i].mean_luminance, mean.luminance[i]);
-        facing.is_height_field &= draw(node, scratch, std::max(support_[node].radius, extent), record, records);
+        const bool is_shown = draw(node, scratch, width, record, records);
+        facing.is_height_field &= is_shown;
+        if constexpr (is_textured) {
+            if (!is_shown || tree_.bounds()[node].ring.radius > longest_shown * width)
+                scratch.slide = std::max(scratch.slide, worst.slide);
+            find_detail(node, width, scratch, worst, record);
+        }
     }
+
+    // ---- with a texture
+
+    // What the measurement of a node needs to know of the texture there.
+    void look_at_texture(NodeId node, float width, Scratch& scratch) const {
+        scratch.density = densities_->of(node, crossing_[node]);
+        for (std::size_t size = 0; size < picture_sizes.size(); ++size) {
+            const float cell = 2 * picture_sizes[size] * width / static_cast<float>(picture_side);
+            scratch.level[size] = lights_.front().texture->level_of(scratch.density.most * cell);
+        }
+        const LuminanceRange range = tree_.ring_texture()[node];
+        scratch.middle = (range.lo + range.hi) / 2;
+        scratch.slide = 0;
+    }
+    // By how much contrasts over a local mean of the texture are more than those over the middle of its range, by which
+    // a criterion divides.
+    static float over_local_mean(float middle, float local_mean) {
+        return std::max(1.0f, (middle + FoldStage::black) / (local_mean + FoldStage::black));
+    }
+    float slide_between(float u0, float v0, float u1, float v1) const {
+        const glm::vec2 size = lights_.front().texture->size();
+        const float slide = std::max(std::abs(u1 - u0) * size.x, std::abs(v1 - v0) * size.y);
+        return std::min(slide, std::max(size.x, size.y));
+    }
+
+    // Makes the luminances of a picture those that the texture leaves of them.
+    void shade(FoldPicture& picture, typename FoldPicture::Layer layer, std::size_t level,
+               typename FoldPicture::Cells* textures) const {
+        typename FoldPicture::Picture& of = picture.picture(layer);
+        for (std::size_t cell = 0; cell < of.height.size(); ++cell) {
+            if (textures) (*textures)[cell] = 0;
+            if (!FoldPicture::is_seen(of.height[cell])) continue;
+            const float texture =
+                lights_.front().texture->at(level, {of.luminance[u_channel][cell], of.luminance[v_channel][cell]});
+            for (std::size_t i = 0; i < luminances; ++i)
+                of.luminance[i][cell] = lights_[i].with_texture(of.luminance[i][cell], texture);
+            if (textures) (*textures)[cell] = texture;
+        }
+    }
+    // Of the mesh's pictures, once they are drawn.
+    void begin_textured_pictures(Scratch& scratch) const {
+        for (std::size_t size = 0; size < scratch.pictures.size(); ++size) {
+            FoldPicture& picture = scratch.pictures[size];
+            typename FoldPicture::Cells textures;
+            shade(picture, FoldPicture::Layer::mesh, scratch.level[size], &textures);
+            picture.find_means(FoldPicture::Layer::mesh, textures, scratch.weights[size]);
+            for (typename FoldPicture::Cells& of_band : scratch.weights[size])
+                for (float& weight : of_band) weight = weight >= 0 ? over_local_mean(scratch.middle, weight) : 1.0f;
+        }
+    }
+    // Of the folded surface's.
+    void finish_textured_picture(FoldPicture& picture, std::size_t size, Scratch& scratch) const {
+        const auto &mesh = picture.picture(FoldPicture::Layer::mesh),
+                   &folded = picture.picture(FoldPicture::Layer::folded);
+        typename FoldPicture::Cells slides;
+        for (std::size_t cell = 0; cell < slides.size(); ++cell) {
+            const bool are_seen = FoldPicture::is_seen(mesh.height[cell]) && FoldPicture::is_seen(folded.height[cell]);
+            slides[cell] = are_seen
+                               ? slide_between(mesh.luminance[u_channel][cell], mesh.luminance[v_channel][cell],
+                                               folded.luminance[u_channel][cell], folded.luminance[v_channel][cell])
+                               : 0.0f;
+        }
+        scratch.slide = std::max(scratch.slide, picture.largest_mean(slides));
+        shade(picture, FoldPicture::Layer::folded, scratch.level[size], nullptr);
+    }
+
+    // What the texture's detail changes: what is finer than the pictures' cells by sliding over the surface, and all of
+    // it by the surface's shift, seen from aside.
+    void find_detail(NodeId node, float width, const Scratch& scratch, const Difference& worst,
+                     const FoldRecord& record) {
+        const TextureDetail& texture = *lights_.front().texture;
+        UvBox box;
+        for (const auto* surface : {&scratch.before, &scratch.after, &scratch.fine_before, &scratch.fine_after})
+            for (const RingTriangle& t : *surface)
+                for (const Point& p : t.corner) box.include({p.luminance[u_channel], p.luminance[v_channel]});
+        box.include(footprints_[node]);
+        const bool is_dense = scratch.density.least > 0 && std::isfinite(scratch.density.most);
+        const float height = std::max(record.shift, record.mean_distance);
+        const float aside = height > 0 ? height * scratch.density.most : 0.0f;
+        (void)worst;
+        FoldTexture& found = found_[0].textures[node];
+        found.mean = scratch.density.mean;
+        const float slide_in_widths = is_dense ? scratch.slide / (scratch.density.least * width) : 1.0f;
+        found.slide = std::max(found.slide, slide_in_widths < 1 ? slide_in_widths : 1.0f);
+        if (getenv("DBG"))
+            fprintf(
+                stderr,
+                "node %u leaves %u width %g ring %g slide %g aside %g worst %g shift %g lv %zu dens %g %g amp %g %g\n",
+                node, leaf_end_[node] - first_leaf_[node], width, tree_.bounds()[node].ring.radius, scratch.slide,
+                aside, worst.slide, record.shift, scratch.level[0], scratch.density.least, scratch.density.most,
+                record.farthest, worst.luminance[0]);
+        const std::size_t measured_from = *std::min_element(scratch.level.begin(), scratch.level.end());
+        for (std::size_t level = 0; level < texture.level_count(); ++level) {
+            const float texel = std::exp2(static_cast<float>(level)); // in the texture's own
+            const float wave = is_dense ? texels_of_wave * texel / scratch.density.least : 0.0f;
+            if (level >= measured_from && wave > 2 * width) break; // as the ring's range shows it
+            const float slide = aside + (level < measured_from ? scratch.slide : 0.0f);
+            if (!(slide > 0)) continue;
+            const float contrast = 2 * std::min(1.0f, slide / texel) * texture.contrast(level, box);
+            const float octaves = wave > 0 ? std::floor(std::log2(width / wave)) : 0.0f;
+            const auto finer =
+                static_cast<std::size_t>(std::clamp(octaves, 0.0f, static_cast<float>(texture_octaves - 1)));
+            found.contrast[finer] = std::max(found.contrast[finer], std::min(contrast, most_texture_contrast));
+        }
+    }
+
+    // ---- the surfaces
 
     // Puts the ring before and after the fold, coarse and fine, into `scratch`; returns what its triangles face.
     NormalReach lay_out(NodeId node, Says says, Scratch& scratch) {
@@ -524,6 +673,24 @@ private:
         return turned;
     }
 
+    Difference difference(const Points& points, std::size_t i, const Scratch& scratch) const {
+        Difference found{points.distance(i), 0, {}};
+        const auto here = points.here(i), there = points.there(i);
+        if constexpr (is_textured) {
+            const TextureDetail& texture = *lights_.front().texture;
+            found.slide = slide_between(here[u_channel], here[v_channel], there[u_channel], there[v_channel]);
+            const float t0 = texture.at(scratch.level[0], {here[u_channel], here[v_channel]}),
+                        t1 = texture.at(scratch.level[0], {there[u_channel], there[v_channel]});
+            const float weight = over_local_mean(scratch.middle, (t0 + t1) / 2);
+            for (std::size_t k = 0; k < luminances; ++k)
+                found.luminance[k] =
+                    weight * std::abs(lights_[k].with_texture(here[k], t0) - lights_[k].with_texture(there[k], t1));
+        } else {
+            for (std::size_t k = 0; k < luminances; ++k) found.luminance[k] = std::abs(here[k] - there[k]);
+        }
+        return found;
+    }
+
     // Raises the worst errors to those between the surfaces; returns the mean ones.
     Difference compare_surfaces(Scratch& scratch, Difference& worst) {
         scratch.before_surface.assign(scratch.before);
@@ -534,13 +701,13 @@ private:
         scratch.after_surface.compare(scratch.points);
         for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
             Sample& sample = scratch.samples[i];
-            const Difference error = scratch.points.difference(i);
+            const Difference error = difference(scratch.points, i, scratch);
             sample.error.include(error);
             worst.include(error);
             if (sample.is_typical) over_leaves.include(error);
         }
-        compare(scratch.before, scratch.after_surface, scratch.points, worst, over_before);
-        compare(scratch.after, scratch.before_surface, scratch.points, worst, over_after);
+        compare(scratch.before, scratch.after_surface, scratch, worst, over_before);
+        compare(scratch.after, scratch.before_surface, scratch, worst, over_after);
         Difference mean = over_leaves.value();
         mean.include(over_before.value());
         mean.include(over_after.value());
@@ -551,8 +718,8 @@ private:
             Mean over_fine_before, over_fine_after;
             scratch.before_surface.assign(scratch.fine_before);
             scratch.after_surface.assign(scratch.fine_after);
-            compare(scratch.fine_before, scratch.after_surface, scratch.points, worst, over_fine_before);
-            compare(scratch.fine_after, scratch.before_surface, scratch.points, worst, over_fine_after);
+            compare(scratch.fine_before, scratch.after_surface, scratch, worst, over_fine_before);
+            compare(scratch.fine_after, scratch.before_surface, scratch, worst, over_fine_after);
             mean.include(over_fine_before.value());
             mean.include(over_fine_after.value());
         }
@@ -574,11 +741,14 @@ private:
         for (std::size_t size = 0; size < pictures.size(); ++size)
             pictures[size].look(points_[node].position, normal / length, picture_sizes[size] * width);
         draw_mesh(node, scratch);
+        if constexpr (is_textured) begin_textured_pictures(scratch);
         const auto compare = [&](std::span<const RingTriangle> folded) {
             for (FoldPicture& picture : pictures) picture.clear(FoldPicture::Layer::folded);
             for (const RingTriangle& t : folded) draw(FoldPicture::Layer::folded, t.corner, pictures);
             for (std::size_t size = 0; size < pictures.size(); ++size) {
-                const typename FoldPicture::Difference difference = pictures[size].difference();
+                if constexpr (is_textured) finish_textured_picture(pictures[size], size, scratch);
+                const typename FoldPicture::Difference difference =
+                    pictures[size].difference(luminances, is_textured ? &scratch.weights[size] : nullptr);
                 record.shift = std::max(record.shift, difference.shift);
                 for (std::size_t i = 0; i < luminances; ++i)
                     for (std::size_t band = 0; band < picture_bands; ++band) {
@@ -632,8 +802,9 @@ private:
 
     // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles
     // of the edges that move, and of their halves. The vertices are among the samples.
-    static void compare(std::span<const RingTriangle> surface, const Surface& with, Points& points, Difference& worst,
-                        Mean& mean) {
+    void compare(std::span<const RingTriangle> surface, const Surface& with, Scratch& scratch, Difference& worst,
+                 Mean& mean) const {
+        Points& points = scratch.points;
         if (with.empty()) return;
         points.clear();
         const std::size_t count = std::min(surface.size(), triangles_compared);
@@ -649,7 +820,7 @@ private:
         }
         with.compare(points);
         for (std::size_t i = 0; i < points.size(); ++i) {
-            const Difference here = points.difference(i);
+            const Difference here = difference(points, i, scratch);
             worst.include(here);
             if (i % 3 == 0) mean.include(here);
         }
@@ -714,9 +885,15 @@ private:
         take(witness_count / 2, [](const Sample& s) { return s.error.largest_luminance(); });
     }
 
+    // FoldModel::longest_ring is no less by default.
+    static constexpr float longest_shown = 4;
+    // Of a level's detail: the lowest frequency that it has much of.
+    static constexpr float texels_of_wave = 4;
+
     const SoundTree& tree_;
-    std::span<MeasuredFolds> found_; // by tree
-    std::vector<Point> points_;      // of nodes
+    std::span<const TexturedLight> lights_; // by tree, with a texture
+    std::span<MeasuredFolds> found_;        // by tree
+    std::vector<Point> points_;             // of nodes
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
     std::span<const Index> first_triangle_;
@@ -730,6 +907,8 @@ private:
     std::vector<Witnesses> witnesses_;
     std::vector<std::array<int, luminances>> luminance_span_; // by interior node: of its support
     std::vector<Change> most_changed_;                        // likewise
+    std::optional<TextureDensities> densities_;               // with a texture
+    std::vector<UvBox> footprints_;                           // likewise
 };
 
 // Lengths in the tree's own units again. False where they are beyond all numbers.
@@ -758,6 +937,28 @@ private:
 
 } // namespace
 
+namespace {
+
+// The colour that all vertices have but for their brightness; none where they have several. Black ones have any.
+std::optional<glm::vec3> common_tint(const VertexTree& tree) {
+    constexpr float alike = 1e-3f; // of channels, over the luminance: far less than a texture's luminance is wrong by
+    std::optional<glm::vec3> tint;
+    for (const glm::vec4& colour : tree.colours()) {
+        const glm::vec3 rgb(colour);
+        const auto luminance = static_cast<float>(rec709_luminance(glm::dvec3(rgb)));
+        if (!(luminance > 0)) continue;
+        const glm::vec3 own = rgb / luminance;
+        if (!tint) tint = own;
+        for (int k = 0; k < 3; ++k)
+            if (!(std::abs(own[k] - (*tint)[k]) <= alike)) return std::nullopt;
+    }
+    return tint ? *tint : glm::vec3(1);
+}
+
+} // namespace
+
+bool knows_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
+
 bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldRecord>(record_name).empty(); }
 
 std::span<const float> measurement_settings() noexcept { return settings; }
@@ -771,21 +972,26 @@ struct Measured {
     std::vector<MeasuredFolds> found;           // by tree
     std::vector<std::vector<FoldError>> errors; // likewise, in the units that were measured in
     std::vector<SoundTree> in_units;            // the trees in these
+    std::shared_ptr<const TextureDetail> texture;
+    std::vector<TexturedLight> lights; // by tree
 };
 
-template <std::size_t luminances>
-bool measure_all(std::span<const SoundTree> trees, std::span<MeasuredFolds> found, double up_to,
-                 MeasuringProgress& progress) {
+template <std::size_t luminances, bool is_textured>
+bool measure_all(std::span<const SoundTree> trees, std::span<const TexturedLight> lights,
+                 std::span<MeasuredFolds> found, double up_to, MeasuringProgress& progress) {
     constexpr double contacts_done = 0.2; // of it
     progress.begin(contacts_done * up_to, static_cast<double>(trees.front().triangles().size()));
     std::vector<Contact> contacts = find_contacts(trees, progress);
     progress.begin(up_to, trees.front().interior_count());
-    return Measurer<luminances>(trees, found, std::move(contacts)).run(progress);
+    return Measurer<luminances, is_textured>(trees, lights, found, std::move(contacts)).run(progress);
 }
 
-// `up_to`: the share of the whole that this is.
-Result<Measured> measure(std::span<const VertexTree> trees, int threads, double up_to, MeasuringProgress& progress) {
-    assert(trees.size() == 1 || trees.size() == 3 || trees.size() == 4);
+// `dark`: of textured trees, by tree, what their luminance is where the texture is black. `up_to`: the share of the
+// whole that this is.
+Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads, double up_to,
+                         MeasuringProgress& progress) {
+    const bool is_textured = !trees.front().texture().empty();
+    assert(trees.size() == 1 || trees.size() == 4 || (trees.size() == 3 && !is_textured));
     Measured all;
     std::shared_ptr<const TreeGeometry> geometry; // scaled, of all
     // Measured is in units in which no product of lengths overflows or vanishes.
@@ -793,9 +999,6 @@ Result<Measured> measure(std::span<const VertexTree> trees, int threads, double 
     for (const VertexTree& tree : trees) {
         const auto sound = SoundTree::of(tree);
         if (!sound) return sound.error();
-        if (!tree.texture().empty())
-            return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold "
-                                                 "test, or the tree without its texture."};
         const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
         if (scale != 1 && !geometry) geometry = scaled_geometry(tree.data().geometry, scale);
         if (scale != 1) scaled->geometry = geometry;
@@ -805,20 +1008,34 @@ Result<Measured> measure(std::span<const VertexTree> trees, int threads, double 
     }
     const NodeId nodes = trees.front().interior_count();
     all.found.resize(trees.size());
-    for (MeasuredFolds& found : all.found) found.folds.resize(nodes), found.facing.resize(nodes);
+    for (MeasuredFolds& found : all.found) {
+        found.folds.resize(nodes), found.facing.resize(nodes);
+        if (is_textured) found.textures.resize(nodes);
+    }
     all.errors.resize(trees.size());
-    const auto measure_these = trees.size() == 1 ? measure_all<1> : trees.size() == 3 ? measure_all<3> : measure_all<4>;
+    if (is_textured) {
+        const auto tint = common_tint(trees.front());
+        if (!tint)
+            return Error{ErrorCode::unsupported, "What folds change of a texture over vertices of several hues is not "
+                                                 "measured: take another fold test, or the tree without its texture."};
+        all.texture = std::make_shared<const TextureDetail>(trees.front().texture(), *tint);
+    }
+    for (std::size_t i = 0; i < trees.size(); ++i) all.lights.push_back({all.texture.get(), dark[i]});
+    const auto measure_these = is_textured         ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
+                               : trees.size() == 1 ? measure_all<1, false>
+                               : trees.size() == 3 ? measure_all<3, false>
+                                                   : measure_all<4, false>;
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = measure_these(all.in_units, all.found, up_to, progress);
+        is_whole = measure_these(all.in_units, all.lights, all.found, up_to, progress);
         if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
         tbb::parallel_for(std::size_t{0}, trees.size(), [&](std::size_t i) {
             MeasuredFolds& found = all.found[i];
-            all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, FoldModel());
-            find_luminance_bias(all.in_units[i], all.errors[i]);
+            all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, found.textures, FoldModel());
+            find_luminance_bias(all.in_units[i], all.lights[i], found.textures, all.errors[i]);
         });
     });
     if (!is_whole) return cancelled_error();
@@ -840,6 +1057,8 @@ Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measure
     with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
     with.add(record_name, AttributeDomain::interior_node, std::move(measured.folds));
     with.add(facing_name, AttributeDomain::interior_node, std::move(measured.facing));
+    if (!measured.textures.empty())
+        with.add(texture_name, AttributeDomain::interior_node, std::move(measured.textures));
     with.add(stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
     with.add(stages_name, AttributeDomain::tree, std::move(stages));
     return with.take();
@@ -850,12 +1069,14 @@ Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measure
 Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
     constexpr double before_stages = 0.8;
     MeasuringProgress told(progress);
-    auto measured = measure(std::span(&tree, 1), threads, before_stages, told);
+    constexpr float dark = 0;
+    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
     if (!measured) return measured.error();
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
     tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        stages = find_stages(measured->in_units.front(), errors, told);
+        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
+                             errors, told);
     });
     if (told.is_cancelled()) return cancelled_error();
     std::vector<std::uint8_t> stage_of(errors.size());
@@ -864,15 +1085,15 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
 }
 
 Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::span<const Shading> shadings,
-                                                   int threads, const Progress& progress) {
+                                                   std::span<const float> dark, int threads, const Progress& progress) {
     std::vector<VertexTree> shaded;
     for (const Shading& luminance : shadings) {
-        auto as_shaded = tree.shaded(luminance);
+        auto as_shaded = tree.shaded(luminance, !tree.texture().empty());
         if (!as_shaded) return as_shaded.error();
         shaded.push_back(std::move(*as_shaded));
     }
     MeasuringProgress told(progress);
-    auto measured = measure(shaded, threads, 1, told);
+    auto measured = measure(shaded, dark, threads, 1, told);
     if (!measured) return measured.error();
     return std::move(measured->found);
 }

@@ -162,7 +162,8 @@ public:
     // The same with luminances of the caller's, of leaves and of proxies, relative, 0..1 (others are clamped, NaN is 0):
     // light that is none of vdtree::Light's. Without the texture, and pre-lit. Called from several threads. Fails and
     // costs as relit().
-    Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance) const;
+    // `keeps_texture`: the texture, if there is one, is multiplied with them.
+    Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture = false) const;
 
     // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything
     // else is shared, but for attributes, which it has not. Vertices without colours then have the default albedo, lit.

@@ -331,8 +331,8 @@ Result<VertexTree> VertexTree::relit(const Light& light) const {
     return VertexTree(std::move(*data));
 }
 
-Result<VertexTree> VertexTree::shaded(const FunctionRef<float(NodeId)>& luminance) const {
-    auto data = shaded_anew(*this, light(), true, false, &luminance);
+Result<VertexTree> VertexTree::shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture) const {
+    auto data = shaded_anew(*this, light(), true, keeps_texture && data_->light->textured, &luminance);
     if (!data) return data.error();
     return VertexTree(std::move(*data));
 }

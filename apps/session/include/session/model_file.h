@@ -24,8 +24,8 @@ struct LoadOptions {
     // A mesh's colours and textures are light that is baked in, not reflectance: see vdtree::BuildOptions. Not of trees.
     bool prelit = false;
     double unit_metres = 1; // world units (metres) a mesh unit; above 0. Of Scene::load()
-    // Of a mesh: measure what folds change, too (see measured()), where its tree has no texture and at most two million
-    // folds.
+    // Of a mesh: measure what folds change, too (see measured()), where its tree has at most two million folds
+    // and `error` knows its texture (perception::knows_texture()).
     bool measures = true;
     CacheOptions cache = {}; // where trees of meshes, and measurements, are kept for the next time
     Messages messages = {};
@@ -55,8 +55,8 @@ Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const Lo
 std::string hint_at_baked_light(const vdtree::VertexTree& tree);
 
 // A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured.
-// Fails on textured trees, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. `threads`:
-// 0: all cores.
+// Of textured trees the light is not conserved. Cost: some 50 us a node, and a second; twice that with a texture; in
+// parallel. `threads`: 0: all cores.
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0, const Progress& progress = {});
 
 // A tree with what its folds change under lights, whichever these are (perception::LitFolds), which `error` goes by in

@@ -18,7 +18,7 @@ struct Effect {
 };
 
 // Of one object. The default fold test is `error`, where the tree has the errors of its folds or they may be measured;
-// else, or where that does not know what there is to see (colours that count, textures, lights that move or make highlights), the
+// else, or where that does not know what there is to see (colours that count, textures over vertices of several hues, lights that move or make highlights), the
 // Luebke-Hallen test that does. For a goal in pixels it is `extent`.
 struct Plan {
     FoldTest fold_test = FoldTest::error;

@@ -1,0 +1,251 @@
+#include <session_gpu/tradeoff.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+
+#include <perception/judge.h>
+#include <session_gpu/as_seen.h>
+#include <session_gpu/scene_renderer.h>
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_format.h>
+
+namespace unseen::session {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double ms_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+constexpr int timed_frames = 9;         // followed, and drawn
+constexpr double degrees_a_frame = 0.1; // around the scene's centre
+constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+
+double median(std::vector<double> values) {
+    if (values.empty()) return undefined;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+struct Way {
+    std::string name;
+    Request request;
+    bool is_of_view = false;
+};
+
+// The most telling ones first.
+std::vector<Way> ways(const Session& session) {
+    std::vector<Way> all;
+    const auto add = [&](std::string name, Goal goal, std::optional<FoldTest> test = {}, double threshold = 1) {
+        all.push_back(
+            {std::move(name),
+             {.goal = goal, .fold_test = test, .threshold = threshold, .purpose = Purpose::picture, .reasons = false}});
+    };
+    const Goal imperceptible = Goal::imperceptible();
+    add("full", Goal::full());
+    add("imperceptible", imperceptible);
+    for (const double threshold : {2.0, 0.5})
+        add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
+    all.push_back({"imperceptible, by this picture", all[1].request, true});
+    add("luebke-hallen-safe", imperceptible, FoldTest::luebke_hallen_safe);
+    for (const double pixels : {1.0, 0.5, 2.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
+    add("luebke-hallen", imperceptible, FoldTest::luebke_hallen);
+    for (const double pixels : {0.25, 0.5, 1.0})
+        add(shortest(pixels) + " px, displacement", Goal::pixels(pixels), FoldTest::displacement);
+    for (const double share : {0.5, 0.25, 0.1, 0.05}) {
+        const double triangles = std::clamp(share * static_cast<double>(session.triangle_count()), 1.0, 4e9);
+        add("budget of " + shortest(100 * share) + "%", Goal::budget(static_cast<vdtree::Index>(triangles)));
+    }
+    for (const double threshold : {1.5, 3.0, 4.0})
+        add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
+    for (const double pixels : {4.0, 8.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
+    return all;
+}
+
+// Around the upright axis through the target.
+vdtree::View turned(const vdtree::View& view, double degrees) {
+    const double angle = degrees * (glm::pi<double>() / 180);
+    const glm::dvec3 axis = glm::normalize(view.up), from = view.eye - view.target;
+    vdtree::View other = view;
+    other.eye = view.target + from * std::cos(angle) + glm::cross(axis, from) * std::sin(angle) +
+                axis * (glm::dot(axis, from) * (1 - std::cos(angle)));
+    return other;
+}
+
+double largest_shift(const Session& session, const std::vector<vdtree::Cut>& cuts) {
+    double most = 0;
+    for (std::size_t i = 0; i < cuts.size(); ++i) {
+        const vdtree::VertexTree& tree = cuts[i].tree();
+        const auto displacement = tree.displacement();
+        float in_mesh = 0;
+        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+            if (cuts[i].is_active(node)) in_mesh = std::max(in_mesh, displacement[node]);
+        most = std::max(most, session.scene().objects[i].placement.scale * static_cast<double>(in_mesh));
+    }
+    return most;
+}
+
+class Measurement {
+public:
+    static Result<Measurement> create(Session& session, const render::Context& context, const vdtree::View& view,
+                                      const TradeoffOptions& options) {
+        auto renderer = SceneRenderer::create(context, session);
+        if (!renderer) return renderer.error();
+        return Measurement(session, context, view, options, std::move(*renderer));
+    }
+
+    // The full model comes first: the others are judged against it.
+    Result<TradeoffPoint> measure(const Way& way) {
+        TradeoffPoint point{.name = way.name, .request = way.request, .is_of_view = way.is_of_view};
+        const auto start = Clock::now();
+        auto made = way.is_of_view ? simplify_as_seen(session_, context_, view_, way.request)
+                                   : session_.simplify(view_, way.request);
+        if (!made) return made.error();
+        point.make_ms = ms_since(start);
+        point.triangles = made->stats.triangles;
+        point.shift = largest_shift(session_, made->cuts);
+        auto frame = draw(made->cuts, options_.samples);
+        if (!frame) return frame.error();
+        if (const auto judged = judge(*frame, point); !judged) return judged.error();
+        std::vector<double> drawn;
+        for (int i = 0; i < timed_frames; ++i) {
+            const auto one = draw(made->cuts, 1);
+            if (!one) return one.error();
+            drawn.push_back(one->draw_ms);
+        }
+        point.draw_ms = median(std::move(drawn));
+        const auto followed = way.is_of_view ? Result<double>(undefined) : follow(way.request);
+        if (!followed) return followed.error();
+        point.follow_ms = *followed;
+        return point;
+    }
+
+private:
+    Measurement(Session& session, const render::Context& context, const vdtree::View& view,
+                const TradeoffOptions& options, SceneRenderer renderer)
+        : session_(session), context_(context), view_(view), options_(options), renderer_(std::move(renderer)) {}
+
+    Result<render::Frame> draw(const std::vector<vdtree::Cut>& cuts, int samples) {
+        render::DrawOptions drawing;
+        drawing.samples = samples;
+        drawing.background = session_.background();
+        return renderer_.draw(drawn_cuts(cuts), view_, drawing);
+    }
+
+    Result<void> judge(const render::Frame& frame, TradeoffPoint& point) {
+        const perception::Display& display = session_.observer().display;
+        perception::Image luminance{frame.width, frame.height, 1, {}}, codes{frame.width, frame.height, 3, {}};
+        for (const float relative : frame.luminance)
+            luminance.values.push_back(
+                static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
+        for (const float linear : frame.colour)
+            codes.values.push_back(
+                static_cast<float>(std::clamp(perception::encode(display, static_cast<double>(linear)), 0.0, 1.0)));
+        if (!judge_) {
+            auto judge = perception::Judge::create(luminance, judge_options(session_.observer()));
+            if (!judge) return judge.error();
+            std::optional<glm::dvec2> gaze;
+            if (session_.observer().gaze) gaze = session_.observer().gaze->px;
+            auto second = perception::Judge::create(
+                luminance, perception::second_judge_options(session_.observer().person, display, gaze));
+            if (!second) return second.error();
+            judge_ = std::move(*judge), second_ = std::move(*second), codes_ = std::move(codes);
+            return {};
+        }
+        const auto verdict = judge_->judge(luminance), other = second_->judge(luminance);
+        if (!verdict) return verdict.error();
+        if (!other) return other.error();
+        const auto similarity = perception::ssim(codes_, codes);
+        point.visible_pixels = verdict->visible_pixels, point.v = verdict->max_ratio;
+        point.second_visible_pixels = other->visible_pixels, point.second_v = other->max_ratio;
+        point.ssim = similarity ? *similarity : undefined; // of windows too small for it
+        return {};
+    }
+
+    Result<double> follow(const Request& request) {
+        Follower follower(session_);
+        std::vector<double> times;
+        for (int i = 0; i <= timed_frames + 1; ++i) {
+            const auto start = Clock::now();
+            const auto followed = follower.follow(turned(view_, degrees_a_frame * i), request);
+            if (!followed) return followed.error();
+            if (i > 1) times.push_back(ms_since(start)); // the first makes the cut, the second what to watch
+        }
+        return median(std::move(times));
+    }
+
+    Session& session_;
+    const render::Context& context_;
+    const vdtree::View& view_;
+    const TradeoffOptions& options_;
+    SceneRenderer renderer_;
+    std::optional<perception::Judge> judge_ = {}, second_ = {}; // of the full model
+    perception::Image codes_ = {};
+};
+
+double frame_ms(const TradeoffPoint& point) {
+    return point.draw_ms + (std::isnan(point.follow_ms) ? 0 : point.follow_ms);
+}
+
+void find_front(std::vector<TradeoffPoint>& points) {
+    for (TradeoffPoint& point : points)
+        point.is_on_front = std::ranges::none_of(points, [&](const TradeoffPoint& other) {
+            const bool is_no_worse = other.triangles <= point.triangles && other.v <= point.v;
+            return is_no_worse && (other.triangles < point.triangles || other.v < point.v);
+        });
+}
+
+void recommend(std::vector<TradeoffPoint>& points) {
+    TradeoffPoint* best = &points.front();
+    for (TradeoffPoint& point : points) {
+        const bool shows_nothing = point.visible_pixels == 0 && point.second_visible_pixels == 0;
+        // A claim about all views like this one, not the luck of one.
+        const bool is_a_claim = is_perceptual(point.request.fold_test.value_or(FoldTest::error)) &&
+                                point.request.goal.kind == Goal::Kind::imperceptible && point.request.threshold <= 1;
+        if (!point.is_of_view && shows_nothing && is_a_claim && frame_ms(point) < frame_ms(*best)) best = &point;
+    }
+    best->is_recommended = true;
+}
+
+} // namespace
+
+Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& context, const vdtree::View& view,
+                                  const TradeoffOptions& options) {
+    constexpr int most_samples = 256;
+    if (!(options.seconds > 0)) return invalid_argument("The seconds of a trade-off must be above 0.");
+    if (options.samples < 1 || options.samples > most_samples)
+        return invalid_argument("The samples of a trade-off must be 1 to 256.");
+    const auto start = Clock::now();
+    const auto prepared = session.prepare(view, {.purpose = Purpose::picture});
+    if (!prepared) return prepared.error();
+    Tradeoff result;
+    result.measuring_s = ms_since(start) / 1e3;
+    auto measurement = Measurement::create(session, context, view, options);
+    if (!measurement) return measurement.error();
+    const auto begin = Clock::now();
+    const std::vector<Way> all = ways(session);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        if (options.progress) options.progress(static_cast<double>(i) / static_cast<double>(all.size()));
+        if (!result.points.empty() && ms_since(begin) > 1e3 * options.seconds) {
+            result.left_out.push_back(all[i].name);
+            continue;
+        }
+        auto point = measurement->measure(all[i]);
+        if (point) result.points.push_back(std::move(*point));
+        else if (all[i].request.fold_test && point.error().code == ErrorCode::invalid_argument)
+            result.left_out.push_back(all[i].name + ": " + point.error().message);
+        else return point.error();
+    }
+    find_front(result.points);
+    recommend(result.points);
+    return result;
+}
+
+} // namespace unseen::session

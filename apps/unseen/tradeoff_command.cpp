@@ -1,0 +1,176 @@
+// unseen tradeoff: what each way to simplify costs and shows, for somebody's own model and view.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <session_gpu/tradeoff.h>
+#include <vdtree/internal/atomic_file.h>
+
+#include "cut_report.h"
+#include "output_files.h"
+#include "progress_bar.h"
+#include "report.h"
+#include "session_options.h"
+#include "terminal.h"
+#include "verbs.h"
+
+namespace unseen::app {
+namespace {
+
+struct TradeoffArguments {
+    std::string model, json, csv;
+    ViewOptions view;
+    DisplayOptions display;
+    session::TradeoffOptions options;
+    bool is_verbose = false;
+};
+
+// What selects the point in simplify, render and view.
+std::string options_of(const session::TradeoffPoint& point) {
+    const session::Request& request = point.request;
+    std::string text;
+    switch (request.goal.kind) {
+    case session::Goal::Kind::full: return "--full";
+    case session::Goal::Kind::budget: return "--triangles " + std::to_string(request.goal.triangles);
+    case session::Goal::Kind::pixels: text = "--pixels " + shortest(request.goal.tolerance_px); break;
+    case session::Goal::Kind::imperceptible: text = "--imperceptible"; break;
+    }
+    if (request.fold_test) text += " --fold-test " + session::name_of(*request.fold_test);
+    if (request.threshold != 1) text += " --threshold " + shortest(request.threshold);
+    if (point.is_of_view) text += " --visibility picture";
+    return text;
+}
+
+Json to_json(const session::TradeoffPoint& p) {
+    return {{"name", p.name},
+            {"options", options_of(p)},
+            {"holds_for", p.is_of_view ? "this view" : "all views"},
+            {"triangles", p.triangles},
+            {"make_ms", p.make_ms},
+            {"follow_ms", number_or_null(p.follow_ms)},
+            {"draw_ms", p.draw_ms},
+            {"visible_pixels", p.visible_pixels},
+            {"v", number_or_null(p.v)},
+            {"second_visible_pixels", p.second_visible_pixels},
+            {"second_v", number_or_null(p.second_v)},
+            {"ssim", number_or_null(p.ssim)},
+            {"shift_m", p.shift},
+            {"pareto", p.is_on_front},
+            {"recommended", p.is_recommended}};
+}
+
+std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
+
+std::string to_csv(const session::Tradeoff& tradeoff) {
+    std::string text =
+        "name,options,triangles,make_ms,follow_ms,draw_ms,visible_pixels,v,second_visible_pixels,second_v,"
+        "ssim,shift_m,pareto,recommended\n";
+    for (const session::TradeoffPoint& p : tradeoff.points)
+        text += "\"" + p.name + "\"," + options_of(p) + "," + std::to_string(p.triangles) + "," + cell(p.make_ms) +
+                "," + cell(p.follow_ms) + "," + cell(p.draw_ms) + "," + std::to_string(p.visible_pixels) + "," +
+                cell(p.v) + "," + std::to_string(p.second_visible_pixels) + "," + cell(p.second_v) + "," +
+                cell(p.ssim) + "," + cell(p.shift) + "," + (p.is_on_front ? "1" : "0") + "," +
+                (p.is_recommended ? "1" : "0") + "\n";
+    return text;
+}
+
+void print(const session::Tradeoff& tradeoff, const session::Session& session) {
+    std::vector<const session::TradeoffPoint*> sorted;
+    for (const session::TradeoffPoint& p : tradeoff.points) sorted.push_back(&p);
+    std::ranges::stable_sort(sorted, std::greater<>(), [](const auto* p) { return p->triangles; });
+    const auto all = static_cast<double>(std::max<std::uint64_t>(session.triangle_count(), 1));
+    std::vector<std::vector<std::string>> rows = {{"", "triangles", "of all", "follow, ms", "draw, ms", "make, ms",
+                                                   "visible pixels", "V", "second judge", "V", "SSIM", ""}};
+    for (const session::TradeoffPoint* p : sorted)
+        rows.push_back({p->name, grouped(p->triangles), rounded(100 * p->triangles / all, 3) + "%",
+                        std::isfinite(p->follow_ms) ? rounded(p->follow_ms, 2) : "-", rounded(p->draw_ms, 3),
+                        rounded(p->make_ms, 3), grouped(p->visible_pixels), rounded(p->v, 2),
+                        grouped(p->second_visible_pixels), rounded(p->second_v, 2),
+                        std::isfinite(p->ssim) ? rounded(p->ssim, 5) : "-",
+                        std::string(p->is_on_front ? "*" : "") + (p->is_recommended ? " <-" : "")});
+    print_table(rows);
+    print_line("* no other has both fewer triangles and a smaller V. V: the largest difference from the full model, in "
+               "thresholds; from 1 on it is seen.");
+    print_line("follow and draw: a frame, with one sample a pixel, on this machine. make: from nothing" +
+               (tradeoff.measuring_s > 0.5 ? ", after " + duration(1e3 * tradeoff.measuring_s) +
+                                                 " that measured what folds change, once for this model."
+                                           : std::string(".")));
+    for (const std::string& name : tradeoff.left_out) print_note("left out: " + name);
+    const auto best = std::ranges::find_if(tradeoff.points, &session::TradeoffPoint::is_recommended);
+    print_line("recommended for this view, observer and machine: " + options_of(*best));
+    const auto still = std::ranges::find_if(tradeoff.points, [&](const session::TradeoffPoint& p) {
+        return p.is_of_view && p.visible_pixels == 0 && p.second_visible_pixels == 0 && p.triangles < best->triangles;
+    });
+    if (still != tradeoff.points.end()) print_line("for a still of this very view: " + options_of(*still));
+}
+
+Result<int> run(TradeoffArguments& a) {
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.csv, a.json}); !ready)
+        return ready.error();
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    std::optional<vdtree::AtomicFile> csv;
+    if (!a.csv.empty()) {
+        auto file = vdtree::AtomicFile::create(a.csv);
+        if (!file) return file.error();
+        csv = std::move(*file);
+    }
+    auto context = render::Context::headless();
+    if (!context) return context.error();
+    auto session = open_session(a.model, a.view, a.display);
+    if (!session) return session.error();
+    Result<session::Tradeoff> tradeoff = session::Tradeoff{};
+    {
+        ProgressBar bar("measuring");
+        a.options.progress = [&](double share) { bar(share, "ways"); };
+        tradeoff = session::measure_tradeoff(*session, *context, make_view(*session, a.view), a.options);
+    }
+    if (!tradeoff) return tradeoff.error();
+    Json points = Json::array();
+    for (const session::TradeoffPoint& point : tradeoff->points) points.push_back(to_json(point));
+    if (auto ok = report->prepare({{"source_triangles", session->triangle_count()},
+                                   {"measuring_s", tradeoff->measuring_s},
+                                   {"points", std::move(points)},
+                                   {"left_out", tradeoff->left_out}});
+        !ok)
+        return ok.error();
+    if (csv) {
+        if (auto ok = csv->write(to_csv(*tradeoff)); !ok) return ok.error();
+        if (auto ok = csv->commit(); !ok) return ok.error();
+    }
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print_scene(*session);
+    print(*tradeoff, *session);
+    print_written({a.csv, a.json});
+    return exit_done;
+}
+
+} // namespace
+
+Command tradeoff_command(CLI::App& app) {
+    auto a = std::make_shared<TradeoffArguments>();
+    CLI::App* verb =
+        app.add_subcommand("tradeoff", "What accuracy costs for a model and a view: which options to take");
+    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    verb->add_option("--csv", a->csv, "One line a way")->type_name("FILE.csv");
+    add_json_option(*verb, a->json);
+    verb->add_option("--seconds", a->options.seconds,
+                     "About how long to measure; ways that do not fit are left out (default: 45)")
+        ->type_name("T")
+        ->check(positive());
+    verb->add_option("--samples", a->options.samples, "Of the pictures that are judged, a pixel (default: 64)")
+        ->type_name("N")
+        ->check(whole(1, 256));
+    add_as_option(*verb, a->view.as);
+    add_view_options(*verb, a->view);
+    add_display_options(*verb, a->display);
+    verb->footer("Examples:\n  unseen tradeoff bunny.vdt\n"
+                 "  unseen tradeoff part.stl --unit 0.001 --size 1920x1080 --csv tradeoff.csv\n"
+                 "  unseen tradeoff museum.glb --observer strict --json -");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

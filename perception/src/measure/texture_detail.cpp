@@ -1,0 +1,176 @@
+#include "measure/texture_detail.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include <vdtree/colour.h>
+
+#include "measure/fold_stages.h"
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+constexpr std::uint32_t tile_side = 4; // texels
+constexpr std::int64_t most_tiles = 8; // a side that a box is looked up in
+// Beyond, a coordinate in float has no texel of its own any more.
+constexpr double farthest_coordinate = 1 << 23; // texels
+
+std::uint32_t tiles_of(std::uint32_t texels) { return (texels + tile_side - 1) / tile_side; }
+
+} // namespace
+
+TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
+    : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
+    Level base{width_, height_, std::vector<float>(texture.texels.size()), {}};
+    const glm::dvec3 of_tint(tint);
+    const double own = rec709_luminance(of_tint);
+    tbb::parallel_for(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
+        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
+            const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
+            base.means[i] = static_cast<float>(own > 0 ? rec709_luminance(of_tint * texel) / own
+                                                       : linear_luminance(texture.texels[i]));
+        }
+    });
+    levels_.push_back(std::move(base));
+    while (levels_.back().width > 1 || levels_.back().height > 1) {
+        const Level& fine = levels_.back();
+        Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
+        coarse.means.resize(std::size_t{coarse.width} * coarse.height);
+        tbb::parallel_for(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
+            for (std::uint32_t x = 0; x < coarse.width; ++x) {
+                float sum = 0, count = 0;
+                for (std::uint32_t fy = 2 * y; fy < std::min(2 * y + 2, fine.height); ++fy)
+                    for (std::uint32_t fx = 2 * x; fx < std::min(2 * x + 2, fine.width); ++fx)
+                        sum += fine.means[std::size_t{fy} * fine.width + fx], count += 1;
+                coarse.means[std::size_t{y} * coarse.width + x] = sum / count;
+            }
+        });
+        levels_.push_back(std::move(coarse));
+    }
+    for (std::size_t level = 0; level < levels_.size(); ++level) find_contrasts(level);
+}
+
+void TextureDetail::find_contrasts(std::size_t number) {
+    Level& level = levels_[number];
+    const Level* const next = number + 1 < levels_.size() ? &levels_[number + 1] : nullptr;
+    Tiles tiles{tiles_of(level.width), tiles_of(level.height), {}};
+    tiles.largest.resize(std::size_t{tiles.width} * tiles.height, 0.0f);
+    tbb::parallel_for(std::uint32_t{0}, tiles.height, [&](std::uint32_t row) {
+        for (std::uint32_t y = row * tile_side; y < std::min((row + 1) * tile_side, level.height); ++y)
+            for (std::uint32_t x = 0; x < level.width; ++x) {
+                if (!next) continue; // one texel: nothing varies
+                const float low = bilinear(*next, (x + 0.5) / level.width, (y + 0.5) / level.height);
+                const float detail = std::abs(level.means[std::size_t{y} * level.width + x] - low);
+                float& largest = tiles.largest[std::size_t{row} * tiles.width + x / tile_side];
+                largest = std::max(largest, detail / (low + FoldStage::black));
+            }
+    });
+    level.tiles.push_back(std::move(tiles));
+    while (level.tiles.back().width > 1 || level.tiles.back().height > 1) {
+        const Tiles& fine = level.tiles.back();
+        Tiles coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+        coarse.largest.resize(std::size_t{coarse.width} * coarse.height, 0.0f);
+        for (std::uint32_t y = 0; y < fine.height; ++y)
+            for (std::uint32_t x = 0; x < fine.width; ++x) {
+                float& largest = coarse.largest[std::size_t{y / 2} * coarse.width + x / 2];
+                largest = std::max(largest, fine.largest[std::size_t{y} * fine.width + x]);
+            }
+        level.tiles.push_back(std::move(coarse));
+    }
+}
+
+float TextureDetail::mean_at(const Level& level, std::int64_t x, std::int64_t y) const {
+    const auto column = static_cast<std::size_t>(wrapped_texel(x, level.width, wrap_u_)),
+               row = static_cast<std::size_t>(wrapped_texel(y, level.height, wrap_v_));
+    return level.means[row * level.width + column];
+}
+
+float TextureDetail::bilinear(const Level& level, double u, double v) const {
+    const double x = u * level.width - 0.5, y = v * level.height - 0.5;
+    if (!(std::abs(x) < farthest_coordinate) || !(std::abs(y) < farthest_coordinate)) return levels_.back().means[0];
+    const double fx = std::floor(x), fy = std::floor(y);
+    const auto i = static_cast<std::int64_t>(fx), j = static_cast<std::int64_t>(fy);
+    const auto s = static_cast<float>(x - fx), t = static_cast<float>(y - fy);
+    float corners[4];
+    if (i >= 0 && j >= 0 && i + 1 < level.width && j + 1 < level.height) { // most
+        const float* const first = level.means.data() + static_cast<std::size_t>(j) * level.width + i;
+        corners[0] = first[0], corners[1] = first[1], corners[2] = first[level.width],
+        corners[3] = first[level.width + 1];
+    } else {
+        for (int k = 0; k < 4; ++k) corners[k] = mean_at(level, i + k % 2, j + k / 2);
+    }
+    return (1 - t) * ((1 - s) * corners[0] + s * corners[1]) + t * ((1 - s) * corners[2] + s * corners[3]);
+}
+
+float TextureDetail::at(std::size_t level, glm::vec2 uv) const {
+    return bilinear(levels_[std::min(level, levels_.size() - 1)], static_cast<double>(uv.x), static_cast<double>(uv.y));
+}
+
+float TextureDetail::nearest(std::size_t number, glm::vec2 uv) const {
+    const Level& level = levels_[std::min(number, levels_.size() - 1)];
+    const float x = uv.x * static_cast<float>(level.width), y = uv.y * static_cast<float>(level.height);
+    constexpr auto farthest = static_cast<float>(farthest_coordinate);
+    if (!(std::abs(x) < farthest) || !(std::abs(y) < farthest)) return levels_.back().means[0];
+    const auto whole = [](float at) {
+        const auto towards_zero = static_cast<std::int64_t>(at);
+        return towards_zero - (static_cast<float>(towards_zero) > at);
+    };
+    const std::int64_t i = whole(x), j = whole(y);
+    if (i >= 0 && j >= 0 && i < level.width && j < level.height)
+        return level.means[static_cast<std::size_t>(j) * level.width + static_cast<std::size_t>(i)];
+    return mean_at(level, i, j);
+}
+
+std::size_t TextureDetail::level_of(float texels) const {
+    std::size_t level = 0;
+    while (level + 1 < levels_.size() && std::exp2(static_cast<float>(level)) < texels) ++level;
+    return level;
+}
+
+std::size_t TextureDetail::runs_of(float lo, float hi, std::uint32_t size, Wrap wrap, Run (&runs)[2]) {
+    const std::int64_t n = size;
+    const double first = static_cast<double>(lo) * size - 1, last = static_cast<double>(hi) * size + 1;
+    runs[0] = {0, n - 1};
+    if (!(first > -farthest_coordinate) || !(last < farthest_coordinate) || !(last - first < size)) return 1;
+    const auto begin = static_cast<std::int64_t>(std::floor(first)), end = static_cast<std::int64_t>(std::floor(last));
+    const std::int64_t a = wrapped_texel(begin, n, wrap), b = wrapped_texel(end, n, wrap);
+    const bool is_one = wrap == Wrap::clamp || (begin - wrapped_texel(begin, n, Wrap::repeat)) / n ==
+                                                   (end - wrapped_texel(end, n, Wrap::repeat)) / n;
+    if (is_one) {
+        runs[0] = {std::min(a, b), std::max(a, b)};
+        return 1;
+    }
+    if (wrap == Wrap::mirror) return 1; // about a border: all of it
+    runs[0] = {a, n - 1}, runs[1] = {0, b};
+    return 2;
+}
+
+float TextureDetail::contrast(std::size_t number, const UvBox& box) const {
+    const Level& level = levels_[std::min(number, levels_.size() - 1)];
+    if (box.is_empty()) return level.tiles.back().largest[0];
+    Run columns[2], rows[2];
+    const std::size_t column_runs = runs_of(box.lo.x, box.hi.x, level.width, wrap_u_, columns),
+                      row_runs = runs_of(box.lo.y, box.hi.y, level.height, wrap_v_, rows);
+    float largest = 0;
+    for (std::size_t r = 0; r < row_runs; ++r)
+        for (std::size_t c = 0; c < column_runs; ++c) {
+            const Run x{columns[c].first / tile_side, columns[c].last / tile_side},
+                y{rows[r].first / tile_side, rows[r].last / tile_side};
+            std::size_t k = 0;
+            while (std::max((x.last >> k) - (x.first >> k), (y.last >> k) - (y.first >> k)) >= most_tiles) ++k;
+            const Tiles& tiles = level.tiles[k];
+            for (std::int64_t j = y.first >> k; j <= y.last >> k; ++j)
+                for (std::int64_t i = x.first >> k; i <= x.last >> k; ++i)
+                    largest = std::max(
+                        largest,
+                        tiles.largest[static_cast<std::size_t>(j) * tiles.width + static_cast<std::size_t>(i)]);
+        }
+    return largest;
+}
+
+} // namespace unseen::perception

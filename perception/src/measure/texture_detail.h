@@ -1,0 +1,62 @@
+// A texture as the measurement of folds looks at it: its relative luminance by mip level, and how much contrast lies at
+// which level around a place.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <vdtree/texture.h>
+
+namespace unseen::perception {
+
+// Level l has texels 2^l times as wide as the texture's own. What a level shows and the next one does not is its detail:
+// patterns of about four of its texels a wave.
+class TextureDetail {
+public:
+    // Of a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count). Cost:
+    // some passes over the texels; 6 bytes of memory for each.
+    explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
+
+    std::size_t level_count() const { return levels_.size(); }
+    glm::vec2 size() const { return glm::vec2(width_, height_); } // texels
+
+    // The mean luminance of a level's texels, bilinear, as renderers filter; beyond 0..1 as the texture repeats.
+    float at(std::size_t level, glm::vec2 uv) const;
+    // Likewise, but of the nearest texel.
+    float nearest(std::size_t level, glm::vec2 uv) const;
+    // The level whose texels are the first to be no narrower than so many of the texture's own.
+    std::size_t level_of(float texels) const;
+
+    // The largest detail of a level in the box and nearby, as a contrast: over the local mean of the next level and
+    // about a display's black.
+    float contrast(std::size_t level, const vdtree::UvBox& box) const;
+
+private:
+    struct Tiles { // of some texels a side, the largest contrast in each
+        std::uint32_t width, height;
+        std::vector<float> largest;
+    };
+    struct Level {
+        std::uint32_t width, height;
+        std::vector<float> means;
+        std::vector<Tiles> tiles; // each half as fine as the last
+    };
+    struct Run { // of texels
+        std::int64_t first, last;
+    };
+
+    void find_contrasts(std::size_t level);
+    float mean_at(const Level& level, std::int64_t x, std::int64_t y) const;
+    float bilinear(const Level& level, double u, double v) const;
+    static std::size_t runs_of(float lo, float hi, std::uint32_t size, vdtree::Wrap wrap, Run (&runs)[2]);
+
+    std::uint32_t width_, height_;
+    vdtree::Wrap wrap_u_, wrap_v_;
+    std::vector<Level> levels_;
+};
+
+} // namespace unseen::perception

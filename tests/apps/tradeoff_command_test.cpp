@@ -1,0 +1,101 @@
+// unseen tradeoff: its points are what the options that it names make.
+#include "run_command.h"
+
+#include <algorithm>
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::HasSubstr;
+
+class TradeoffCommandTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        build_ball();
+        const Outcome probe = run({"render", "ball.vdt", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
+        fs::remove(path("probe.png"));
+        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
+        ASSERT_EQ(probe.status, 0) << probe.err;
+    }
+    Json tradeoff(const std::vector<std::string>& more = {}) const {
+        std::vector<std::string> words = {"tradeoff",  "ball.vdt", "--size", "200x160",
+                                          "--samples", "16",       "--json", "-"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json();
+    }
+};
+
+std::vector<std::string> words_of(const std::string& text) {
+    std::istringstream stream(text);
+    return {std::istream_iterator<std::string>(stream), {}};
+}
+
+TEST_F(TradeoffCommandTest, EachPointIsWhatItsOptionsMake) {
+    const Json report = tradeoff({"--csv", "points.csv"});
+    const Json& points = report["points"];
+    ASSERT_GT(points.size(), 15u);
+    EXPECT_EQ(points[0]["options"], "--full");
+    EXPECT_EQ(points[0]["triangles"], report["source_triangles"]);
+    EXPECT_EQ(points[0]["v"], 0);
+    for (const Json& point : points) {
+        std::vector<std::string> words = {"render", "ball.vdt", "--size", "200x160", "-o", "x.png", "--json", "-"};
+        for (const std::string& word : words_of(point["options"])) words.push_back(word);
+        const Outcome made = run(words);
+        ASSERT_EQ(made.status, 0) << made.err;
+        const Json cut = made.json();
+        EXPECT_EQ(cut["triangles"], point["triangles"]) << point;
+        EXPECT_GT(point["draw_ms"], 0) << point;
+        EXPECT_EQ(point["follow_ms"].is_null(), point["holds_for"] == "this view") << point;
+    }
+    const std::string csv = read_text(path("points.csv"));
+    EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), points.size() + 1);
+}
+
+TEST_F(TradeoffCommandTest, TheFrontHasNothingBetter) {
+    const Json report = tradeoff();
+    std::size_t recommended = 0;
+    for (const Json& point : report["points"]) {
+        bool has_better = false;
+        for (const Json& other : report["points"])
+            has_better = has_better || (other["triangles"] <= point["triangles"] && other["v"] <= point["v"] &&
+                                        (other["triangles"] < point["triangles"] || other["v"] < point["v"]));
+        EXPECT_EQ(point["pareto"], !has_better) << point;
+        if (point["recommended"] == false) continue;
+        ++recommended;
+        EXPECT_EQ(point["visible_pixels"], 0);
+        EXPECT_EQ(point["second_visible_pixels"], 0);
+        EXPECT_EQ(point["holds_for"], "all views");
+    }
+    EXPECT_EQ(recommended, 1u);
+    // Coarse ways are seen: the judges are not blind.
+    EXPECT_TRUE(std::ranges::any_of(report["points"], [](const Json& p) { return p["visible_pixels"] > 0; }));
+}
+
+TEST_F(TradeoffCommandTest, WhatDoesNotFitIsLeftOutAndSaid) {
+    const Json report = tradeoff({"--seconds", "0.001"});
+    EXPECT_EQ(report["points"].size(), 1u);
+    EXPECT_GT(report["left_out"].size(), 15u);
+    EXPECT_EQ(report["points"][0]["recommended"], true);
+    EXPECT_THAT(run({"tradeoff", "ball.vdt", "--seconds", "0"}).err, HasSubstr("--seconds"));
+    EXPECT_THAT(run({"tradeoff", "missing.vdt"}).err, HasSubstr("missing.vdt"));
+    const Outcome text = run({"tradeoff", "ball.vdt", "--size", "64x64", "--samples", "1", "--seconds", "0.2"});
+    EXPECT_EQ(text.status, 0) << text.err;
+    EXPECT_THAT(text.out, HasSubstr("recommended for this view, observer and machine: --"));
+}
+
+TEST_F(TradeoffCommandTest, ThresholdsAreOfImperceptibleCuts) {
+    const auto kept = [&](const char* threshold) {
+        return run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", threshold, "--json", "-"})
+            .json()["triangles"];
+    };
+    EXPECT_LE(kept("4"), kept("1"));
+    EXPECT_LE(kept("1"), kept("0.25"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "2", "--full"}).err,
+                HasSubstr("--threshold is of --imperceptible"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "0"}).err, HasSubstr("--threshold"));
+}
+
+} // namespace
