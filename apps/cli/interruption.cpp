@@ -3,10 +3,12 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <string_view>
 
 #include <unistd.h>
 
 #include <vdtree/internal/atomic_file.h>
+#include <vdtree/internal/mapped_names.h>
 
 #include "command.h"
 
@@ -29,11 +31,22 @@ void on_signal(int signal) {
     end_by(signal);
 }
 
-// What a mapped file's pages raise when the file has become shorter than it was.
-void on_lost_page(int) {
-    static constexpr char sentence[] = "unseen: A file that is read in place was cut short while it was read. Write it "
-                                       "anew under another name and rename it.\n";
-    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, sentence, sizeof sentence - 1);
+// Async-signal-safe; as printable(), but that letters of other languages are dots, too.
+void write_plainly(std::string_view text) {
+    for (const char c : text) {
+        const char shown = c >= ' ' && c <= '~' ? c : '.';
+        [[maybe_unused]] const auto written = ::write(STDERR_FILENO, &shown, 1);
+    }
+}
+
+// What a mapped file's pages raise when the file has become shorter than it was. Other causes are not for a sentence.
+void on_lost_page(int signal, siginfo_t* info, void*) {
+    const char* const file = info->si_code > 0 ? vdtree::mapped_file_at(info->si_addr) : nullptr;
+    if (!file) return end_by(signal);
+    write_plainly("unseen: '");
+    write_plainly(file);
+    write_plainly("' was cut short while it was read: write it anew, under another name, and rename it.");
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, "\n", 1);
     vdtree::AtomicFile::remove_all();
     ::_exit(exit_failed);
 }
@@ -50,7 +63,8 @@ void clean_up_on_signals() {
         ::sigaction(signal, &action, nullptr);
     }
     struct sigaction action {};
-    action.sa_handler = on_lost_page;
+    action.sa_sigaction = on_lost_page;
+    action.sa_flags = SA_SIGINFO;
     ::sigaction(SIGBUS, &action, nullptr);
 }
 

@@ -5,7 +5,8 @@
 namespace unseen::app {
 
 // From now on such a signal removes temporary files before it ends the process. Signals that are ignored stay so. A
-// page that a mapped file has lost, because another program cut it short, ends the process with a sentence.
+// page that a mapped file has lost, because another program cut it short, ends the process with a sentence that names
+// the file.
 void clean_up_on_signals();
 
 // While one lives, the first signal is only remembered, for a loop that ends early and keeps what it has; the second

@@ -9,6 +9,9 @@
 #include <string_view>
 #include <typeinfo>
 
+#include <poll.h>
+#include <unistd.h>
+
 #include "interruption.h"
 #include "option_names.h"
 #include "output_files.h"
@@ -79,9 +82,12 @@ std::string complaint(const CLI::App& app, const Program& program, const CLI::Pa
 // Brings out what was printed. The files of a run that comes so far are written.
 int finish(int status) {
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
+    pollfd out{STDOUT_FILENO, 0, 0};
+    const bool is_closed = ::poll(&out, 1, 0) == 1 && (out.revents & POLLERR);
     std::string kept;
     for (const std::string& file : written_outputs()) kept += (kept.empty() ? " Written: " : ", ") + file;
-    print_error("cannot write to the standard output: is the disk full?" + kept);
+    print_error("cannot write to the standard output: " +
+                std::string(is_closed ? "who reads it has closed it." : "is the disk full?") + kept);
     return exit_failed;
 }
 
@@ -153,8 +159,9 @@ int run(int argc, char** argv, const Program& program, const FunctionRef<std::ve
 
 int run_program(int argc, char** argv, const Program& program,
                 const FunctionRef<std::vector<Command>(CLI::App&)>& verbs) {
-    std::signal(SIGXFSZ,
-                SIG_IGN); // a file beyond the user's limit is an error like a full disk, and not the end without a word
+    // A file beyond the user's limit is an error like a full disk, and so is a pipe that nobody reads any more: not the
+    // end without a word.
+    for (const int signal : {SIGXFSZ, SIGPIPE}) std::signal(signal, SIG_IGN);
     clean_up_on_signals();
     name_program(program.name);
     const int status = run(argc, argv, program, verbs);

@@ -8,6 +8,23 @@
 
 namespace unseen::app {
 
+std::string json_text(const Json& json) {
+    const std::string plain = json.dump(2, ' ', false, Json::error_handler_t::replace); // names may be no UTF-8
+    std::string text;
+    constexpr const char* digits = "0123456789abcdef";
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+        auto code = static_cast<unsigned char>(plain[i]);
+        if (code == 0xc2 && static_cast<unsigned char>(plain[i + 1]) < 0xa0)
+            code = static_cast<unsigned char>(plain[++i]);
+        else if (code != 0x7f) {
+            text += plain[i];
+            continue;
+        }
+        text += {'\\', 'u', '0', '0', digits[code >> 4], digits[code & 15]};
+    }
+    return text + "\n";
+}
+
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Result<JsonReport> JsonReport::open(const std::string& name) {
@@ -22,8 +39,7 @@ Result<JsonReport> JsonReport::open(const std::string& name) {
 }
 
 Result<void> JsonReport::prepare(const Json& json) {
-    // File names may hold bytes that are no UTF-8.
-    text_ = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    text_ = json_text(json);
     return file_ ? file_->write(text_) : Result<void>();
 }
 

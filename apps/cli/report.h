@@ -17,6 +17,10 @@ namespace unseen::app {
 using Json = nlohmann::ordered_json;
 
 // Infinite and undefined numbers are null: JSON has neither.
+// What is printed or written of a report, with a line break behind it. Control characters are escaped, also those above
+// ASCII, which JSON would allow: nothing steers the terminal.
+std::string json_text(const Json& json);
+
 Json number_or_null(double value);
 
 // Where --json goes: nowhere (no name), stdout ("-"), or a file that appears when the report is published. Opened

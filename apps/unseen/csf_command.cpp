@@ -171,6 +171,18 @@ Result<void> read_cell(const std::string& column, const std::string& cell, Stimu
     return {};
 }
 
+// The column of the first control character but tabs, from 1 on; 0: there is none. Rows are printed as they are, and must
+// not steer the terminal. Letters of encodings other than UTF-8 are not looked at.
+std::size_t control_character(std::string_view line) {
+    for (std::size_t i = 0; i < line.size(); ++i) {
+        const auto byte = static_cast<unsigned char>(line[i]);
+        const auto next = static_cast<unsigned char>(i + 1 < line.size() ? line[i + 1] : 0);
+        if ((byte < 0x20 && byte != '\t') || byte == 0x7f || (byte == 0xc2 && next >= 0x80 && next < 0xa0))
+            return i + 1;
+    }
+    return 0;
+}
+
 // The rows with `sensitivity` appended, 17 digits so that nothing is lost; comments and empty lines as they are.
 Result<std::string> evaluate_csv(std::istream& in, const std::string& name, const CsfArguments& a,
                                  const Observer& observer) {
@@ -183,6 +195,8 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
     for (std::string line; std::getline(in, line);) {
         ++line_number;
         if (line.ends_with('\r')) line.pop_back();
+        if (const std::size_t column = control_character(line); column > 0)
+            return complain("column " + std::to_string(column) + " is a control character: remove it.");
         if (line.empty() || line.starts_with('#')) {
             out += line + "\n";
             continue;
@@ -190,6 +204,10 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
         const std::vector<std::string> cells = split(line);
         if (columns.empty()) {
             columns = cells;
+            for (auto column = columns.begin(); column != columns.end(); ++column)
+                if (!column->empty() && std::find(columns.begin(), column, *column) != column)
+                    return complain("column " + std::to_string(column - columns.begin() + 1) + ", '" + *column +
+                                    "', is there before: remove or rename one of them.");
             out += line + ",sensitivity\n";
             continue;
         }

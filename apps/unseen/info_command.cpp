@@ -28,7 +28,7 @@ struct InfoArguments {
 using Rows = std::vector<std::vector<std::string>>;
 
 void output(bool as_json, const Json& json, const Rows& rows) {
-    if (as_json) std::printf("%s\n", json.dump(2, ' ', false, Json::error_handler_t::replace).c_str());
+    if (as_json) std::fputs(json_text(json).c_str(), stdout);
     else print_table(rows);
 }
 

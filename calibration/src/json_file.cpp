@@ -102,6 +102,11 @@ std::string line_and_column(std::string_view text, std::size_t byte) {
 }
 
 Result<json> parse(const std::filesystem::path& file, const std::string& text) {
+    if (const std::size_t nul = text.find('\0'); nul != text.npos) { // which the parser takes for the end
+        std::filesystem::path place = file;
+        place += line_and_column(text, nul + 1);
+        return file_error(place, ErrorCode::malformed_data, "is no valid JSON: a NUL byte");
+    }
     try {
         Inspector inspector;
         if (!json::sax_parse(text, &inspector)) {

@@ -158,6 +158,10 @@ TEST_F(CsfCommandTest, BadRowsNameTheirLineAndPrintNothing) {
         {"frequency,luminance,field\n4,100,upper\n", "line 2: field"},
         {"frequency\n4\n", "line 2: --luminance"},
         {"frequency,luminance,velocity\n4,100,-1\n", "line 2"},
+        {"frequency,luminance,frequency\n4,100,5\n", "line 1: column 3, 'frequency', is there before"},
+        {"frequency,lumi\x1b[31mnance\n4,100\n", "line 1: column 15 is a control character"},
+        {"frequency,luminance,note\n4,100,\xc2\x9b\n", "line 2: column 7 is a control character"},
+        {std::string("frequency,luminance\n4,100\n\0", 27), "line 3: column 1 is a control character"},
         {"frequency,luminance,velocity,temporal\n4,100,1,8\n", "line 2: no sensitivity: give a temporal"},
     };
     for (const auto& [rows, expected] : bad) {

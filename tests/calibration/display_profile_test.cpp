@@ -232,6 +232,8 @@ TEST_F(DisplayProfile, RefusesWhatIsNoProfile) {
     EXPECT_LT(read_display(write("{\"" + long_key + "\": 1}")).error().message.size(), 1000u);
     EXPECT_THAT(read_display(write("{\"line\\nbreak\": 1}")).error().message, HasSubstr("line\\nbreak"));
     EXPECT_THAT(read_display(write("{}{}")).error().message, HasSubstr("profile.json:1:3"));
+    EXPECT_THAT(read_display(write(minimal + '\0')).error().message, HasSubstr("a NUL byte"));
+    EXPECT_THAT(read_display(write(std::string("{\n \0}", 5))).error().message, HasSubstr("profile.json:2:2"));
 }
 
 TEST_F(DisplayProfile, RefusesWhatIsNoFile) {

@@ -258,6 +258,29 @@ TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     EXPECT_TRUE(std::ranges::equal(records_of(*one), records_of(*four)));
 }
 
+TEST(FoldErrors, TellHowFarTheyAreAndCanBeCancelledAtAnyTime) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.02));
+    std::vector<double> shares;
+    ASSERT_TRUE(measure_folds(tree, 1, [&](double share, const char* stage) {
+        EXPECT_STREQ(stage, "measuring folds");
+        shares.push_back(share);
+        return true;
+    }));
+    EXPECT_TRUE(std::ranges::is_sorted(shares));
+    EXPECT_GE(shares.front(), 0);
+    EXPECT_LE(shares.back(), 1);
+    double widest = 0;
+    for (std::size_t i = 1; i < shares.size(); ++i) widest = std::max(widest, shares[i] - shares[i - 1]);
+    EXPECT_LT(widest, 0.1) << "in contacts, folds and pictures";
+    for (const std::size_t calls : {std::size_t{0}, shares.size() / 4, shares.size() / 2, shares.size() - 1}) {
+        std::size_t told = 0;
+        const auto cancelled = measure_folds(tree, 1, [&](double, const char*) { return told++ < calls; });
+        ASSERT_FALSE(cancelled) << calls;
+        EXPECT_EQ(cancelled.error().code, ErrorCode::cancelled);
+        EXPECT_EQ(told, calls + 1) << "it stops at once";
+    }
+}
+
 // Neither as they are built nor with their light conserved.
 TEST(FoldErrors, LeaveTheLuminancesAsTheyAre) {
     const VertexTree means = support::built(shapes::with_attributes(shapes::torus(24, 12)));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <set>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@
 #include <gtest/gtest.h>
 
 #include "fold/fold_errors.h"
+#include "measure/border_shifts.h"
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"
@@ -184,6 +186,36 @@ TEST(FoldedBorders, MoveByNoMoreThanIsCounted) {
         }
         EXPECT_GE(moved, least_moved);
     }
+}
+
+// Rings of random triangles lie through each other: that none of the others' edges is nearer, no sphere around some of
+// them tells.
+TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
+    const VertexTree tree = support::built(shapes::unwelded(shapes::random_soup(72000, 24000, 1)));
+    const SoundTree sound = support::sound(tree);
+    const LeafTriangles of_leaf(sound);
+    const BorderShifts shifts(sound, of_leaf);
+    NodeId node = 1; // with most leaves, but for the root
+    const auto leaves = [&](NodeId n) { return sound.leaf_end()[n] - sound.first_leaf()[n]; };
+    for (NodeId other = 1; other < tree.interior_count(); ++other)
+        if (leaves(other) > leaves(node)) node = other;
+    std::vector<Index> crossing;
+    for (Index t = 0; t < sound.triangles().size(); ++t)
+        if (std::ranges::any_of(sound.triangles()[t],
+                                [&](Index leaf) { return leaf - sound.first_leaf()[node] < leaves(node); }))
+            crossing.push_back(t);
+    ASSERT_GT(crossing.size(), 4000u);
+    const auto cpu_seconds = [] {
+        timespec now{};
+        clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+        return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+    };
+    const double start = cpu_seconds();
+    const float shift = shifts.shift(node, crossing, [&](Index leaf) { return tree.interior_count() + leaf; });
+    const double seconds = cpu_seconds() - start;
+    EXPECT_GT(shift, 0);
+    EXPECT_LT(shift, 2 * tree.support_spheres()[node].radius);
+    EXPECT_LT(seconds, 5) << crossing.size() << " triangles";
 }
 
 // What is inside moves no outline, however far it moves along the sheet.

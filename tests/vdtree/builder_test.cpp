@@ -712,6 +712,54 @@ TEST(BuildTree, RefusesCoordinatesBeyondFloats) {
     }
 }
 
+// What floats cannot measure, and what doubles have rounded to a few places, would be trees of nothing.
+TEST(BuildTree, RefusesSizesThatNumbersCannotHold) {
+    const Mesh ball = shapes::bumpy_sphere(3); // about 2 units large
+    const auto far = [&](double x) {
+        Mesh mesh = ball;
+        for (glm::dvec3& p : mesh.positions) p.x += x;
+        return mesh;
+    };
+    for (const double scale : {1e-300, 1e-100, 1e-38}) {
+        const auto tree = build_tree(shapes::placed(ball, scale).view());
+        ASSERT_FALSE(tree) << scale;
+        EXPECT_THAT(tree.error().message, testing::HasSubstr("scale it up"));
+    }
+    const auto smallest = build_tree(shapes::placed(ball, 1e-36).view());
+    ASSERT_TRUE(smallest);
+    EXPECT_TRUE(verify(*smallest));
+    for (const double x : {1e15, -1e15, 1e30}) {
+        const auto tree = build_tree(far(x).view());
+        ASSERT_FALSE(tree) << x;
+        EXPECT_THAT(tree.error().message, testing::HasSubstr("move it nearer to the origin"));
+    }
+    const auto farthest = build_tree(far(1e13).view());
+    ASSERT_TRUE(farthest);
+    EXPECT_TRUE(verify(*farthest));
+    Mesh wall = shapes::grid(4); // exact there, since one of its coordinates is the same everywhere
+    for (glm::dvec3& p : wall.positions) p.z = 1e15;
+    EXPECT_TRUE(build_tree(wall.view()));
+    Mesh point = shapes::single_triangle();
+    for (glm::dvec3& p : point.positions) p = glm::dvec3(1e15);
+    EXPECT_TRUE(build_tree(point.view())) << "is meant to be one";
+}
+
+// Vertices that only doubles tell apart are one point in a tree, several nodes deep.
+TEST(BuildTree, IsSoundWhereFloatsDoNotTellVerticesApart) {
+    for (const double apart : {1e-8, 1e-10, 1e-14}) {
+        Mesh mesh = shapes::unwelded(shapes::bumpy_sphere(3));
+        for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+            mesh.positions[v] += apart * glm::dvec3(v % 3, v % 5, v % 7);
+        mesh = shapes::with_attributes(mesh);
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const auto tree = build_tree(mesh.view(), {.clusterer = kind});
+            ASSERT_TRUE(tree);
+            const auto sound = verify(*tree);
+            EXPECT_TRUE(sound) << apart << ": " << sound.error().message;
+        }
+    }
+}
+
 // Colours and UVs that are no numbers would make luminances that are none.
 TEST(BuildTree, RefusesOrRepairsAttributesThatAreNotFinite) {
     const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 
@@ -22,6 +23,7 @@ float BorderShifts::shift(NodeId node, std::span<const Index> crossing,
     if (border_.is_empty() || !(tree_.bounds()[node].flags & irregular_ring)) return 0;
     if (!(support_[node].radius > 0)) return 0; // all of it is at one point
     thread_local Scratch scratch;
+    scratch.looks_left = most_border_looks + border_looks_an_edge * (border_of(node).size() + crossing.size());
     return turned_reach(node, crossing, distance_of_borders(node, crossing, stand_in, scratch), scratch);
 }
 
@@ -30,23 +32,38 @@ std::span<const OpenBorder::End> BorderShifts::border_of(NodeId node) const {
     return border_.at(first_leaf_[node], leaf_end_[node]);
 }
 
-// Down the tree, where the ring may be nearer than what was seen.
-void BorderShifts::look_at_border(NodeId top, BorderSide& side, std::vector<NodeId>& waiting) const {
+// Down the tree, where the ring may be nearer than what was seen. False where that was too much: then only some edges
+// have been looked at.
+bool BorderShifts::look_at_border(NodeId top, BorderSide& side, Scratch& scratch) const {
     constexpr std::size_t few = 16; // edges, which are looked at one by one
+    const auto look_at = [&](const OpenBorder::End& end) {
+        side.look_at({leaf_place(end.leaf), leaf_place(end.other)}, leaf_place(end.opposite));
+    };
+    if (scratch.looks_left == 0) {
+        const std::span<const OpenBorder::End> ends = border_of(top);
+        const std::size_t count = std::min(ends.size(), few);
+        for (std::size_t i = 0; i < count; ++i) look_at(ends[i * ends.size() / count]);
+        return false;
+    }
+    std::vector<NodeId>& waiting = scratch.waiting;
     waiting.assign(1, top);
     while (!waiting.empty()) {
         const NodeId node = waiting.back();
         waiting.pop_back();
         const std::span<const OpenBorder::End> ends = border_of(node);
-        if (ends.size() <= few || node >= interior_) {
-            for (const auto& [leaf, other, opposite] : ends)
-                side.look_at({leaf_place(leaf), leaf_place(other)}, leaf_place(opposite));
+        const bool is_last = ends.size() <= few || node >= interior_;
+        const std::size_t looks = is_last ? ends.size() + 1 : 1;
+        scratch.looks_left -= std::min(scratch.looks_left, looks);
+        if (is_last) {
+            for (const OpenBorder::End& end : ends) look_at(end);
             continue;
         }
+        if (scratch.looks_left == 0) return look_at_border(top, side, scratch);
         const Sphere& ring = tree_.bounds()[node].ring;
         if (side.may_be_nearer(ring.centre, ring.radius))
             tree_.for_each_child(node, [&](NodeId child) { waiting.push_back(child); });
     }
+    return true;
 }
 
 float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> crossing,
@@ -77,10 +94,10 @@ float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> cros
         if (folded->empty()) folded->push_back({proxy, proxy}); // a border of the support alone shrinks to the proxy
         largest = std::max(largest, farthest_from(*folded, scratch.points));
     }
-    // The other way round: the proxy, and points between it and the neighbours.
+    // The other way round: the proxy, and points between it and the neighbours. Some edges alone are never too near.
     const auto look_from = [&](const glm::vec3& p) {
         BorderSide side(p);
-        look_at_border(node, side, scratch.waiting);
+        look_at_border(node, side, scratch);
         largest = std::max(largest, side.distance());
     };
     look_from(proxy);
@@ -132,7 +149,8 @@ float BorderShifts::reach_of(NodeId a, NodeId b, NodeId c, Scratch& scratch) con
     float reach = 0;
     for (const glm::vec3& at : {(p + q) * 0.5f, (q + r) * 0.5f, (r + p) * 0.5f, (p + q + r) / 3.0f}) {
         BorderSide side(at);
-        for (const NodeId node : {a, b, c}) look_at_border(node, side, scratch.waiting);
+        for (const NodeId node : {a, b, c})
+            if (!look_at_border(node, side, scratch)) return std::numeric_limits<float>::infinity();
         reach = std::max(reach, side.outside());
     }
     return reach;

@@ -21,7 +21,8 @@ public:
     // neighbour folded, and with those that `stand_in` gives for leaves outside of the support. And how far triangles
     // that turn over reach beyond the border, in any state of the neighbours that are no larger than the node.
     // `crossing`: triangles with a corner in the support, among them all with one outside. 0 where the node is nowhere
-    // near a border. Threads may ask at once. Cost: some products for each edge of the border below the node.
+    // near a border. Threads may ask at once. Cost: some products for each edge of the border below the node, as long as
+    // the mesh's parts do not lie through each other; at most some hundreds, after which the answer errs upwards.
     float shift(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
                 const FunctionRef<vdtree::NodeId(vdtree::Index leaf)>& stand_in) const;
 
@@ -30,6 +31,7 @@ private:
         std::vector<Segment> folded, folded_alone; // with neighbours, and without
         std::vector<glm::vec3> points;
         std::vector<vdtree::NodeId> waiting, second, third;
+        std::size_t looks_left = 0; // at nodes and edges of the mesh's own border
     };
 
     bool supports(vdtree::NodeId node, vdtree::Index leaf) const {
@@ -41,13 +43,14 @@ private:
     const glm::vec3& place(vdtree::NodeId node) const { return positions_[node]; }
     const glm::vec3& leaf_place(vdtree::Index leaf) const { return positions_[interior_ + leaf]; }
     std::span<const OpenBorder::End> border_of(vdtree::NodeId node) const;
-    void look_at_border(vdtree::NodeId top, BorderSide& side, std::vector<vdtree::NodeId>& waiting) const;
+    bool look_at_border(vdtree::NodeId top, BorderSide& side, Scratch& scratch) const;
     float distance_of_borders(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
                               const FunctionRef<vdtree::NodeId(vdtree::Index)>& stand_in, Scratch& scratch) const;
     void find_stand_ins(vdtree::Index leaf, vdtree::NodeId node, vdtree::Index without,
                         std::vector<vdtree::NodeId>& nodes) const;
     float turned_reach(vdtree::NodeId node, std::span<const vdtree::Index> crossing, float least,
                        Scratch& scratch) const;
+    // Infinite where there is too much to be looked at.
     float reach_of(vdtree::NodeId a, vdtree::NodeId b, vdtree::NodeId c, Scratch& scratch) const;
 
     const vdtree::SoundTree& tree_;

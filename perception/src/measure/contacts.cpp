@@ -139,8 +139,8 @@ public:
         }
     }
 
-    std::vector<Contact> run() const {
-        const std::vector<Contact> contacts = by_triangle();
+    std::vector<Contact> run(MeasuringProgress& progress) const {
+        const std::vector<Contact> contacts = by_triangle(progress);
         std::vector<Contact> all(interior_);
         const std::span<const NodeId> parents = tree_.parents();
         for (Index t = 0; t < contacts.size(); ++t)
@@ -151,13 +151,16 @@ public:
     }
 
 private:
-    std::vector<Contact> by_triangle() const {
+    std::vector<Contact> by_triangle(MeasuringProgress& progress) const {
         std::vector<Contact> contacts(triangles_.size());
         tbb::parallel_for(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
                           [&](const auto& part) {
                               Scratch scratch;
-                              for (Index t = part.begin(); t < part.end(); t += at_once)
-                                  find(t, std::min(t + at_once, part.end()), contacts, scratch);
+                              for (Index t = part.begin(); t < part.end() && !progress.is_cancelled(); t += at_once) {
+                                  const Index end = std::min(t + at_once, part.end());
+                                  find(t, end, contacts, scratch);
+                                  progress.add(end - t);
+                              }
                           });
         return contacts;
     }
@@ -308,6 +311,14 @@ private:
 
 } // namespace
 
-std::vector<Contact> find_contacts(std::span<const SoundTree> trees) { return ContactFinder(trees).run(); }
+std::vector<Contact> find_contacts(std::span<const SoundTree> trees, MeasuringProgress& progress) {
+    return ContactFinder(trees).run(progress);
+}
+
+std::vector<Contact> find_contacts(std::span<const SoundTree> trees) {
+    const Progress nobody;
+    MeasuringProgress progress(nobody);
+    return find_contacts(trees, progress);
+}
 
 } // namespace unseen::perception

@@ -8,6 +8,8 @@
 
 #include <vdtree/vertex_tree.h>
 
+#include "measure/measuring_progress.h"
+
 namespace unseen::perception {
 
 // Of triangles that are near to others which are no neighbours of theirs or of their neighbours, over or under them and
@@ -25,6 +27,8 @@ struct Contact {
 // By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a
 // triangle.
 // `trees`: one at least, the same but for their luminances; what looks alike does so in all of them.
+// Adds the triangles to what is done; where that says to stop, the answer is of no use.
+std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees, MeasuringProgress& progress);
 std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees);
 
 } // namespace unseen::perception

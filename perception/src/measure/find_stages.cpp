@@ -352,9 +352,10 @@ FoldStage contrasts(const Bands& mesh, const Bands& difference) {
 class StageFinder {
 public:
     StageFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
-                std::span<FoldError> errors)
-        : tree_(tree), light_(light), textures_(textures), errors_(errors), interior_(tree.interior_count()),
-          parents_(tree.parents()), triangles_(tree.triangles().begin(), tree.triangles().end()) {
+                std::span<FoldError> errors, MeasuringProgress& progress)
+        : tree_(tree), light_(light), textures_(textures), errors_(errors), progress_(progress),
+          interior_(tree.interior_count()), parents_(tree.parents()),
+          triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (NodeId& corner : t) corner += interior_;
         for (std::size_t i = 0; i < direction_count; ++i) cameras_.push_back(camera(tree.bounding_sphere(), i));
@@ -362,6 +363,9 @@ public:
 
     std::vector<FoldStage> run() {
         const std::size_t count = order();
+        // Each stage leaves about so many triangles of the one before.
+        const double fewer = std::exp2(-1 / stages_per_halving);
+        progress_.begin(1, direction_count * (1 - std::pow(fewer, count + 1)) / (1 - fewer));
         std::vector<std::optional<Picture>> pictures(direction_count);
         std::vector<std::optional<Bands>> bands(direction_count);
         for_each_picture([&](std::size_t i, Picture picture) {
@@ -370,7 +374,9 @@ public:
         });
         std::vector<FoldStage> stages(count);
         for (std::size_t stage = 0; stage < count; ++stage) {
+            if (progress_.is_cancelled()) return {};
             fold(stage);
+            dearness_ *= fewer;
             std::vector<FoldStage> found(direction_count);
             for_each_picture([&](std::size_t i, Picture picture) {
                 picture.subtract(*pictures[i]);
@@ -449,7 +455,9 @@ private:
     template <class F>
     void for_each_picture(F&& f) {
         tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
+            if (progress_.is_cancelled()) return;
             f(i, Painter(tree_, light_, cameras_[i], surfaces_.local()).draw(triangles_));
+            progress_.add(dearness_);
         });
     }
 
@@ -464,6 +472,8 @@ private:
     TexturedLight light_;
     std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
+    MeasuringProgress& progress_;
+    double dearness_ = 1; // of a picture, of the first ones'
     NodeId interior_;
     std::span<const NodeId> parents_;
     std::vector<Triangle> triangles_; // as folded, over nodes
@@ -477,11 +487,12 @@ private:
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 
 std::vector<FoldStage> find_stages(const SoundTree& tree, const TexturedLight& light,
-                                   std::span<const FoldTexture> textures, std::span<FoldError> errors) {
+                                   std::span<const FoldTexture> textures, std::span<FoldError> errors,
+                                   MeasuringProgress& progress) {
     const float radius = tree.bounding_sphere().radius;
     const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
     if (is_translucent || !(radius > 0) || !std::isfinite(side / (2 * radius))) return {};
-    return StageFinder(tree, light, textures, errors).run();
+    return StageFinder(tree, light, textures, errors, progress).run();
 }
 
 } // namespace unseen::perception

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cassert>
 #include <cmath>
 #include <cstring>
@@ -11,7 +10,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
@@ -34,6 +32,7 @@
 #include "measure/luminance_bias.h"
 #include "measure/measure_folds.h"
 #include "measure/measurement.h"
+#include "measure/measuring_progress.h"
 #include "measure/texture_density.h"
 #include "measure/textured_light.h"
 
@@ -278,11 +277,13 @@ class Measurer {
     using FoldPicture = FoldPictureOf<channels>;
 
 public:
-    Measurer(std::span<const SoundTree> trees, std::span<const TexturedLight> lights, std::span<MeasuredFolds> found)
+    // `contacts`: of the trees.
+    Measurer(std::span<const SoundTree> trees, std::span<const TexturedLight> lights, std::span<MeasuredFolds> found,
+             std::vector<Contact> contacts)
         : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()),
           leaf_end_(tree_.leaf_end()), parents_(tree_.parents()), first_triangle_(tree_.first_triangle()),
           triangles_(tree_.triangles()), support_(tree_.support_spheres()), interior_(tree_.interior_count()),
-          of_leaf_(tree_), border_(tree_, of_leaf_), crossing_(interior_), contacts_(find_contacts(trees)),
+          of_leaf_(tree_), border_(tree_, of_leaf_), crossing_(interior_), contacts_(std::move(contacts)),
           witnesses_(interior_), luminance_span_(interior_), most_changed_(interior_) {
         for (NodeId node = 0; node < interior_; ++node) {
             for (std::size_t i = 0; i < luminances; ++i) {
@@ -308,37 +309,31 @@ public:
         }
     }
 
-    // False where `progress` has cancelled; it is called on the calling thread only.
-    bool run(const Progress& progress) {
+    // False where it was cancelled.
+    bool run(MeasuringProgress& progress) {
         std::vector<NodeId> parts, above;
         for (NodeId node = 0; node < interior_;) {
             const bool is_part = leaf_end_[node] - first_leaf_[node] <= leaves_of_part;
             (is_part ? parts : above).push_back(node);
             node = is_part ? tree_.subtree_end()[node] : node + 1;
         }
-        const std::thread::id caller = std::this_thread::get_id();
-        std::atomic<NodeId> done = 0;
-        std::atomic<bool> is_cancelled = false;
-        const auto go_on = [&](NodeId more) {
-            const double share = static_cast<double>(done += more) / interior_;
-            if (progress && std::this_thread::get_id() == caller && !progress(share, stage)) is_cancelled = true;
-            return !is_cancelled;
-        };
+        constexpr NodeId at_once = 64; // nodes between looks at the clock
         tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
-            if (is_cancelled) return;
             const NodeId begin = parts[i], end = tree_.subtree_end()[begin];
             Scratch scratch;
-            for (NodeId node = end; node-- > begin;) measure(node, scratch);
-            go_on(end - begin);
+            for (NodeId last = end; last > begin && !progress.is_cancelled();) {
+                const NodeId first = last - std::min(last - begin, at_once);
+                for (NodeId node = last; node-- > first;) measure(node, scratch);
+                progress.add(last - first);
+                last = first;
+            }
         });
         Scratch scratch;
-        for (std::size_t i = above.size(); i-- > 0 && go_on(1);) measure(above[i], scratch);
-        return go_on(0);
+        for (std::size_t i = above.size(); i-- > 0 && progress.add(1);) measure(above[i], scratch);
+        return !progress.is_cancelled();
     }
 
 private:
-    static constexpr const char* stage = "measuring folds";
-
     struct Mean {
         Difference sum;
         int count = 0;
@@ -970,6 +965,8 @@ std::span<const float> measurement_settings() noexcept { return settings; }
 
 namespace {
 
+Error cancelled_error() { return {ErrorCode::cancelled, "Measuring what folds change was cancelled."}; }
+
 // Of trees that are the same but for their luminances, with what follows from each.
 struct Measured {
     std::vector<MeasuredFolds> found;           // by tree
@@ -981,13 +978,18 @@ struct Measured {
 
 template <std::size_t luminances, bool is_textured>
 bool measure_all(std::span<const SoundTree> trees, std::span<const TexturedLight> lights,
-                 std::span<MeasuredFolds> found, const Progress& progress) {
-    return Measurer<luminances, is_textured>(trees, lights, found).run(progress);
+                 std::span<MeasuredFolds> found, double up_to, MeasuringProgress& progress) {
+    constexpr double contacts_done = 0.2; // of it
+    progress.begin(contacts_done * up_to, static_cast<double>(trees.front().triangles().size()));
+    std::vector<Contact> contacts = find_contacts(trees, progress);
+    progress.begin(up_to, trees.front().interior_count());
+    return Measurer<luminances, is_textured>(trees, lights, found, std::move(contacts)).run(progress);
 }
 
-// `dark`: of textured trees, by tree, what their luminance is where the texture is black.
-Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads,
-                         const Progress& progress) {
+// `dark`: of textured trees, by tree, what their luminance is where the texture is black. `up_to`: the share of the
+// whole that this is.
+Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads, double up_to,
+                         MeasuringProgress& progress) {
     const bool is_textured = !trees.front().texture().empty();
     assert(trees.size() == 1 || trees.size() == 4 || (trees.size() == 3 && !is_textured));
     Measured all;
@@ -1026,7 +1028,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = measure_these(all.in_units, all.lights, all.found, progress);
+        is_whole = measure_these(all.in_units, all.lights, all.found, up_to, progress);
         if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
@@ -1036,7 +1038,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
             find_luminance_bias(all.in_units[i], all.lights[i], found.textures, all.errors[i]);
         });
     });
-    if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
+    if (!is_whole) return cancelled_error();
     for (std::size_t i = 0; i < trees.size(); ++i)
         for (NodeId node = 0; node < nodes; ++node) {
             FoldRecord& fold = all.found[i].folds[node];
@@ -1065,15 +1067,18 @@ Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measure
 } // namespace
 
 Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
+    constexpr double before_stages = 0.8;
+    MeasuringProgress told(progress);
     constexpr float dark = 0;
-    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, progress);
+    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
     if (!measured) return measured.error();
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
     tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        stages =
-            find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures, errors);
+        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
+                             errors, told);
     });
+    if (told.is_cancelled()) return cancelled_error();
     std::vector<std::uint8_t> stage_of(errors.size());
     for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
     return with_attributes(tree, std::move(measured->found.front()), std::move(stage_of), std::move(stages));
@@ -1087,7 +1092,8 @@ Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::
         if (!as_shaded) return as_shaded.error();
         shaded.push_back(std::move(*as_shaded));
     }
-    auto measured = measure(shaded, dark, threads, progress);
+    MeasuringProgress told(progress);
+    auto measured = measure(shaded, dark, threads, 1, told);
     if (!measured) return measured.error();
     return std::move(measured->found);
 }

@@ -30,6 +30,11 @@ inline constexpr int most_steps = 1024;
 inline constexpr std::size_t most_stand_ins = 16; // nodes, each above the last, that may stand for a leaf
 inline constexpr std::size_t most_border_ends =
     4096; // of edges of the mesh's own border; of more, these at equal steps
+// Looks at the own border for one node: so many, and so many for each of its edges there and each triangle around it.
+// Twice what any mesh took whose parts do not lie through each other; after them, shifts are taken as too large. Not
+// kept with a measurement: no mesh for use comes there.
+inline constexpr std::size_t most_border_looks = 1u << 16;
+inline constexpr std::size_t border_looks_an_edge = 256;
 
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells

@@ -114,6 +114,7 @@ float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3
     for (const glm::vec3& p : points) {
         float nearest = std::numeric_limits<float>::infinity();
         for (const Segment& segment : segments) {
+            if (nearest <= farthest) break; // which this point does not raise
             const glm::vec3 way = p - segment.nearest_to(p);
             nearest = std::min(nearest, glm::dot(way, way));
         }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -22,6 +23,7 @@
 #include "build/place_proxies.h"
 #include "build/surface.h"
 #include "tree/mask_pool.h"
+#include <vdtree/internal/number_format.h>
 #include <vdtree/internal/texture_bounds.h>
 #include <vdtree/internal/texture_fit.h>
 #include <vdtree/internal/vertex_tree_data.h>
@@ -35,6 +37,12 @@ constexpr double clustering_begins = 0.1, clustering_ends = 0.7;
 
 // Positions beyond this, relative to the origin, leave no room for spheres around them in floats.
 constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
+
+// Of a mesh, mesh units: floats, which end at 1.4e-45, place what is smaller more coarsely than what is larger.
+constexpr double smallest_size = 1e-36;
+
+// Places that doubles tell apart along the mesh, at least: fewer, far away from the origin, leave no surface.
+constexpr double fewest_places = 256;
 
 // Tells the caller how far the build is.
 class Reporter {
@@ -200,6 +208,33 @@ Result<void> check(const Light& light) {
     return {};
 }
 
+// What is too small for floats, and what lies so far away that doubles have rounded it to a few places. Meshes in one
+// point are as they are meant to be.
+Result<void> check_size(std::span<const glm::dvec3> positions) {
+    if (positions.empty()) return {};
+    glm::dvec3 low = positions.front(), high = low;
+    for (const glm::dvec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
+    const glm::dvec3 sides = high - low;
+    const double size = std::max({sides.x, sides.y, sides.z});
+    if (size == 0) return {};
+    const auto text = [](double value) { return rounded(value, 3); };
+    if (size < smallest_size)
+        return Error{ErrorCode::invalid_argument, "The mesh is " + text(size) + " units large, and at least " +
+                                                      text(smallest_size) +
+                                                      " are needed: scale it up, or write it in a smaller unit."};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double farthest = std::max(std::abs(low[axis]), std::abs(high[axis]));
+        const double step = std::nextafter(farthest, std::numeric_limits<double>::infinity()) - farthest;
+        const double places = sides[axis] > 0 ? fewest_places : 1; // flat walls are as exact there as anywhere
+        if (step * places > size)
+            return Error{ErrorCode::invalid_argument,
+                         "The mesh is " + text(size) + " units large and lies " + text(farthest) +
+                             " from the origin, where coordinates are " + text(step) +
+                             " apart, so that its shape is lost: move it nearer to the origin where it is made."};
+    }
+    return {};
+}
+
 // What validate() lets pass, but the tree's floats do not.
 Result<void> check_attributes(const MeshView& mesh) {
     const auto invalid = [](const char* what, std::size_t vertex) {
@@ -207,6 +242,7 @@ Result<void> check_attributes(const MeshView& mesh) {
     };
     for (std::size_t v = 0; v < mesh.positions.size(); ++v)
         if (!fits_floats(mesh.positions[v])) return invalid("The position is too far away for floats:", v);
+    if (const auto sized = check_size(mesh.positions); !sized) return sized;
     for (std::size_t v = 0; v < mesh.colours.size(); ++v) {
         const glm::vec4 c = mesh.colours[v];
         if (!std::isfinite(c.r) || !std::isfinite(c.g) || !std::isfinite(c.b) || !std::isfinite(c.a))

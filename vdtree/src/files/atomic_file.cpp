@@ -111,14 +111,21 @@ Result<AtomicFile> AtomicFile::create(const fs::path& target) {
         return Error{ErrorCode::invalid_argument,
                      "Cannot write to '" + target.string() + "': it is no regular file; give another name."};
     }
+    // Renaming would go against what others are told with it.
+    if (fs::exists(status) && ::faccessat(AT_FDCWD, target.c_str(), W_OK, AT_EACCESS) != 0)
+        return Error{ErrorCode::io_failure, "Cannot write to '" + target.string() +
+                                                "', which is there: " + std::generic_category().message(errno) +
+                                                ". Allow it, remove the file, or give another name."};
     const Result<fs::path> real_target = follow(target);
     if (!real_target) return real_target.error();
 
+    // Who may not read what is replaced, may not read it meanwhile.
+    const mode_t mode = fs::exists(status) ? 0600 : 0666;
     std::random_device random;
     for (int attempt = 0; attempt < max_name_attempts; ++attempt) {
         fs::path temporary = random_sibling(*real_target, random);
         const int place = list(temporary); // before it is there: a signal may come at any time
-        const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
         const int cause = errno;
         if (descriptor >= 0 && claim(descriptor))
             return AtomicFile(descriptor, *real_target, std::move(temporary), place);
@@ -196,7 +203,10 @@ Result<void> AtomicFile::commit() {
     };
     constexpr mode_t permissions = 0777;
     struct stat replaced {};
-    if (::stat(target_.c_str(), &replaced) == 0) ::fchmod(descriptor_, replaced.st_mode & permissions);
+    if (::stat(target_.c_str(), &replaced) == 0) {
+        [[maybe_unused]] const int kept = ::fchown(descriptor_, replaced.st_uid, replaced.st_gid); // as far as it may
+        ::fchmod(descriptor_, replaced.st_mode & permissions);
+    }
     // The data must be on the disk before the name is, or a power cut could leave the name with an empty file.
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) return failed("write");
     if (::close(std::exchange(descriptor_, -1)) != 0) return failed("write");

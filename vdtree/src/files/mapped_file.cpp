@@ -1,6 +1,11 @@
 #include "files/mapped_file.h"
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <climits>
+#include <cstdint>
 #include <cstring>
 #include <string>
 
@@ -9,12 +14,43 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <vdtree/internal/mapped_names.h>
+
 namespace unseen::vdtree {
 
 namespace {
 
 Error failure(const std::filesystem::path& file, const std::string& why) {
     return {ErrorCode::io_failure, "Cannot open " + file.string() + ": " + why + "."};
+}
+
+// What signal handlers may ask for, which may neither lock nor allocate. `end` is set last, and 0 first.
+struct NamedPages {
+    std::atomic<bool> is_used = false;
+    std::atomic<std::uintptr_t> begin = 0, end = 0;
+    std::array<char, PATH_MAX> name;
+};
+static_assert(std::atomic<std::uintptr_t>::is_always_lock_free);
+std::array<NamedPages, 32> named_pages;
+
+// Its place in the list; -1 where the list is full.
+int note(std::span<const std::byte> bytes, const std::string& name) {
+    for (std::size_t i = 0; i < named_pages.size() && name.size() < PATH_MAX; ++i) {
+        NamedPages& pages = named_pages[i];
+        if (pages.is_used.exchange(true)) continue;
+        std::copy_n(name.c_str(), name.size() + 1, pages.name.begin());
+        pages.begin = reinterpret_cast<std::uintptr_t>(bytes.data());
+        pages.end = pages.begin + bytes.size();
+        return static_cast<int>(i);
+    }
+    return -1;
+}
+
+void forget(int place) {
+    if (place < 0) return;
+    NamedPages& pages = named_pages[static_cast<std::size_t>(place)];
+    pages.end = 0;
+    pages.is_used = false;
 }
 
 class Descriptor {
@@ -45,9 +81,22 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::filesystem
     void* start = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor.get(), 0);
     if (start == MAP_FAILED) return failure(file, std::strerror(errno));
     ::madvise(start, size, MADV_RANDOM); // a hint only
-    return std::shared_ptr<const MappedFile>(new MappedFile({static_cast<const std::byte*>(start), size}));
+    return std::shared_ptr<const MappedFile>(new MappedFile({static_cast<const std::byte*>(start), size}, file));
 }
 
-MappedFile::~MappedFile() { ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size()); }
+MappedFile::MappedFile(std::span<const std::byte> bytes, const std::filesystem::path& file)
+    : bytes_(bytes), place_(note(bytes, file.native())) {}
+
+MappedFile::~MappedFile() {
+    forget(place_);
+    ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
+}
+
+const char* mapped_file_at(const void* address) noexcept {
+    const auto at = reinterpret_cast<std::uintptr_t>(address);
+    for (const NamedPages& pages : named_pages)
+        if (const std::uintptr_t end = pages.end; at < end && at >= pages.begin) return pages.name.data();
+    return nullptr;
+}
 
 } // namespace unseen::vdtree

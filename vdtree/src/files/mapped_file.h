@@ -24,8 +24,9 @@ public:
     std::span<const std::byte> bytes() const noexcept { return bytes_; }
 
 private:
-    explicit MappedFile(std::span<const std::byte> bytes) : bytes_(bytes) {}
+    MappedFile(std::span<const std::byte> bytes, const std::filesystem::path& file);
     std::span<const std::byte> bytes_;
+    int place_; // among the names that mapped_file_at() knows; -1: none
 };
 
 } // namespace unseen::vdtree

@@ -185,15 +185,20 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     parts.bottom_up([&] {
         return [&](NodeId node) {
             PackedRange support = empty_range, ring = empty_range;
+            // Of children at one point, as they are: what floats round to one point, may be several nodes deep.
+            PackedRange shortened_rings = empty_range, shortened_vertices = empty_range;
             Unorm16 adaptation;
             tree.for_each_child(
                 node,
                 [&](NodeId child) {
                     support = unite(support, out.support_range[child]);
                     ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
-                    if (is_coincident(g, child)) // its ring_range is narrower than its ring
+                    if (is_coincident(g, child)) { // its ring_range is narrower than its ring
                         for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l)
                             ring = unite(ring, leaf.ring[l]);
+                        shortened_rings = unite(shortened_rings, out.ring_range[child]);
+                        if (textured) shortened_vertices = unite(shortened_vertices, of_vertices[child]);
+                    }
                     adaptation = std::max(adaptation, out.adaptation[child]);
                 },
                 [&](Index l) {
@@ -211,6 +216,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
                 // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
                 // contrast of that is largest on the ring's darkest luminance.
                 ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
+                ring = unite(ring, textured ? shortened_vertices : shortened_rings);
             }
             out.support_range[node] = support;
             if (textured) {
@@ -218,7 +224,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
                 PackedRange texture = g.ring_texture[node];
                 if (is_coincident(g, node) && !moves_texture[node])
                     texture.lo = texture.hi; // the brightest shows the spread best
-                ring = product(ring, texture);
+                ring = unite(product(ring, texture), shortened_rings);
             }
             out.ring_range[node] = ring;
             out.adaptation[node] = std::max(adaptation, middle(ring));

@@ -16,8 +16,8 @@ namespace unseen::vdtree {
 // long as it lives, so that others know.
 class AtomicFile {
 public:
-    // Fails where the folder is missing or not writable, where the name is too long, and where the target exists but is
-    // no regular file (a folder, a device): renaming would replace it.
+    // Fails where the folder is missing or not writable, where the name is too long, and where the target exists but may
+    // not be written to, or is no regular file (a folder, a device): renaming would replace it.
     static Result<AtomicFile> create(const std::filesystem::path& target);
 
     // Removes temporaries in the folder of the target whose writers are no more. As far as it may; nothing is reported.

@@ -1,0 +1,43 @@
+// What ends a program while it works.
+#include "interruption.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <vdtree/builder.h>
+#include <vdtree/internal/atomic_file.h>
+#include <vdtree/tree_io.h>
+
+#include "shapes.h"
+#include "temp_folder.h"
+
+namespace {
+
+using namespace unseen;
+
+// Pages of a tree that is read in place, after another program has cut its file.
+void read_what_was_cut(const std::filesystem::path& file, const std::filesystem::path& output) {
+    const auto tree = vdtree::map_tree(file);
+    auto out = vdtree::AtomicFile::create(output);
+    if (!tree || !out) std::exit(7);
+    app::clean_up_on_signals();
+    std::filesystem::resize_file(file, 0);
+    float sum = 0;
+    for (const glm::vec3& p : tree->positions()) sum += p.x;
+    std::exit(sum == sum ? 8 : 9);
+}
+
+TEST(LostPagesDeathTest, AreSaidAndLeaveNothingBehind) {
+    const support::TempFolder folder;
+    const auto tree = vdtree::build_tree(shapes::bumpy_sphere(4).view());
+    ASSERT_TRUE(tree);
+    const std::filesystem::path file = folder / "gr\x1b.vdt";
+    ASSERT_TRUE(vdtree::write_tree(file, *tree));
+    GTEST_FLAG_SET(death_test_style, "threadsafe");
+    EXPECT_EXIT(read_what_was_cut(file, folder / "out.ply"), testing::ExitedWithCode(1),
+                "unseen: '.*/gr\\..vdt' was cut short while it was read: write it anew");
+    EXPECT_EQ(folder.file_count(), 1u) << "not even what was being written";
+}
+
+} // namespace
