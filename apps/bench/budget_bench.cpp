@@ -10,10 +10,10 @@
 #include <perception/criterion.h>
 #include <perception/judge.h>
 #include <render/renderer.h>
+#include <session_gpu/frame_image.h>
 #include <vdtree/cut.h>
 
 #include "drawing.h"
-#include "frame_image.h"
 #include "model_file.h"
 #include "terminal.h"
 
@@ -55,7 +55,7 @@ public:
         full.unfold_all();
         const auto frame = renderer_.draw(full, view_, draw_options_);
         if (!frame) return frame.error();
-        reference_ = luminance_image(*frame, display_);
+        reference_ = session::luminance_image(*frame, display_);
         auto marked = mark_contour(full);
         if (!marked) return marked.error();
         near_contour_ = std::move(*marked);
@@ -76,7 +76,7 @@ public:
         if (!frame) return frame.error();
         perception::JudgeOptions judge;
         judge.display = display_;
-        const auto judgement = perception::judge_modern(reference_, luminance_image(*frame, display_), judge);
+        const auto judgement = perception::judge_modern(reference_, session::luminance_image(*frame, display_), judge);
         if (!judgement) return judgement.error();
         render::DrawOptions wired = draw_options_;
         wired.wireframe = true;
@@ -84,7 +84,7 @@ public:
         if (!wireframe) return wireframe.error();
         return Spent{{std::move(name), stats.triangles, judgement->visible_pixels, judgement->max_ratio,
                       100 * contour_share(cut)},
-                     code_image(*wireframe, display_)};
+                     session::code_image(*wireframe, display_)};
     }
 
     const vdtree::View& view() const { return view_; }

@@ -2,9 +2,8 @@
 
 #include <cmath>
 
+#include <session_gpu/frame_image.h>
 #include <session_gpu/gpu_judge.h>
-
-#include "frame_image.h"
 
 namespace unseen::app {
 namespace {
@@ -119,7 +118,8 @@ Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const vdtree::Cut& 
     const auto frame = stand.renderer->draw(cut, view_, options);
     if (!frame) return frame.error();
     const perception::Display& display = stand.session->observer().display;
-    return Picture{cut.triangle_count(), luminance_image(*frame, display), code_image(*frame, display)};
+    return Picture{cut.triangle_count(), session::luminance_image(*frame, display),
+                   session::code_image(*frame, display)};
 }
 
 Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what, bool wireframe) {

@@ -10,12 +10,12 @@
 #include <perception/judge.h>
 #include <session/session.h>
 #include <session_gpu/as_seen.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/level_control.h>
 #include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
-#include "frame_image.h"
 #include "made_scenes.h"
 #include "terminal.h"
 
@@ -151,7 +151,7 @@ private:
         drawing.background = session_->background();
         const auto frame = renderer_->draw(session::drawn_cuts(cuts), view_, drawing);
         if (!frame) return frame.error();
-        return luminance_image(*frame, session_->observer().display);
+        return session::luminance_image(*frame, session_->observer().display);
     }
 
     const render::Context& context_;

@@ -5,11 +5,11 @@
 #include <functional>
 
 #include <render/renderer.h>
+#include <session_gpu/frame_image.h>
 #include <vdtree/internal/number_format.h>
 
 #include "drawing.h"
 #include "fold_map.h"
-#include "frame_image.h"
 
 namespace unseen::app {
 namespace {
@@ -85,7 +85,7 @@ private:
         const auto whole = draw(cut, view_, options);
         if (!whole) return whole.error();
         column.cut.draw_ms = whole->draw_ms;
-        column.luminance = luminance_image(*whole, session_.observer().display);
+        column.luminance = session::luminance_image(*whole, session_.observer().display);
         if (o_.has_cuts) {
             const vdtree::View small = small_view(view_, o_.cell_px.value_or(usual_cell_px));
             if (auto ok = draw_twice(column.pictures, cut, small, options); !ok) return ok;
@@ -107,7 +107,7 @@ private:
             options.wireframe = has_edges;
             const auto frame = draw(cut, small, options);
             if (!frame) return frame.error();
-            pictures.push_back(code_image(*frame, session_.observer().display));
+            pictures.push_back(session::code_image(*frame, session_.observer().display));
         }
         return {};
     }

@@ -4,8 +4,7 @@
 #include <cmath>
 
 #include <glm/geometric.hpp>
-
-#include "frame_image.h"
+#include <session_gpu/frame_image.h>
 
 namespace unseen::app {
 namespace {
@@ -104,7 +103,7 @@ Result<perception::Image> FlightChanges::draw_cut(const session::Follower& follo
     auto frame = follower.geomorph() ? renderers_.cut.draw(*follower.geomorph(), view, options, placement)
                                      : renderers_.cut.draw(follower.cut(), view, options, placement);
     if (!frame) return frame.error();
-    return luminance_image(*frame, session_.observer().display);
+    return session::luminance_image(*frame, session_.observer().display);
 }
 
 Result<void> FlightChanges::before(const session::Follower& flight, const session::Request& request,
@@ -123,7 +122,8 @@ Result<FrameChange> FlightChanges::after(const session::Follower& flight, const 
     const perception::Display& display = session_.observer().display;
     const auto drawn = renderers_.full.draw(full_cut_, view, options, session_.scene().objects.front().placement);
     if (!drawn) return drawn.error();
-    const perception::Image full = luminance_image(*drawn, display), now = luminance_image(frame, display);
+    const perception::Image full = session::luminance_image(*drawn, display),
+                            now = session::luminance_image(frame, display);
     const perception::JudgeOptions judging = session::judge_options(session_.observer());
     const auto judge = perception::Judge::create(full, judging);
     if (!judge) return judge.error();

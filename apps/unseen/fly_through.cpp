@@ -10,6 +10,7 @@
 #include <panel_plot.h>
 #include <perception/image.h>
 #include <session/follower.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
 #include <vdtree/internal/atomic_file.h>
@@ -17,7 +18,6 @@
 #include "camera_path.h"
 #include "cut_report.h"
 #include "flight_changes.h"
-#include "frame_image.h"
 #include "interruption.h"
 #include "numbered_pictures.h"
 #include "output_files.h"
@@ -277,7 +277,7 @@ public:
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
             if (!pictures.are_wanted()) continue;
-            if (auto written = pictures.write_next(code_image(*frame, display())); !written) return written;
+            if (auto written = pictures.write_next(session::code_image(*frame, display())); !written) return written;
         }
         return {};
     }

@@ -11,10 +11,10 @@
 
 #include <perception/image.h>
 #include <render/target.h>
+#include <session_gpu/frame_image.h>
 
 #include "camera_path.h"
 #include "colour_bar.h"
-#include "frame_image.h"
 #include "interruption.h"
 #include "numbered_pictures.h"
 #include "output_files.h"
@@ -137,7 +137,7 @@ Result<Image> picture_of(LevelControl& control, const perception::Display& displ
     const auto coded = [&](const render::Target& target) -> Result<Image> {
         const auto frame = frame_of(target);
         if (!frame) return frame.error();
-        return code_image(*frame, display);
+        return session::code_image(*frame, display);
     };
     if (!show) return coded(control.picture());
     if (*show == LevelPicture::levels) {
@@ -399,7 +399,7 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
         } else {
             const auto frame = frame_of(control->picture());
             if (!frame) return frame.error();
-            picture = luminance_image(*frame, shown_on);
+            picture = session::luminance_image(*frame, shown_on);
         }
         if (!picture) return picture.error();
         if (auto ok = perception::write_image(options.out, *picture); !ok) return ok;

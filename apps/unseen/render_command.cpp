@@ -4,12 +4,12 @@
 
 #include <perception/image.h>
 #include <render/renderer.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/scene_renderer.h>
 
 #include "cut_report.h"
 #include "fly_through.h"
 #include "fold_map.h"
-#include "frame_image.h"
 #include "level_flight.h"
 #include "numbered_pictures.h"
 #include "output_files.h"
@@ -117,7 +117,8 @@ Result<int> run(RenderArguments& a) {
     if (!frame) return frame.error();
 
     const perception::Display& display = session->observer().display;
-    perception::Image image = is_for_people(a.out) ? code_image(*frame, display) : luminance_image(*frame, display);
+    perception::Image image =
+        is_for_people(a.out) ? session::code_image(*frame, display) : session::luminance_image(*frame, display);
     if (a.show.map) {
         auto drawn = draw_fold_map(result->cuts.front(), *session, view, request, *a.show.map, view);
         if (!drawn) return drawn.error();

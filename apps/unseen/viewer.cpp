@@ -15,10 +15,10 @@
 #include <glm/trigonometric.hpp>
 
 #include <perception/image.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/moving_occlusion.h>
 #include <session_gpu/scene_renderer.h>
 
-#include "frame_image.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "viewer_overlay.h"
@@ -379,7 +379,7 @@ private:
         if (const auto result = follower_.follow(view_, request_); !result) return result.error();
         const auto frame = renderer_.draw(cuts(), view_, draw_);
         if (!frame) return frame.error();
-        return perception::write_image(file, code_image(*frame, display()));
+        return perception::write_image(file, session::code_image(*frame, display()));
     }
 
     // With text and rings, as the window shows it.

@@ -12,16 +12,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using unseen::perception::read_image;
 
-class RenderCommandTest : public CommandTest {
+class RenderCommandTest : public DrawingCommandTest {
 protected:
-    void SetUp() override {
-        CommandTest::SetUp();
-        build_ball();
-        const Outcome probe = run({"render", "ball.vdt", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
-        fs::remove(path("probe.png"));
-        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
-        ASSERT_EQ(probe.status, 0) << probe.err;
-    }
     Json render(std::vector<std::string> more, const std::string& out) const {
         std::vector<std::string> words = {"render", "ball.vdt", "-o", out, "--size", "200x160", "--json", "-"};
         words.insert(words.end(), more.begin(), more.end());

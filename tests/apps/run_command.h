@@ -238,4 +238,17 @@ inline Json effect_named(const Json& report, const std::string& name) {
     return {};
 }
 
+// Of verbs that draw, with a tree of a ball; passed over where there is no OpenGL.
+class DrawingCommandTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        build_ball();
+        const Outcome probe = run({"render", "ball.vdt", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
+        fs::remove(path("probe.png"));
+        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
+        ASSERT_EQ(probe.status, 0) << probe.err;
+    }
+};
+
 } // namespace unseen::app::testing

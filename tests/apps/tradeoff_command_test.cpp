@@ -8,16 +8,8 @@ namespace {
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
 
-class TradeoffCommandTest : public CommandTest {
+class TradeoffCommandTest : public DrawingCommandTest {
 protected:
-    void SetUp() override {
-        CommandTest::SetUp();
-        build_ball();
-        const Outcome probe = run({"render", "ball.vdt", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
-        fs::remove(path("probe.png"));
-        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
-        ASSERT_EQ(probe.status, 0) << probe.err;
-    }
     Json tradeoff(const std::vector<std::string>& more = {}) const {
         std::vector<std::string> words = {"tradeoff",  "ball.vdt", "--size", "200x160",
                                           "--samples", "16",       "--json", "-"};

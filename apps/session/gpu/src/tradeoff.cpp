@@ -11,9 +11,12 @@
 
 #include <perception/judge.h>
 #include <session_gpu/as_seen.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/scene_renderer.h>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_format.h>
+
+#include "median.h"
 
 namespace unseen::session {
 namespace {
@@ -26,13 +29,6 @@ double ms_since(Clock::time_point start) {
 constexpr int timed_frames = 9;         // followed, and drawn
 constexpr double degrees_a_frame = 0.1; // around the scene's centre
 constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
-
-double median(std::vector<double> values) {
-    if (values.empty()) return undefined;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 struct Way {
     std::string name;
@@ -141,13 +137,8 @@ private:
 
     Result<void> judge(const render::Frame& frame, TradeoffPoint& point) {
         const perception::Display& display = session_.observer().display;
-        perception::Image luminance{frame.width, frame.height, 1, {}}, codes{frame.width, frame.height, 3, {}};
-        for (const float relative : frame.luminance)
-            luminance.values.push_back(
-                static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
-        for (const float linear : frame.colour)
-            codes.values.push_back(
-                static_cast<float>(std::clamp(perception::encode(display, static_cast<double>(linear)), 0.0, 1.0)));
+        const perception::Image luminance = luminance_image(frame, display);
+        perception::Image codes = code_image(frame, display);
         if (!judge_) {
             auto judge = perception::Judge::create(luminance, judge_options(session_.observer()));
             if (!judge) return judge.error();

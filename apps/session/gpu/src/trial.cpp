@@ -2,17 +2,9 @@
 
 #include <algorithm>
 
+#include "median.h"
+
 namespace unseen::session {
-namespace {
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-} // namespace
-
 void Trial::begin(bool tries) {
     is_trying_ = tries;
     tries_ += tries;

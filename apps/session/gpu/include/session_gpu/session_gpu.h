@@ -6,6 +6,7 @@
 #pragma once
 
 #include <session_gpu/as_seen.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/gpu_judge.h>
 #include <session_gpu/level_control.h>
 #include <session_gpu/moving_occlusion.h>

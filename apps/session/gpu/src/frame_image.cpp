@@ -1,8 +1,8 @@
-#include "frame_image.h"
+#include <session_gpu/frame_image.h>
 
 #include <algorithm>
 
-namespace unseen::app {
+namespace unseen::session {
 
 perception::Image code_image(const render::Frame& frame, const perception::Display& display) {
     perception::Image image{frame.width, frame.height, 3, {}};
@@ -23,4 +23,4 @@ perception::Image luminance_image(const render::Frame& frame, const perception::
     return image;
 }
 
-} // namespace unseen::app
+} // namespace unseen::session

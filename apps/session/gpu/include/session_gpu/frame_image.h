@@ -5,11 +5,11 @@
 #include <perception/image.h>
 #include <render/renderer.h>
 
-namespace unseen::app {
+namespace unseen::session {
 
 // Colour encoded for the display, in code values.
 perception::Image code_image(const render::Frame& frame, const perception::Display& display);
 // Luminance as the display shows it, in cd/m2.
 perception::Image luminance_image(const render::Frame& frame, const perception::Display& display);
 
-} // namespace unseen::app
+} // namespace unseen::session
