@@ -74,7 +74,7 @@ std::string to_csv(const session::Tradeoff& tradeoff) {
     return text;
 }
 
-void print(const session::Tradeoff& tradeoff, const session::Session& session) {
+void print(const session::Tradeoff& tradeoff, const session::Session& session, int wanted_samples) {
     std::vector<const session::TradeoffPoint*> sorted;
     for (const session::TradeoffPoint& p : tradeoff.points) sorted.push_back(&p);
     std::ranges::stable_sort(sorted, std::greater<>(), [](const auto* p) { return p->triangles; });
@@ -95,6 +95,10 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session) {
                (tradeoff.measuring_s > 0.5 ? ", after " + duration(1e3 * tradeoff.measuring_s) +
                                                  " that measured what folds change, once for this model."
                                            : std::string(".")));
+    if (tradeoff.samples < wanted_samples)
+        print_line("judged with " + std::to_string(tradeoff.samples) + " samples a pixel in place of " +
+                   std::to_string(wanted_samples) +
+                   ", to keep to the time: V is larger for that. --seconds gives more.");
     for (const std::string& name : tradeoff.left_out) print_note("left out: " + name);
     const auto best = std::ranges::find_if(tradeoff.points, &session::TradeoffPoint::is_recommended);
     print_line("recommended for this view, observer and machine: " + options_of(*best));
@@ -129,6 +133,7 @@ Result<int> run(TradeoffArguments& a) {
     Json points = Json::array();
     for (const session::TradeoffPoint& point : tradeoff->points) points.push_back(to_json(point));
     if (auto ok = report->prepare({{"source_triangles", session->triangle_count()},
+                                   {"samples", tradeoff->samples},
                                    {"measuring_s", tradeoff->measuring_s},
                                    {"points", std::move(points)},
                                    {"left_out", tradeoff->left_out}});
@@ -141,7 +146,7 @@ Result<int> run(TradeoffArguments& a) {
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_scene(*session);
-    print(*tradeoff, *session);
+    print(*tradeoff, *session, a.options.samples);
     print_written({a.csv, a.json});
     return exit_done;
 }

@@ -97,6 +97,23 @@ public:
         return Measurement(session, context, view, options, std::move(*renderer));
     }
 
+    // As many as keep so many pictures to half of the time.
+    Result<int> choose_samples(std::size_t pictures) {
+        const auto whole = session_.simplify(view_, {.goal = Goal::full(), .purpose = Purpose::picture});
+        if (!whole) return whole.error();
+        constexpr int tried = 4;
+        std::optional<double> sample_ms; // of the second picture: the first one compiles and uploads
+        for (int i = 0; i < 2; ++i) {
+            const auto frame = draw(whole->cuts, tried);
+            if (!frame) return frame.error();
+            sample_ms = frame->draw_ms / tried;
+        }
+        const double allowed_ms = 1e3 * options_.seconds / 2 / static_cast<double>(pictures);
+        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(*sample_ms, 1e-3)),
+                              std::min(least_judged_samples, options_.samples), options_.samples);
+        return samples_;
+    }
+
     // The full model comes first: the others are judged against it.
     Result<TradeoffPoint> measure(const Way& way) {
         TradeoffPoint point{.name = way.name, .request = way.request, .is_of_view = way.is_of_view};
@@ -107,7 +124,7 @@ public:
         point.make_ms = ms_since(start);
         point.triangles = made->stats.triangles;
         point.shift = largest_shift(session_, made->cuts);
-        auto frame = draw(made->cuts, options_.samples);
+        auto frame = draw(made->cuts, samples_);
         if (!frame) return frame.error();
         if (const auto judged = judge(*frame, point); !judged) return judged.error();
         std::vector<double> drawn;
@@ -177,6 +194,7 @@ private:
     const vdtree::View& view_;
     const TradeoffOptions& options_;
     SceneRenderer renderer_;
+    int samples_ = 1;
     std::optional<perception::Judge> judge_ = {}, second_ = {}; // of the full model
     perception::Image codes_ = {};
 };
@@ -222,6 +240,9 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     if (!measurement) return measurement.error();
     const auto begin = Clock::now();
     const std::vector<Way> all = ways(session);
+    const auto samples = measurement->choose_samples(all.size());
+    if (!samples) return samples.error();
+    result.samples = *samples;
     for (std::size_t i = 0; i < all.size(); ++i) {
         if (options.progress) options.progress(static_cast<double>(i) / static_cast<double>(all.size()));
         if (!result.points.empty() && ms_since(begin) > 1e3 * options.seconds) {

@@ -12,9 +12,13 @@
 
 namespace unseen::session {
 
+inline constexpr int least_judged_samples = 8;
+
 struct TradeoffOptions {
     double seconds = 45; // of wall-clock time for all points, about; those that do not fit are left out. Above 0
-    int samples = 64;    // of the pictures that are judged, 1 to 256; fewer show steps of samples
+    // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but least_judged_samples or
+    // more. Fewer show steps of samples, so V is larger than it is of a finer picture.
+    int samples = 64;
     std::function<void(double)> progress = {}; // hears what share of the points is done
 };
 
@@ -40,6 +44,7 @@ struct TradeoffPoint {
 struct Tradeoff {
     std::vector<TradeoffPoint> points;      // the full model first
     std::vector<std::string> left_out = {}; // names of points there was no time for
+    int samples = 0;                        // of the pictures that were judged
     double measuring_s = 0;                 // of the errors of folds, before all points; next to 0 where they are kept
 };
 
