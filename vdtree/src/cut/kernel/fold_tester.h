@@ -93,9 +93,7 @@ public:
 private:
     using Lanes = std::span<const FoldCandidate* const>; // of one batch, at most sixteen
 
-    bool is_hidden(NodeId node) const noexcept {
-        return hidden_ && ((*hidden_)[node / 64] >> (node % 64) & 1) != 0;
-    }
+    bool is_hidden(NodeId node) const noexcept { return hidden_ && ((*hidden_)[node / 64] >> (node % 64) & 1) != 0; }
     void fold_hidden(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
 
     template <class F>
@@ -108,7 +106,7 @@ private:
     CostTables cost_tables() const;
 
     const DistanceCriterion& criterion_;
-    NodeArrays arrays_;                  // of the tree and the criterion
+    NodeArrays arrays_; // of the tree and the criterion
     // Of the criterion; infinite where the fold is seen from everywhere. The last row is that of hidden nodes.
     std::vector<float> switch_distance_;
     FoldClass hidden_rows_;
