@@ -2,9 +2,11 @@
 //
 // A depth picture tells what one eye does not see. As the eye moves, gaps open where a near surface ends in front of a far
 // one, and what was behind them appears. So gaps count as holes: two neighbouring pixels belong to one surface only where
-// no eye within reach sees them more than a part of a pixel apart. A place is hidden from all of these eyes where the
-// picture, for as far around it as the surface's image may move, is of one surface without holes, and that is nearer: any
-// line from such an eye to the place goes through it, for it begins in front of the surface and ends behind it.
+// no eye within reach sees them more than a part of a pixel apart.
+//
+// As the eye moves, a surface's image moves by so many pixels at most. A place is hidden from all of these eyes where the
+// picture shows one surface for that far around it, without holes and nearer than the place. Any line from such an eye to
+// the place begins in front of that surface and ends behind it. So it goes through the surface.
 #pragma once
 
 #include <cstdint>
