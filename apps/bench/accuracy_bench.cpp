@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
+#include <functional>
 #include <optional>
 #include <random>
-#include <set>
 #include <utility>
 
 #include <perception/csf.h>
@@ -34,8 +33,6 @@ const std::vector<AccuracyAxis> all_axes = {
      "How a cut is kept at what a moving eye asks for."},
     {stale_axis, "pictures a frame", "triangles kept, of those without occlusion",
      "How long one picture of depth serves a moving eye: what it may not hide for that."}};
-
-double milliseconds_since(BenchClock::time_point start) { return 1e3 * seconds_since(start); }
 
 // ---- fold decisions
 
@@ -195,7 +192,7 @@ Result<std::vector<AccuracyPoint>> cut_points(session::Session& session, const v
             const auto start = BenchClock::now();
             const auto made = follower.follow(now, request);
             if (!made) return made.error();
-            if (i > 1) times.push_back(1e3 * milliseconds_since(start));
+            if (i > 1) times.push_back(1e6 * seconds_since(start));
             const auto truth = session.simplify(now, exact);
             if (!truth) return truth.error();
             const double all = std::max<double>(1, truth->stats.triangles);

@@ -128,11 +128,14 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
             pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
             impl_->add(&used);
         }
-        const auto near = near_plane(items, view);
-        if (!near) return near.error();
-        impl_->drawn_depth =
-            DrawnDepth{sample.depth.id(),      width(), height(), used.left, used.top, used.left + used.width,
-                       used.top + used.height, *near};
+        impl_->drawn_depth = DrawnDepth{sample.depth.id(),
+                                        width(),
+                                        height(),
+                                        used.left,
+                                        used.top,
+                                        used.left + used.width,
+                                        used.top + used.height,
+                                        pass->near_plane().value_or(1)};
         return {};
     });
 }

@@ -14,6 +14,7 @@
 #include <perception/judge.h>
 #include <perception/judge_tables.h>
 #include <perception/masking.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/gpu_judge.h>
 #include <session_gpu/scene_renderer.h>
 
@@ -348,10 +349,7 @@ protected:
         const session::DrawnCut drawn[] = {{&cut}};
         const auto frame = renderer->draw(drawn, view(), options);
         EXPECT_TRUE(frame) << frame.error().message;
-        Image image{frame->width, frame->height, 1, frame->luminance};
-        for (float& v : image.values)
-            v = static_cast<float>(perception::to_luminance({}, static_cast<double>(v)).value());
-        return image;
+        return luminance_image(*frame, {});
     }
     struct Kept {
         double triangles, v;

@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <perception/judge.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/trial.h>
 
 #include "built.h"
@@ -123,10 +124,7 @@ protected:
         const DrawnCut drawn[] = {{&cut}};
         const auto frame = renderer->draw(drawn, view, options);
         EXPECT_TRUE(frame) << frame.error().message;
-        Image image{frame->width, frame->height, 1, frame->luminance};
-        for (float& v : image.values)
-            v = static_cast<float>(perception::to_luminance({}, static_cast<double>(v)).value());
-        return image;
+        return luminance_image(*frame, {});
     }
     struct Flight {
         std::vector<vdtree::Index> triangles;

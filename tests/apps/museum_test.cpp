@@ -1,6 +1,7 @@
 // What bars mask: a statue in a museum, behind a gate of bars or in the shadow of bars in a window. Levels by the pipeline
 // of Drettakis and others (their figure 1), and cuts of the vertex tree.
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include <make_scene.h>
 #include <perception/judge.h>
 #include <session_gpu/as_seen.h>
+#include <session_gpu/frame_image.h>
 #include <session_gpu/level_control.h>
 #include <session_gpu/scene_renderer.h>
 
@@ -60,6 +62,19 @@ protected:
         return settled->levels[0];
     }
 
+    // Behind a bar a metre the statue has the level that it has behind none, and behind finer ones no better than before.
+    // Returns that of the finest.
+    int falling_level(MuseumBars bars, std::initializer_list<double> finer) {
+        int before = level(bars, 1);
+        EXPECT_EQ(before, level(MuseumBars::none));
+        for (const double bars_per_metre : finer) {
+            const int now = level(bars, bars_per_metre);
+            EXPECT_GE(now, before) << bars_per_metre;
+            before = now;
+        }
+        return before;
+    }
+
     perception::Image picture(Museum& in, const std::vector<vdtree::Cut>& cuts) {
         auto renderer = SceneRenderer::create(context(), in.session);
         render::DrawOptions options;
@@ -68,11 +83,7 @@ protected:
         const auto frame = renderer->draw(drawn_cuts(cuts), in.view, options);
         EXPECT_TRUE(frame) << frame.error().message;
         EXPECT_TRUE(renderer->shadows()) << "the sun casts some";
-        perception::Image image{frame->width, frame->height, 1, frame->luminance};
-        for (float& v : image.values)
-            v = static_cast<float>(
-                perception::to_luminance(in.session.observer().display, static_cast<double>(v)).value());
-        return image;
+        return luminance_image(*frame, in.session.observer().display);
     }
 
     // Triangles of the statue's cut for a picture, of which nobody sees anything.
@@ -97,27 +108,11 @@ protected:
 };
 
 TEST_F(MuseumTest, TheFinerTheBarsBeforeTheStatueTheCoarserItsLevel) {
-    const int without = level(MuseumBars::none);
-    int before = level(MuseumBars::gate, 1);
-    EXPECT_EQ(before, without);
-    for (const double bars_per_metre : {12.0, 32.0}) {
-        const int now = level(MuseumBars::gate, bars_per_metre);
-        EXPECT_GE(now, before) << bars_per_metre;
-        before = now;
-    }
-    EXPECT_GE(before, without + 2);
+    EXPECT_GE(falling_level(MuseumBars::gate, {12, 32}), level(MuseumBars::none) + 2);
 }
 
 TEST_F(MuseumTest, TheFinerTheBarsShadowsTheCoarserTheLevel) {
-    const int without = level(MuseumBars::none);
-    int before = level(MuseumBars::window, 1);
-    EXPECT_EQ(before, without);
-    for (const double bars_per_metre : {8.0, 32.0}) {
-        const int now = level(MuseumBars::window, bars_per_metre);
-        EXPECT_GE(now, before) << bars_per_metre;
-        before = now;
-    }
-    EXPECT_GE(before, without + 1);
+    EXPECT_GE(falling_level(MuseumBars::window, {8, 32}), level(MuseumBars::none) + 1);
 }
 
 TEST_F(MuseumTest, TheLevelFallsAgainFromShadowToGate) {

@@ -102,14 +102,14 @@ public:
         const auto whole = session_.simplify(view_, {.goal = Goal::full(), .purpose = Purpose::picture});
         if (!whole) return whole.error();
         constexpr int tried = 4;
-        std::optional<double> sample_ms; // of the second picture: the first one compiles and uploads
+        double sample_ms = 0; // of the second picture: the first one compiles and uploads
         for (int i = 0; i < 2; ++i) {
             const auto frame = draw(whole->cuts, tried);
             if (!frame) return frame.error();
             sample_ms = frame->draw_ms / tried;
         }
         const double allowed_ms = 1e3 * options_.seconds / 2 / static_cast<double>(pictures);
-        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(*sample_ms, 1e-3)),
+        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(sample_ms, 1e-3)),
                               std::min(least_judged_samples, options_.samples), options_.samples);
         return samples_;
     }

@@ -31,7 +31,6 @@ public:
     // A bit a node, see vdtree::Viewpoint::hidden; null: none, or the tree is another one by now.
     std::shared_ptr<const std::vector<std::uint64_t>> of(std::size_t object,
                                                          const vdtree::VertexTree& tree) const noexcept;
-    std::size_t objects() const noexcept { return found_.size(); }
     std::size_t touched() const noexcept; // objects of which something is hidden
 
 private:
