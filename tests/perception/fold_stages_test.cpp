@@ -2,6 +2,8 @@
 // against surfaces that show nothing, and against the background alone.
 #include "measure/fold_stages.h"
 
+#include "measure/lit_stages.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -53,6 +55,48 @@ double sum(const Raster& plane) {
     double all = 0;
     for (const float value : plane.values) all += static_cast<double>(value);
     return all;
+}
+
+// Of one stage, with another contrast for each share of ambient light and each background.
+LitStages numbered() {
+    LitStages stages;
+    for (std::size_t share = 0; share < LitStages::ambient_shares.size(); ++share) {
+        FoldStage& stage = stages.by_share.emplace_back();
+        for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
+            stage.contrast[k][3][1] = 0.01f * static_cast<float>(share + 1) + 0.1f * static_cast<float>(k + 1);
+    }
+    return stages;
+}
+float found(const std::vector<FoldStage>& stages, float of_background) {
+    return stages.at(0).contrast[background(of_background)][3][1];
+}
+
+TEST(LitStages, AreThoseOfTheSharesAndBackgroundsAround) {
+    const LitStages all = numbered();
+    ASSERT_EQ(all.stage_count(), 1u);
+    // A fifth is ambient, as in one of the tables. Before black nothing lies around black but itself; white is a quarter
+    // of the brightest of the pictures, between 0.2 and 0.3 of it.
+    const auto fifth = all.under({.ambient = 0.2f, .least = 0.8f, .most = 0.8f});
+    EXPECT_FLOAT_EQ(found(fifth, 0), 0.03f + 0.1f);
+    EXPECT_FLOAT_EQ(found(fifth, 1), 0.03f + 0.7f);
+    // More of it: between two tables.
+    EXPECT_FLOAT_EQ(found(all.under({.ambient = 0.3f, .least = 0.7f, .most = 0.7f}), 0), 0.04f + 0.1f);
+    // Lights that are uneven over the mesh: all that occurs.
+    EXPECT_FLOAT_EQ(found(all.under({.ambient = 0.2f, .least = 0, .most = 0.8f}), 0), 0.05f + 0.1f);
+    // Half as bright: white is half of the brightest of the pictures.
+    EXPECT_FLOAT_EQ(found(all.under({.ambient = 0.1f, .least = 0.4f, .most = 0.4f}), 1), 0.03f + 0.8f);
+}
+
+TEST(LitStages, BeforeWhatIsBrighterThanInThePicturesCountForMore) {
+    // White has an eighth: twice the brightest of the pictures. |l - 2 c| <= 2 |l - c| + |l|.
+    const auto dim = numbered().under({.ambient = 0.025f, .least = 0.1f, .most = 0.1f});
+    EXPECT_FLOAT_EQ(found(dim, 1), 2 * (0.03f + 0.9f) + (0.03f + 0.1f));
+}
+
+TEST(LitStages, AreNoneWhereThereIsNoLight) {
+    EXPECT_TRUE(numbered().under({}).empty());
+    EXPECT_TRUE(numbered().under({.ambient = 0, .least = 0, .most = 1}).empty());
+    EXPECT_TRUE(LitStages().under({.ambient = 0.2f, .least = 1, .most = 1}).empty());
 }
 
 // Every sample's weight in the next level is a quarter, also at the border, where that reaches farther out.

@@ -650,8 +650,17 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
     std::vector<Shown> patches, strips;
     while (!find_shown(as_lit, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
+    // The edge of a shadow on the mesh moves with the surface as its outline would before what is in the shadow.
+    FoldTestOptions behind = options;
+    const bool has_edges = std::ranges::any_of(as_lit, [](const LitErrors& lit) { return !lit.casting.empty(); });
+    if (behind.scene.behind && has_edges)
+        for (const LitErrors& lit : as_lit) {
+            const vdtree::LuminanceRange own = lit.tree->luminance_range();
+            behind.scene.behind->lo = std::min(behind.scene.behind->lo, own.lo);
+            behind.scene.behind->hi = std::max(behind.scene.behind->hi, own.hi);
+        }
     const std::vector<float> distances =
-        stage_distances(tree, measured_stages, screen, options, masking, parts.eccentricity_bins);
+        stage_distances(tree, measured_stages, screen, behind, masking, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
@@ -747,6 +756,13 @@ Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel&
         all.lit_.push_back({&all.sound_.back(), all.errors_.back().of_nodes, {}, albedo});
         for (const vdtree::LightSource& light : one.lighting.lights)
             if (light.casts_shadow) all.lit_.back().casting.push_back(light);
+    }
+    // Parts of the mesh may be lit in either way: no contrast is larger than the larger one of both (LitStages).
+    const std::span<const FoldStage> own = all.errors_.front().stages;
+    all.stages_.assign(own.begin(), own.end());
+    for (const FoldErrors& errors : all.errors_) {
+        if (errors.stages.size() != own.size()) all.stages_.clear(); // somewhere no light is left
+        for (std::size_t i = 0; i < all.stages_.size(); ++i) include(errors.stages[i], all.stages_[i]);
     }
     return all;
 }

@@ -35,7 +35,7 @@ public:
     LitTrees& operator=(LitTrees&&) noexcept = default;
 
     std::span<const LitErrors> as_lit() const { return lit_; }
-    std::span<const FoldStage> stages() const { return errors_.front().stages; }
+    std::span<const FoldStage> stages() const { return stages_; } // the worst of any
     const vdtree::SoundTree& tree() const { return sound_.front(); }
 
 private:
@@ -43,6 +43,7 @@ private:
     std::vector<vdtree::SoundTree> sound_;
     std::vector<FoldErrors> errors_;
     std::vector<LitErrors> lit_;
+    std::vector<FoldStage> stages_;
 };
 
 // error_distances() of these, where something masks what folds change, as parts of a criterion.

@@ -14,9 +14,11 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include "measure/lit_stages.h"
 #include "measure/luminance_bias.h"
 #include "measure/pyramid.h"
 #include <vdtree/internal/simd.h>
+#include <vdtree/lighting.h>
 
 namespace unseen::perception {
 
@@ -32,6 +34,7 @@ constexpr float nothing = -std::numeric_limits<float>::infinity(); // is at a sa
 
 // From where a picture is taken: the mesh's sphere fills it, but for the margin. Lengths are in samples.
 struct Camera {
+    std::size_t number;
     glm::vec3 centre, right, up, towards;
     float samples_per_length;
 
@@ -51,6 +54,7 @@ Camera camera(const Sphere& sphere, std::size_t number) {
     const float z = 1 - static_cast<float>(2 * number + 1) / direction_count, s = std::sqrt(1 - z * z);
     const float angle = golden_angle * static_cast<float>(number);
     Camera c;
+    c.number = number;
     c.centre = sphere.centre;
     c.towards = {s * std::cos(angle), s * std::sin(angle), z};
     c.right =
@@ -176,14 +180,14 @@ class Painter {
 public:
     // The surfaces' memory is used again.
     Painter(const VertexTree& tree, const TexturedLight& light, const Camera& camera, Surfaces& surfaces)
-        : light_(light), camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), uvs_(tree.uvs()),
-          closedness_(tree.closedness()), surfaces_(surfaces) {
-        surfaces_.clear();
-    }
+        : light_(light), camera_(camera), positions_(tree.positions()), uvs_(tree.uvs()),
+          closedness_(tree.closedness()), surfaces_(surfaces) {}
 
-    // Triangles over nodes.
-    Picture draw(std::span<const Triangle> triangles) {
-        for (const Triangle& t : triangles) draw(t);
+    // Triangles over nodes, which are as bright as `luminance` says.
+    template <class Luminance>
+    Picture draw(std::span<const Triangle> triangles, const Luminance& luminance) {
+        surfaces_.clear();
+        for (const Triangle& t : triangles) draw(t, luminance);
         return cells();
     }
 
@@ -217,7 +221,8 @@ private:
         return picture;
     }
 
-    void draw(const Triangle& corners) {
+    template <class Luminance>
+    void draw(const Triangle& corners, const Luminance& luminance) {
         Shown t;
         t.a = camera_.place(positions_[corners[0]]);
         t.b = camera_.place(positions_[corners[1]]);
@@ -234,7 +239,7 @@ private:
         if (!std::isfinite(inverse)) return;
         t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
         t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
-        t.of_a = luminance_[corners[0]], t.of_b = luminance_[corners[1]], t.of_c = luminance_[corners[2]];
+        t.of_a = luminance(corners[0]), t.of_b = luminance(corners[1]), t.of_c = luminance(corners[2]);
         if (light_.texture)
             return draw_textured(t, light_, {uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]},
                                  surfaces_.height.data(), surfaces_.light.data());
@@ -244,7 +249,6 @@ private:
     const TexturedLight& light_;
     const Camera& camera_;
     std::span<const glm::vec3> positions_;
-    std::span<const Unorm16> luminance_;
     std::span<const glm::vec2> uvs_;
     Closedness closedness_;
     Surfaces& surfaces_;
@@ -268,6 +272,22 @@ public:
     }
     const Band& operator[](std::size_t band) const { return bands_[band]; }
 
+    // Of a picture whose light is so many times that of this picture, and of the other one, of the same surfaces.
+    void set_to_sum(const Bands& picture, float share, const Bands& other, float other_share) {
+        const auto sum = [&](const Raster& a, const Raster& b, Raster& to) {
+            to.side = a.side;
+            to.values.resize(a.values.size());
+            for (std::size_t i = 0; i < a.values.size(); ++i)
+                to.values[i] = share * a.values[i] + other_share * b.values[i];
+        };
+        for (std::size_t b = 0; b < FoldStage::band_count; ++b) {
+            sum(picture[b].light, other[b].light, bands_[b].light);
+            sum(picture[b].mean_light, other[b].mean_light, bands_[b].mean_light);
+            bands_[b].cover = picture[b].cover, bands_[b].mean_cover = picture[b].mean_cover;
+        }
+    }
+    Bands() = default;
+
 private:
     // Takes the mean away; returns the next level.
     static Raster split(Raster& plane, Raster& mean) {
@@ -285,10 +305,16 @@ double share_in_cells(double frequency) {
     return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency);
 }
 
+// Relative luminances.
+struct Surround {
+    float brightest = 1;            // that is behind the mesh
+    float black = FoldStage::black; // added to what luminances are divided by
+};
+
 // The largest contrasts of a band. `Floats`: a register's, each lane with places of its own.
 template <class Floats>
 UNSEEN_INLINE void find_contrasts(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain,
-                                  std::size_t band, FoldStage& stage) {
+                                  std::size_t band, const Surround& around, FoldStage& stage) {
     constexpr auto& masks = FoldStage::masks;
     constexpr std::size_t backgrounds = FoldStage::backgrounds.size(), width = sizeof(Floats) / sizeof(float);
     const auto magnitude = [](const Floats& v) UNSEEN_INLINE_LAMBDA { return v < 0 ? -v : v; };
@@ -308,9 +334,9 @@ UNSEEN_INLINE void find_contrasts(const Bands::Band& mesh, const Bands::Band& di
         const Floats own_light = load(mesh.light), own_cover = load(mesh.cover), mean_light = load(mesh.mean_light),
                      mean_cover = load(mesh.mean_cover);
         for (std::size_t k = 0; k < backgrounds; ++k) {
-            const float background = FoldStage::backgrounds[k];
+            const float background = around.brightest * FoldStage::backgrounds[k];
             const Floats lit = mean_light + background * (1 - mean_cover), mean = lit < 0 ? Floats{} : lit;
-            const Floats to_contrast = inverse_gain / (mean + FoldStage::black);
+            const Floats to_contrast = inverse_gain / (mean + around.black);
             const Floats mask = magnitude(own_light - background * own_cover) * to_contrast;
             const Floats contrast = magnitude(light - background * cover) * to_contrast;
             for (std::size_t row = 0; row < masks.size(); ++row) {
@@ -327,33 +353,139 @@ UNSEEN_INLINE void find_contrasts(const Bands::Band& mesh, const Bands::Band& di
                 stage.contrast[k][band][row] = std::max(stage.contrast[k][band][row], most[k][row][i]);
 }
 void find_contrasts_plain(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain, std::size_t band,
-                          FoldStage& stage) {
-    find_contrasts<Float4>(mesh, difference, inverse_gain, band, stage);
+                          const Surround& around, FoldStage& stage) {
+    find_contrasts<Float4>(mesh, difference, inverse_gain, band, around, stage);
 }
 #if defined(UNSEEN_EIGHT_WIDE)
 UNSEEN_AVX2 void find_contrasts_avx2(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain,
-                                     std::size_t band, FoldStage& stage) {
-    find_contrasts<Float8>(mesh, difference, inverse_gain, band, stage);
+                                     std::size_t band, const Surround& around, FoldStage& stage) {
+    find_contrasts<Float8>(mesh, difference, inverse_gain, band, around, stage);
 }
 #else
 constexpr auto find_contrasts_avx2 = find_contrasts_plain;
 #endif
 
-// The contrasts of a difference of pictures.
-FoldStage contrasts(const Bands& mesh, const Bands& difference) {
-    FoldStage stage;
+// Adds the contrasts of a difference of pictures: the larger ones stay.
+void add_contrasts(const Bands& mesh, const Bands& difference, const Surround& around, FoldStage& stage) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b)
         (has_avx2() ? find_contrasts_avx2 : find_contrasts_plain)(
             mesh[b], difference[b], 1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b))), b,
-            stage);
-    return stage;
+            around, stage);
 }
 
+// What is looked at of a mesh, and of each of its stages, from one direction: pictures under the tree's own light.
+class OwnLight {
+public:
+    static constexpr std::size_t table_count = 1;
+
+    explicit OwnLight(const VertexTree& tree) : luminance_(tree.luminance()) {}
+
+    struct Seen {
+        Picture picture;
+        Bands bands;
+    };
+    Seen look(Painter& painter, std::span<const Triangle> triangles, const Camera&) const {
+        Seen seen{draw(painter, triangles), {}};
+        seen.bands = Bands(seen.picture);
+        return seen;
+    }
+    // `tables`: one of each kind.
+    void compare(const Seen& mesh, Painter& painter, std::span<const Triangle> folded, const Camera&,
+                 std::span<FoldStage> tables) const {
+        Picture difference = draw(painter, folded);
+        difference.subtract(mesh.picture);
+        add_contrasts(mesh.bands, Bands(difference), {}, tables.front());
+    }
+
+private:
+    Picture draw(Painter& painter, std::span<const Triangle> triangles) const {
+        return painter.draw(triangles, [&](NodeId node) -> float { return luminance_[node]; });
+    }
+
+    std::span<const Unorm16> luminance_;
+};
+
+// The same under single lights from all around, with the shares of ambient light of LitStages: a table for each.
+class SingleLights {
+public:
+    static constexpr std::size_t table_count = LitStages::ambient_shares.size();
+
+    explicit SingleLights(const VertexTree& tree)
+        : normals_(tree.node_count()), has_albedo_(!tree.colours().empty() || !tree.texture().empty()) {
+        for (NodeId node = 0; node < tree.node_count(); ++node)
+            normals_[node] = {glm::vec3(tree.normals()[node]), albedo_of(tree, node)};
+    }
+
+    struct Seen {
+        Picture painted;
+        std::array<Picture, LitStages::lights> lit; // by lights of unit illuminance
+        Bands of_painted;
+        std::array<Bands, LitStages::lights> of_lit;
+    };
+    Seen look(Painter& painter, std::span<const Triangle> triangles, const Camera& camera) const {
+        Seen seen;
+        draw(painter, triangles, camera, seen);
+        seen.of_painted = Bands(seen.painted);
+        for (std::size_t i = 0; i < seen.lit.size(); ++i) seen.of_lit[i] = Bands(seen.lit[i]);
+        return seen;
+    }
+    void compare(const Seen& mesh, Painter& painter, std::span<const Triangle> folded, const Camera& camera,
+                 std::span<FoldStage> tables) const {
+        Seen difference;
+        draw(painter, folded, camera, difference);
+        difference.painted.subtract(mesh.painted);
+        difference.of_painted = Bands(difference.painted);
+        const Surround around{LitStages::brightest, LitStages::black};
+        add_contrasts(mesh.of_painted, difference.of_painted, around, tables.back());
+        Bands lit_mesh, lit_difference; // with some ambient light
+        for (std::size_t i = 0; i < difference.lit.size(); ++i) {
+            difference.lit[i].subtract(mesh.lit[i]);
+            const Bands of_lit(difference.lit[i]);
+            for (std::size_t table = 0; table + 1 < table_count; ++table) {
+                const float ambient = LitStages::ambient_shares[table];
+                lit_mesh.set_to_sum(mesh.of_lit[i], 1 - ambient, mesh.of_painted, ambient);
+                lit_difference.set_to_sum(of_lit, 1 - ambient, difference.of_painted, ambient);
+                add_contrasts(lit_mesh, lit_difference, around, tables[table]);
+            }
+        }
+    }
+
+private:
+    // From before the mesh, from aside and from behind: around the direction of view by so many radians.
+    static constexpr std::array<float, LitStages::lights> from_view = {0.7f, 1.4f, 2.2f};
+
+    void draw(Painter& painter, std::span<const Triangle> triangles, const Camera& camera, Seen& seen) const {
+        constexpr float golden_angle = 2.39996323f;
+        for (std::size_t i = 0; i < from_view.size(); ++i) {
+            const float around = golden_angle * static_cast<float>(camera.number * from_view.size() + i);
+            const glm::vec3 towards =
+                std::cos(from_view[i]) * camera.towards +
+                std::sin(from_view[i]) * (std::cos(around) * camera.right + std::sin(around) * camera.up);
+            seen.lit[i] = painter.draw(triangles, [&](NodeId node) {
+                const glm::vec4& vertex = normals_[node];
+                const float facing = glm::dot(glm::vec3(vertex), towards);
+                return facing > 0 ? facing * vertex.w : 0.0f;
+            });
+        }
+        if (has_albedo_) {
+            seen.painted = painter.draw(triangles, [&](NodeId node) { return normals_[node].w; });
+        } else {
+            seen.painted = seen.lit.front();
+            for (std::size_t i = 0; i < seen.painted.light.values.size(); ++i)
+                seen.painted.light.values[i] = normals_.front().w * seen.painted.cover.values[i];
+        }
+    }
+
+    std::vector<glm::vec4> normals_; // and the albedo
+    bool has_albedo_;
+};
+
+template <class Light>
 class StageFinder {
 public:
-    StageFinder(const SoundTree& tree, const TexturedLight& light, std::span<const FoldTexture> textures,
+    StageFinder(const SoundTree& tree, const TexturedLight& texture, std::span<const FoldTexture> textures,
                 std::span<FoldError> errors, MeasuringProgress& progress)
-        : tree_(tree), light_(light), textures_(textures), errors_(errors), progress_(progress),
+        : tree_(tree), light_(tree), texture_(texture), textures_(textures), errors_(errors), progress_(progress),
           interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
@@ -361,30 +493,31 @@ public:
         for (std::size_t i = 0; i < direction_count; ++i) cameras_.push_back(camera(tree.bounding_sphere(), i));
     }
 
+    // By table and stage.
     std::vector<FoldStage> run() {
         const std::size_t count = order();
         // Each stage leaves about so many triangles of the one before.
         const double fewer = std::exp2(-1 / stages_per_halving);
         progress_.begin(1, direction_count * (1 - std::pow(fewer, count + 1)) / (1 - fewer));
-        std::vector<std::optional<Picture>> pictures(direction_count);
-        std::vector<std::optional<Bands>> bands(direction_count);
-        for_each_picture([&](std::size_t i, Picture picture) {
-            bands[i].emplace(picture);
-            pictures[i] = std::move(picture);
-        });
-        std::vector<FoldStage> stages(count);
+        std::vector<typename Light::Seen> mesh(direction_count);
+        for_each_direction(
+            [&](std::size_t i, Painter& painter) { mesh[i] = light_.look(painter, triangles_, cameras_[i]); });
+        std::vector<FoldStage> stages(Light::table_count * count);
         for (std::size_t stage = 0; stage < count; ++stage) {
             if (progress_.is_cancelled()) return {};
             fold(stage);
             dearness_ *= fewer;
-            std::vector<FoldStage> found(direction_count);
-            for_each_picture([&](std::size_t i, Picture picture) {
-                picture.subtract(*pictures[i]);
-                found[i] = contrasts(*bands[i], Bands(picture));
+            std::vector<std::array<FoldStage, Light::table_count>> found(direction_count);
+            for_each_direction([&](std::size_t i, Painter& painter) {
+                light_.compare(mesh[i], painter, triangles_, cameras_[i], found[i]);
             });
-            for (const FoldStage& from : found) unite(stages[stage], from);
+            for (const auto& tables : found)
+                for (std::size_t table = 0; table < tables.size(); ++table)
+                    include(tables[table], stages[table * count + stage]);
         }
-        if (!textures_.empty()) add_detail(stages);
+        if (!textures_.empty())
+            for (std::size_t first = 0; first < stages.size(); first += count)
+                add_detail(std::span(stages).subspan(first, count));
         return stages;
     }
 
@@ -416,7 +549,7 @@ private:
     // With a texture, patterns finer than the pictures' cells may change as no outline does, which the cells' means do
     // not show: those of any node that has been folded count. Whoever looks at contrasts finer than the first band takes
     // twice its contrast for each octave, up to three.
-    void add_detail(std::vector<FoldStage>& stages) const {
+    void add_detail(std::span<FoldStage> stages) const {
         constexpr float most_octaves = 3;
         const float cell = 2 * margin * tree_.bounding_sphere().radius / static_cast<float>(side);
         const float first_wave = cell / static_cast<float>(nominal_frequency(0));
@@ -453,23 +586,18 @@ private:
     }
 
     template <class F>
-    void for_each_picture(F&& f) {
+    void for_each_direction(F&& f) {
         tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
             if (progress_.is_cancelled()) return;
-            f(i, Painter(tree_, light_, cameras_[i], surfaces_.local()).draw(triangles_));
+            Painter painter(tree_, texture_, cameras_[i], surfaces_.local());
+            f(i, painter);
             progress_.add(dearness_);
         });
     }
 
-    static void unite(FoldStage& stage, const FoldStage& other) {
-        for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
-            for (std::size_t b = 0; b < FoldStage::band_count; ++b)
-                for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
-                    stage.contrast[k][b][row] = std::max(stage.contrast[k][b][row], other.contrast[k][b][row]);
-    }
-
     const SoundTree& tree_;
-    TexturedLight light_;
+    Light light_;
+    TexturedLight texture_;
     std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
     MeasuringProgress& progress_;
@@ -484,15 +612,25 @@ private:
 
 } // namespace
 
+bool has_stages(const VertexTree& tree) {
+    const float radius = tree.bounding_sphere().radius;
+    const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
+    return !is_translucent && radius > 0 && std::isfinite(side / (2 * radius));
+}
+
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 
 std::vector<FoldStage> find_stages(const SoundTree& tree, const TexturedLight& light,
                                    std::span<const FoldTexture> textures, std::span<FoldError> errors,
                                    MeasuringProgress& progress) {
-    const float radius = tree.bounding_sphere().radius;
-    const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
-    if (is_translucent || !(radius > 0) || !std::isfinite(side / (2 * radius))) return {};
-    return StageFinder(tree, light, textures, errors, progress).run();
+    if (!has_stages(tree)) return {};
+    return StageFinder<OwnLight>(tree, light, textures, errors, progress).run();
+}
+
+LitStages find_lit_stages(const SoundTree& tree, const TexturedLight& texture, std::span<const FoldTexture> textures,
+                          std::span<FoldError> errors, MeasuringProgress& progress) {
+    if (!has_stages(tree)) return {};
+    return {StageFinder<SingleLights>(tree, texture, textures, errors, progress).run()};
 }
 
 } // namespace unseen::perception

@@ -8,6 +8,7 @@
 
 #include "fold/fold_errors.h"
 #include "measure/fold_stages.h"
+#include "measure/lit_stages.h"
 #include "measure/measuring_progress.h"
 #include "measure/textured_light.h"
 
@@ -20,5 +21,14 @@ namespace unseen::perception {
 std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, const TexturedLight& light,
                                    std::span<const FoldTexture> textures, std::span<FoldError> errors,
                                    MeasuringProgress& progress);
+
+// The same under any lights. `errors`: of folds under light from everywhere. `texture`: dark where the texture is.
+// Cost: three to four times as many pictures.
+LitStages find_lit_stages(const vdtree::SoundTree& tree, const TexturedLight& texture,
+                          std::span<const FoldTexture> textures, std::span<FoldError> errors,
+                          MeasuringProgress& progress);
+
+// Whether these find any.
+bool has_stages(const vdtree::VertexTree& tree);
 
 } // namespace unseen::perception

@@ -2,6 +2,7 @@
 // aside.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -36,6 +37,13 @@ struct FoldStage {
 
     bool operator==(const FoldStage&) const = default;
 };
+// Of each contrast the larger one.
+inline void include(const FoldStage& other, FoldStage& stage) {
+    for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
+        for (std::size_t b = 0; b < FoldStage::band_count; ++b)
+            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
+                stage.contrast[k][b][row] = std::max(stage.contrast[k][b][row], other.contrast[k][b][row]);
+}
 // Whether all of it are numbers that a measurement can give.
 inline bool is_sound(const FoldStage& stage) {
     bool sound = true;

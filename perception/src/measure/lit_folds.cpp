@@ -1,5 +1,4 @@
-// Luminances in the pictures are (2 + a n_k) / 4: what measures them takes them for positive, and divides shifts of the
-// mean by them, so they stay away from 0.
+// Luminances in the pictures are (2 + a n_k) / 4: what measures them takes them for positive.
 #include <perception/lit_folds.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@
 #include <vdtree/internal/spot_share.h>
 
 #include "measure/fold_record.h"
+#include "measure/lit_stages.h"
 #include "measure/measure_folds.h"
 #include "measure/measurement.h"
 
@@ -30,33 +30,33 @@ using namespace vdtree;
 namespace {
 
 constexpr float offset = 2, scale = 4; // of luminances in the pictures of a n
-constexpr float brightest = (offset + 1) / scale;
 // Within a ring of the angular radius x, seen from a light, its light is a quadratic of the place but for less than this
 // times x^2, as a share: 1/8 of the square of the ring's diameter times the second derivatives of 1 / d^2 and of the
 // direction, 6 / d^2 and 1 / d^2, rounded up.
 constexpr float falloff_curvature = 4;
-constexpr float least_lit = 1e-5f;       // what is less lit is dark: below a step of stored luminances
-constexpr float least_luminance = 1e-3f; // that shifts of the mean are shares of
+constexpr float least_lit = 1e-5f; // what is less lit is dark: below a step of stored luminances
 
 // What is kept with a measurement: its own numbers, and all of measure_folds().
-constexpr int revision = 1; // one more where the same settings give other numbers
+constexpr int revision = 2; // one more where the same settings give other numbers
 constexpr auto settings = [] {
-    std::array<float, 3 + measurement::settings.size()> all = {revision, offset, scale};
-    std::copy(measurement::settings.begin(), measurement::settings.end(), all.begin() + 3);
+    std::array<float, 5 + measurement::settings.size()> all = {revision, offset, scale, LitStages::lights,
+                                                               LitStages::brightest};
+    std::copy(measurement::settings.begin(), measurement::settings.end(), all.begin() + 5);
     return all;
 }();
 constexpr std::string_view lit_record_name = "lit_folds", lit_facing_name = "lit_facing",
                            lit_albedo_name = "lit_albedo", lit_texture_name = "lit_texture",
+                           lit_stage_of_name = "lit_stage", lit_stages_name = "lit_stages",
                            lit_settings_name = "lit_measurement";
 
 // What a fold changes of a luminance: of FoldRecord.
 struct Shades {
     using Component = float;
 
-    float largest = 0, mean = 0, bias = 0;
+    float largest = 0, mean = 0;
     float amplitudes[measurement::picture_sizes.size()][measurement::picture_bands] = {};
 };
-static_assert(sizeof(Shades) == 11 * sizeof(float));
+static_assert(sizeof(Shades) == 10 * sizeof(float));
 
 // Of an interior node.
 struct LitRecord {
@@ -66,7 +66,7 @@ struct LitRecord {
     float gap = 0, sine = 1;
     Shades of_axis[3]; // of a n_k in the pictures' luminances
 };
-static_assert(sizeof(LitRecord) == 40 * sizeof(float));
+static_assert(sizeof(LitRecord) == 37 * sizeof(float));
 
 constexpr float LitRecord::*lengths[] = {&LitRecord::shift, &LitRecord::farthest, &LitRecord::mean_distance,
                                          &LitRecord::extent, &LitRecord::border};
@@ -74,7 +74,7 @@ constexpr float LitRecord::*lengths[] = {&LitRecord::shift, &LitRecord::farthest
 bool is_sound(const Shades& shades) {
     bool sound = true;
     const auto look_at = [&](float value) { sound &= value >= 0 && std::isfinite(value); };
-    for (const float value : {shades.largest, shades.mean, shades.bias}) look_at(value);
+    for (const float value : {shades.largest, shades.mean}) look_at(value);
     for (const auto& of_size : shades.amplitudes)
         for (const float amplitude : of_size) look_at(amplitude);
     return sound;
@@ -88,7 +88,7 @@ bool is_sound(const LitRecord& record) {
 }
 
 Shades shades_of(const FoldRecord& record) {
-    Shades shades{record.largest_luminance, record.mean_luminance, record.bias, {}};
+    Shades shades{record.largest_luminance, record.mean_luminance, {}};
     std::copy(&record.amplitudes[0][0],
               &record.amplitudes[0][0] + std::size(shades.amplitudes) * measurement::picture_bands,
               &shades.amplitudes[0][0]);
@@ -105,7 +105,6 @@ void include(const FoldRecord& other, LitRecord& record) {
 }
 
 void include(const FoldFacing& other, FoldFacing& facing) {
-    facing.fading = std::min(facing.fading, other.fading);
     facing.facing |= other.facing;
     facing.is_height_field &= other.is_height_field;
 }
@@ -149,6 +148,19 @@ Reach reach_of(const LightSource& light, const Sphere& ring) {
     return reach;
 }
 
+// The least that white has of a light that it faces, anywhere in a sphere.
+float least_of(const LightSource& light, const Sphere& sphere) {
+    if (light.kind == LightSource::Kind::directional) return static_cast<float>(light.intensity);
+    const glm::dvec3 to_sphere = glm::dvec3(sphere.centre) - light.position;
+    const double distance = glm::length(to_sphere), radius = static_cast<double>(sphere.radius),
+                 ratio = light.distance / (distance + radius);
+    const auto least = static_cast<float>(light.intensity * ratio * ratio);
+    if (light.kind != LightSource::Kind::spot) return least;
+    if (!(distance > radius)) return 0;
+    const double angle = std::acos(std::clamp(glm::dot(to_sphere, light.direction) / distance, -1.0, 1.0));
+    return least * share_at(light, angle + std::asin(radius / distance));
+}
+
 // The largest that each coordinate of the direction to the light is, from anywhere in the ring.
 glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
     if (light.kind == LightSource::Kind::directional) return glm::abs(glm::vec3(light.direction));
@@ -160,6 +172,17 @@ glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
     return glm::vec3(glm::min(reached, glm::dvec3(1)));
 }
 
+Illumination illumination_of(const Lighting& lighting, const VertexTree& tree) {
+    Illumination all{static_cast<float>(lighting.ambient), 0, 0};
+    const Sphere sphere = tree.bounds()[VertexTree::root()].ring;
+    for (const LightSource& light : lighting.lights) {
+        const Reach reach = reach_of(light, sphere);
+        all.most += reach.most;
+        all.least += least_of(light, sphere);
+    }
+    return all;
+}
+
 } // namespace
 
 struct LitFolds::State {
@@ -167,6 +190,9 @@ struct LitFolds::State {
     std::vector<FoldFacing> facing;
     std::vector<Shades> albedo;        // empty: the same everywhere
     std::vector<FoldTexture> textures; // of textured trees; else empty
+    std::vector<std::uint8_t> stage_of;
+    LitStages stages;
+    std::shared_ptr<const TextureDetail> texture; // null: none
     LightBounds bounds;
 };
 
@@ -179,10 +205,10 @@ Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Pr
     if (has_albedo(tree)) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
     constexpr float unlit = offset / scale; // what a vertex is in the pictures that no light makes bright
     constexpr float dark[] = {unlit, unlit, unlit, 0};
-    auto measured = measure_records(tree, shadings, std::span(dark).first(shadings.size()), threads, progress);
+    auto measured = measure_shadings(tree, shadings, std::span(dark).first(shadings.size()), scale, threads, progress);
     if (!measured) return measured.error();
     auto state = std::make_shared<State>();
-    const auto& axes = *measured;
+    const auto& axes = measured->of;
     LitRecord none;
     none.gap = std::numeric_limits<float>::infinity();
     state->folds.assign(tree.interior_count(), none);
@@ -196,9 +222,14 @@ Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Pr
     if (axes.size() > 3)
         for (const FoldRecord& fold : axes[3].folds) state->albedo.push_back(shades_of(fold));
     state->textures = axes[0].textures;
+    state->stage_of = std::move(measured->stage_of);
+    state->stages = std::move(measured->stages);
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
+    auto texture = texture_detail_of(tree);
+    if (!texture) return texture.error();
     state->bounds = std::move(*bounds);
+    state->texture = std::move(*texture);
     return LitFolds(std::move(state));
 }
 
@@ -217,22 +248,35 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     const auto facing = tree.attribute<FoldFacing>(lit_facing_name);
     const auto albedo = tree.attribute<Shades>(lit_albedo_name);
     const auto textures = tree.attribute<FoldTexture>(lit_texture_name);
-    const std::size_t nodes = tree.interior_count();
-    if (folds.size() != nodes || facing.size() != nodes || albedo.size() != (has_albedo(tree) ? nodes : 0) ||
+    const auto stage_of = tree.attribute<std::uint8_t>(lit_stage_of_name);
+    const auto stages = tree.attribute<FoldStage>(lit_stages_name);
+    const std::size_t nodes = tree.interior_count(), stage_count = stages.size() / LitStages::ambient_shares.size();
+    if (folds.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
+        stages.size() % LitStages::ambient_shares.size() != 0 || albedo.size() != (has_albedo(tree) ? nodes : 0) ||
         textures.size() != (tree.texture().empty() ? 0 : nodes))
         return refused("a part of it is missing.");
-    for (std::size_t node = 0; node < nodes; ++node)
+    for (const FoldStage& stage : stages)
+        if (!is_sound(stage)) return refused("a contrast of a stage is negative or not finite.");
+    for (std::size_t node = 0; node < nodes; ++node) {
+        if (!stages.empty() && stage_of[node] >= stage_count)
+            return refused("node " + std::to_string(node) + " folds in a stage that is not there.");
         if (!is_sound(folds[node]) || facing[node].fading > most_fading ||
             !(albedo.empty() || is_sound(albedo[node])) || !(textures.empty() || is_sound(textures[node])))
             return refused("a number of node " + std::to_string(node) + " is negative or not finite.");
+    }
     auto bounds = LightBounds::measure(tree);
     if (!bounds) return bounds.error();
+    auto texture = texture_detail_of(tree);
+    if (!texture) return texture.error();
     auto state = std::make_shared<State>();
     state->folds.assign(folds.begin(), folds.end());
     state->facing.assign(facing.begin(), facing.end());
     state->albedo.assign(albedo.begin(), albedo.end());
     state->textures.assign(textures.begin(), textures.end());
+    state->stage_of.assign(stage_of.begin(), stage_of.end());
+    state->stages.by_share.assign(stages.begin(), stages.end());
     state->bounds = std::move(*bounds);
+    state->texture = std::move(*texture);
     return LitFolds(std::move(state));
 }
 
@@ -248,6 +292,8 @@ Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
         with = with->with_attribute(lit_albedo_name, AttributeDomain::interior_node, state_->albedo);
     if (with && !state_->textures.empty())
         with = with->with_attribute(lit_texture_name, AttributeDomain::interior_node, state_->textures);
+    if (with) with = with->with_attribute(lit_stage_of_name, AttributeDomain::interior_node, state_->stage_of);
+    if (with) with = with->with_attribute(lit_stages_name, AttributeDomain::tree, state_->stages.by_share);
     return with;
 }
 
@@ -302,12 +348,11 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
                 set(fold.amplitudes[size][band], combined([&](const Shades& s) { return s.amplitudes[size][band]; }));
         float& widest = fold.amplitudes[measurement::picture_sizes.size() - 1][measurement::picture_bands - 1];
         set(widest, widest + uneven);
-        const LuminanceRange range = lit->support_luminance()[node];
-        float middle = std::max((range.lo + range.hi) / 2, least_luminance);
-        if (!state_->textures.empty()) middle = std::max(middle * state_->textures[node].mean, least_luminance);
-        fold.bias = combined([&](const Shades& s) { return brightest * s.bias; }) / middle;
     });
-    return with_records(*lit, {std::move(folds), state_->facing, state_->textures});
+    MeasuredFolds measured{std::move(folds), state_->facing, state_->textures};
+    if (const auto added = add_luminance_bias(*lit, state_->texture.get(), measured); !added) return added.error();
+    return with_records(*lit, std::move(measured), state_->stage_of,
+                        state_->stages.under(illumination_of(lighting, tree)));
 }
 
 } // namespace unseen::perception

@@ -912,11 +912,15 @@ private:
 };
 
 // Lengths in the tree's own units again. False where they are beyond all numbers.
-bool scale_back(FoldRecord& record, float scale) {
-    if (record.gap < infinity && !std::isfinite(record.gap / scale)) return false;
+void scale_lengths(FoldRecord& record, float scale) {
     for (float* length :
          {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap, &record.border})
-        *length /= scale;
+        *length *= scale;
+}
+
+bool scale_back(FoldRecord& record, float scale) {
+    if (record.gap < infinity && !std::isfinite(record.gap / scale)) return false;
+    scale_lengths(record, 1 / scale);
     return is_sound(record);
 }
 
@@ -957,6 +961,15 @@ std::optional<glm::vec3> common_tint(const VertexTree& tree) {
 
 } // namespace
 
+Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const VertexTree& tree) {
+    if (tree.texture().empty()) return std::shared_ptr<const TextureDetail>();
+    const auto tint = common_tint(tree);
+    if (!tint)
+        return Error{ErrorCode::unsupported, "What folds change of a texture over vertices of several hues is not "
+                                             "measured: take another fold test, or the tree without its texture."};
+    return std::make_shared<const TextureDetail>(tree.texture(), *tint);
+}
+
 bool knows_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
 
 bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldRecord>(record_name).empty(); }
@@ -964,6 +977,16 @@ bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldR
 std::span<const float> measurement_settings() noexcept { return settings; }
 
 namespace {
+
+// The tree in units in which no product of lengths overflows or vanishes. `geometry`: kept for others of the same one.
+Result<SoundTree> in_units(const VertexTree& tree, float scale, std::shared_ptr<const TreeGeometry>& geometry) {
+    auto sound = SoundTree::of(tree);
+    if (!sound || scale == 1) return sound;
+    if (!geometry) geometry = scaled_geometry(tree.data().geometry, scale);
+    const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
+    scaled->geometry = geometry;
+    return SoundTree::of(VertexTree(scaled));
+}
 
 Error cancelled_error() { return {ErrorCode::cancelled, "Measuring what folds change was cancelled."}; }
 
@@ -986,23 +1009,17 @@ bool measure_all(std::span<const SoundTree> trees, std::span<const TexturedLight
     return Measurer<luminances, is_textured>(trees, lights, found, std::move(contacts)).run(progress);
 }
 
-// `dark`: of textured trees, by tree, what their luminance is where the texture is black. `up_to`: the share of the
+// Without shifts of the mean. `dark`: of textured trees, by tree, what their luminance is where the texture is black. `up_to`: the share of the
 // whole that this is.
 Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads, double up_to,
                          MeasuringProgress& progress) {
     const bool is_textured = !trees.front().texture().empty();
     assert(trees.size() == 1 || trees.size() == 4 || (trees.size() == 3 && !is_textured));
     Measured all;
-    std::shared_ptr<const TreeGeometry> geometry; // scaled, of all
-    // Measured is in units in which no product of lengths overflows or vanishes.
     const float scale = unit_scale(trees.front().bounding_sphere().radius);
+    std::shared_ptr<const TreeGeometry> geometry;
     for (const VertexTree& tree : trees) {
-        const auto sound = SoundTree::of(tree);
-        if (!sound) return sound.error();
-        const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
-        if (scale != 1 && !geometry) geometry = scaled_geometry(tree.data().geometry, scale);
-        if (scale != 1) scaled->geometry = geometry;
-        auto measured = SoundTree::of(VertexTree(scaled));
+        auto measured = in_units(tree, scale, geometry);
         if (!measured) return measured.error();
         all.in_units.push_back(std::move(*measured));
     }
@@ -1013,13 +1030,9 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         if (is_textured) found.textures.resize(nodes);
     }
     all.errors.resize(trees.size());
-    if (is_textured) {
-        const auto tint = common_tint(trees.front());
-        if (!tint)
-            return Error{ErrorCode::unsupported, "What folds change of a texture over vertices of several hues is not "
-                                                 "measured: take another fold test, or the tree without its texture."};
-        all.texture = std::make_shared<const TextureDetail>(trees.front().texture(), *tint);
-    }
+    auto texture = texture_detail_of(trees.front());
+    if (!texture) return texture.error();
+    all.texture = std::move(*texture);
     for (std::size_t i = 0; i < trees.size(); ++i) all.lights.push_back({all.texture.get(), dark[i]});
     const auto measure_these = is_textured         ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
                                : trees.size() == 1 ? measure_all<1, false>
@@ -1030,29 +1043,113 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
     arena.execute([&] {
         is_whole = measure_these(all.in_units, all.lights, all.found, up_to, progress);
         if (!is_whole) return;
-        // How much light many folds shift depends on the order in which they are folded: that of what the model makes
-        // of each alone, whatever the factors of a criterion will be.
         tbb::parallel_for(std::size_t{0}, trees.size(), [&](std::size_t i) {
-            MeasuredFolds& found = all.found[i];
+            const MeasuredFolds& found = all.found[i];
             all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, found.textures, FoldModel());
-            find_luminance_bias(all.in_units[i], all.lights[i], found.textures, all.errors[i]);
         });
     });
     if (!is_whole) return cancelled_error();
-    for (std::size_t i = 0; i < trees.size(); ++i)
-        for (NodeId node = 0; node < nodes; ++node) {
-            FoldRecord& fold = all.found[i].folds[node];
-            fold.bias = all.errors[i][node].bias;
-            all.found[i].facing[node].fading = all.errors[i][node].fading;
-            if (!scale_back(fold, scale))
+    for (MeasuredFolds& found : all.found)
+        for (NodeId node = 0; node < nodes; ++node)
+            if (!scale_back(found.folds[node], scale))
                 return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
                                                          " changes is beyond all numbers: the mesh is too large."};
-        }
     return all;
 }
 
-Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measured, std::vector<std::uint8_t> stage_of,
-                                   std::vector<FoldStage> stages) {
+constexpr double before_stages = 0.8; // of the whole
+
+void copy_bias(std::span<const FoldError> errors, MeasuredFolds& to) {
+    for (std::size_t node = 0; node < errors.size(); ++node) {
+        to.folds[node].bias = errors[node].bias;
+        to.facing[node].fading = errors[node].fading;
+    }
+}
+
+std::vector<std::uint8_t> stages_of(std::span<const FoldError> errors) {
+    std::vector<std::uint8_t> stage_of(errors.size());
+    for (std::size_t node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
+    return stage_of;
+}
+
+// What folds change under light from everywhere, as far as the order goes in which they fold: half as much along each
+// axis as a light from there.
+std::vector<FoldError> errors_in_any_light(const Measured& measured, float to_light) {
+    std::vector<FoldError> errors = measured.errors.front();
+    for (std::size_t i = 0; i < measured.errors.size(); ++i) {
+        const float factor = i < 3 ? to_light / 2 : 1;
+        for (std::size_t node = 0; node < errors.size(); ++node) {
+            const FoldError& of = measured.errors[i][node];
+            errors[node].mean_distance = std::max(errors[node].mean_distance, of.mean_distance);
+            const auto include = [&](float& to, float value) {
+                to = i == 0 ? factor * value : std::max(to, factor * value);
+            };
+            include(errors[node].luminance, of.luminance);
+            include(errors[node].wide_luminance, of.wide_luminance);
+        }
+    }
+    return errors;
+}
+
+} // namespace
+
+Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
+    MeasuringProgress told(progress);
+    constexpr float dark = 0;
+    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
+    if (!measured) return measured.error();
+    std::vector<FoldError>& errors = measured->errors.front();
+    std::vector<FoldStage> stages;
+    tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
+        find_luminance_bias(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
+                            errors);
+        copy_bias(errors, measured->found.front());
+        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
+                             errors, told);
+    });
+    if (told.is_cancelled()) return cancelled_error();
+    return with_records(tree, std::move(measured->found.front()), stages_of(errors), std::move(stages));
+}
+
+Result<MeasuredShadings> measure_shadings(const VertexTree& tree, std::span<const Shading> shadings,
+                                          std::span<const float> dark, float to_light, int threads,
+                                          const Progress& progress) {
+    std::vector<VertexTree> shaded;
+    for (const Shading& luminance : shadings) {
+        auto as_shaded = tree.shaded(luminance, !tree.texture().empty());
+        if (!as_shaded) return as_shaded.error();
+        shaded.push_back(std::move(*as_shaded));
+    }
+    MeasuringProgress told(progress);
+    auto measured = measure(shaded, dark, threads, before_stages, told);
+    if (!measured) return measured.error();
+    std::vector<FoldError> errors = errors_in_any_light(*measured, to_light);
+    MeasuredShadings all;
+    tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
+        all.stages = find_lit_stages(measured->in_units.front(), {measured->texture.get(), 0},
+                                     measured->found.front().textures, errors, told);
+    });
+    if (told.is_cancelled()) return cancelled_error();
+    all.stage_of = stages_of(errors);
+    all.of = std::move(measured->found);
+    return all;
+}
+
+Result<void> add_luminance_bias(const VertexTree& tree, const TextureDetail* texture, MeasuredFolds& measured) {
+    const float scale = unit_scale(tree.bounding_sphere().radius);
+    std::shared_ptr<const TreeGeometry> geometry;
+    const auto measured_in = in_units(tree, scale, geometry);
+    if (!measured_in) return measured_in.error();
+    std::vector<FoldRecord> records = measured.folds;
+    for (FoldRecord& record : records) scale_lengths(record, scale);
+    auto errors = nested_errors(*measured_in, records, measured.facing, measured.textures, FoldModel());
+    find_luminance_bias(*measured_in, {texture, 0}, measured.textures, errors);
+    copy_bias(errors, measured);
+    return {};
+}
+
+Result<VertexTree> with_records(const VertexTree& tree, MeasuredFolds measured, std::vector<std::uint8_t> stage_of,
+                                std::vector<FoldStage> stages) {
     Attributes with(tree.share());
     with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
     with.add(record_name, AttributeDomain::interior_node, std::move(measured.folds));
@@ -1062,44 +1159,6 @@ Result<VertexTree> with_attributes(const VertexTree& tree, MeasuredFolds measure
     with.add(stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
     with.add(stages_name, AttributeDomain::tree, std::move(stages));
     return with.take();
-}
-
-} // namespace
-
-Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
-    constexpr double before_stages = 0.8;
-    MeasuringProgress told(progress);
-    constexpr float dark = 0;
-    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
-    if (!measured) return measured.error();
-    std::vector<FoldError>& errors = measured->errors.front();
-    std::vector<FoldStage> stages;
-    tbb::task_arena(threads > 0 ? threads : tbb::task_arena::automatic).execute([&] {
-        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
-                             errors, told);
-    });
-    if (told.is_cancelled()) return cancelled_error();
-    std::vector<std::uint8_t> stage_of(errors.size());
-    for (NodeId node = 0; node < errors.size(); ++node) stage_of[node] = errors[node].stage;
-    return with_attributes(tree, std::move(measured->found.front()), std::move(stage_of), std::move(stages));
-}
-
-Result<std::vector<MeasuredFolds>> measure_records(const VertexTree& tree, std::span<const Shading> shadings,
-                                                   std::span<const float> dark, int threads, const Progress& progress) {
-    std::vector<VertexTree> shaded;
-    for (const Shading& luminance : shadings) {
-        auto as_shaded = tree.shaded(luminance, !tree.texture().empty());
-        if (!as_shaded) return as_shaded.error();
-        shaded.push_back(std::move(*as_shaded));
-    }
-    MeasuringProgress told(progress);
-    auto measured = measure(shaded, dark, threads, 1, told);
-    if (!measured) return measured.error();
-    return std::move(measured->found);
-}
-
-Result<VertexTree> with_records(const VertexTree& tree, MeasuredFolds measured) {
-    return with_attributes(tree, std::move(measured), std::vector<std::uint8_t>(tree.interior_count()), {});
 }
 
 } // namespace unseen::perception

@@ -1,6 +1,7 @@
 // The measurement of folds without what follows from it for the whole mesh.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,8 @@
 #include <vdtree/vertex_tree.h>
 
 #include "measure/fold_record.h"
+#include "measure/lit_stages.h"
+#include "measure/texture_detail.h"
 
 namespace unseen::perception {
 
@@ -21,13 +24,30 @@ struct MeasuredFolds { // by interior node
 // What a tree's nodes are given as luminance.
 using Shading = Callback<float(vdtree::NodeId)>;
 
-// As measure_folds(), without its stages, for several luminances at once. Which neighbours are folded with a node is the
-// same for all, so they share what is measured of lengths, and where surfaces touch. By shading. Precondition: one,
-// three or four of them; of a textured tree one or four. `dark`: by shading, what it is where a texture is black.
-Result<std::vector<MeasuredFolds>> measure_records(const vdtree::VertexTree& tree, std::span<const Shading> shadings,
-                                                   std::span<const float> dark, int threads, const Progress& progress);
+struct MeasuredShadings {
+    std::vector<MeasuredFolds> of; // by shading
+    std::vector<std::uint8_t> stage_of;
+    LitStages stages; // none where measure_folds() finds none
+};
 
-// The tree with these as measure_folds() keeps them, and no stages.
-Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured);
+// As measure_folds(), but for shifts of the mean, for several luminances at once: first along each axis what light from there makes of the vertices,
+// then their albedo where they differ. Which neighbours are folded with a node is the same for all, so they share what is
+// measured of lengths, and where surfaces touch. Precondition: three or four of them; of a textured tree four. `dark`: by
+// shading, what it is where a texture is black. `to_light`: from the shadings' luminances to those under a light.
+Result<MeasuredShadings> measure_shadings(const vdtree::VertexTree& tree, std::span<const Shading> shadings,
+                                          std::span<const float> dark, float to_light, int threads,
+                                          const Progress& progress);
+
+// Adds how much light many folds shift (FoldRecord::bias, FoldFacing::fading), under the tree's light. That depends on
+// the order in which they are folded: that of what the model makes of each alone, whatever the factors of a criterion
+// will be. `texture`: of texture_detail_of(). Cost: some 1.5 us a node.
+Result<void> add_luminance_bias(const vdtree::VertexTree& tree, const TextureDetail* texture, MeasuredFolds& measured);
+
+// Of the tree's texture; null where there is none. Fails where knows_texture() is false.
+Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const vdtree::VertexTree& tree);
+
+// The tree with these as measure_folds() keeps them.
+Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured,
+                                        std::vector<std::uint8_t> stage_of, std::vector<FoldStage> stages);
 
 } // namespace unseen::perception
