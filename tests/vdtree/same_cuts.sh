@@ -9,9 +9,9 @@ mkdir -p "$folder"
 launcher=()
 if command -v ccache >/dev/null; then launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
 
-variants=("-O0" "-O3")
+variants=("-Werror -O3 -DNDEBUG" "-O0") # the first ones are the preset release's, which ccache may have
 if grep -qw avx2 /proc/cpuinfo && grep -qw fma /proc/cpuinfo; then
-    variants+=("-O3 -mavx2 -mfma" "-O2 -march=native")
+    variants+=("-O3 -DNDEBUG -mavx2 -mfma")
 else
     echo "This processor has no AVX2 and fused operations: builds for such are left out."
 fi
