@@ -1,5 +1,5 @@
 // Hard cases of numbers in budgets, sums and long runs: entries of docs/numerics.md, like those of numerics_test.cpp. With
-// UNSEEN_NUMERICS=full in as many frames, terms and triangles as the catalogue says; else in some hundredths of that.
+// UNSEEN_NUMERICS=full in as many frames, terms and triangles as the catalogue says; else in a part of that.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
