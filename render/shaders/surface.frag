@@ -97,7 +97,10 @@ float visibility_of(int light, vec3 across, vec3 along) {
             // Texels first - 1 + i and the next one: in the order (i, j + 1), (i + 1, j + 1), (i + 1, j), (i, j).
             vec4 depths = textureGather(shadow_maps, vec3((first + vec2(i, j)) / size, float(layer)));
             vec2 off = vec2(i, j) - 1.0 - part;
-            vec4 own = here.z + texel * (gradient.x * (off.x + vec4(0, 1, 1, 0)) + gradient.y * (off.y + vec4(1, 1, 0, 0)));
+            // Not below 0, which empty texels have: else the plane, where it goes on behind its own end, would be hidden
+            // by nothing.
+            vec4 own = max(
+                here.z + texel * (gradient.x * (off.x + vec4(0, 1, 1, 0)) + gradient.y * (off.y + vec4(1, 1, 0, 0))), 0.0);
             vec4 open = clamp(1.0 + ((own - depths) / unit + bias_texels) / fading_texels, 0.0, 1.0);
             seen += dot(open, vec4(weights_x[i] * weights_y[j + 1], weights_x[i + 1] * weights_y[j + 1],
                                    weights_x[i + 1] * weights_y[j], weights_x[i] * weights_y[j]));

@@ -12,16 +12,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#ifdef UNSEEN_TEST_WITH_CGAL
-#include <CGAL/Cartesian.h>
-#include <CGAL/Exact_rational.h>
-#include <CGAL/Min_sphere_of_spheres_d.h>
-#include <CGAL/Min_sphere_of_spheres_d_traits_3.h>
-#endif
-
 #include <vdtree/builder.h>
 
 #include "exact.h"
+#include "exact_sphere.h"
 #include "shapes.h"
 #include "sound.h"
 
@@ -32,6 +26,9 @@ using shapes::random_between;
 using shapes::random_direction;
 using shapes::random_unit;
 using Points = std::vector<glm::dvec3>;
+#ifdef UNSEEN_TEST_WITH_CGAL
+using support::exact_radius;
+#endif
 
 // Of the radius: distances in double round a few times.
 constexpr double rounding = 1e-14;
@@ -111,22 +108,6 @@ std::vector<NamedPoints> point_sets() {
          }},
     };
 }
-
-#ifdef UNSEEN_TEST_WITH_CGAL
-// The radius of the smallest sphere around points and spheres, by rational arithmetic.
-double exact_radius(const Points& points, const std::vector<DSphere>& spheres = {}) {
-    using Number = CGAL::Exact_rational;
-    using Traits = CGAL::Min_sphere_of_spheres_d_traits_3<CGAL::Cartesian<Number>, Number>;
-    using Point = CGAL::Cartesian<Number>::Point_3;
-    CGAL::Min_sphere_of_spheres_d<Traits> smallest;
-    for (const glm::dvec3& p : points) smallest.insert(Traits::Sphere(Point(p.x, p.y, p.z), Number(0)));
-    for (const DSphere& s : spheres)
-        smallest.insert(Traits::Sphere(Point(s.centre.x, s.centre.y, s.centre.z), Number(s.radius)));
-    const auto radius = smallest.radius(); // a + b sqrt(c)
-    return CGAL::to_double(radius.first) +
-           CGAL::to_double(radius.second) * std::sqrt(CGAL::to_double(smallest.discriminant()));
-}
-#endif
 
 void expect_contains(const DSphere& sphere, const Points& points, const std::vector<DSphere>& spheres = {}) {
     for (const glm::dvec3& p : points) ASSERT_LE(glm::distance(p, sphere.centre), sphere.radius * (1 + rounding));

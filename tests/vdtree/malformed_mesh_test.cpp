@@ -527,6 +527,22 @@ TEST(MalformedMesh, GltfJsonMayNotBeNestedDeeply) {
     }
 }
 
+// The parser takes a NUL byte for the end, and what comes after it would not count.
+TEST(MalformedMesh, GltfJsonHasNoNulBytes) {
+    const std::string data = mesh_files::gltf_triangle_data();
+    const std::string json = mesh_files::gltf_triangle_json(
+        R"([{"mesh":0}])", R"({"byteLength":42,"uri":"data:;base64,)" + vtk_files::base64(data) + R"("})");
+    ASSERT_TRUE(is_read_or_refused(json, "a.gltf"));
+    for (const std::string& behind : {"\0"s, "\0{}"s, " \n\0"s})
+        EXPECT_THAT(error_of(json + behind, "a.gltf"), HasSubstr("a NUL byte, which no JSON contains"));
+    EXPECT_THAT(error_of("\0"s + json, "a.gltf"), HasSubstr("a.gltf: "));
+    // Chunks of GLB files may be filled up so, by less than a word.
+    std::string filled = mesh_files::gltf_triangle_json();
+    while (filled.size() % 4 != 1) filled += ' ';
+    EXPECT_TRUE(is_read_or_refused(mesh_files::glb(filled + "\0\0\0"s, data), "a.glb"));
+    EXPECT_THAT(error_of(mesh_files::glb(filled + "\0\0\0\0\0\0\0"s, data), "a.glb"), HasSubstr("a NUL byte"));
+}
+
 TEST(MalformedMesh, GltfInstancesMayNotMultiplyWithoutLimit) {
     // 20,000 nodes that show one mesh of 20,000 triangles: 600 kB that would become 400 million triangles.
     std::string data, nodes, list;

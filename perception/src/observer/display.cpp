@@ -153,6 +153,7 @@ PixelsPerDegree finest_pixels_per_degree(const Display& display) {
 
 PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre) {
     const double angle_deg = std::abs(from_centre.value());
+    if (std::isnan(angle_deg)) return PixelsPerDegree(angle_deg);
     const std::vector<PixelsPerDegreeAt>& lens = display.lens;
     if (lens.empty()) {
         constexpr double nearly_grazing_deg = 89.9;

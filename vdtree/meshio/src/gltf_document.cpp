@@ -86,11 +86,17 @@ Container split_glb(std::string_view bytes) {
         else if (type == chunk_bin && !container.bin) container.bin = chunk;
         at += size;
     }
+    // Chunks are filled up to words: with spaces, it is said, but some programs take NUL bytes.
+    constexpr int most_filling = 3;
+    for (int i = 0; i < most_filling && container.json_text.ends_with('\0'); ++i) container.json_text.remove_suffix(1);
     if (container.json_text.empty()) fail("it has no JSON chunk; the file is damaged.");
     return container;
 }
 
 json parse_json(std::string_view text) {
+    // The parser takes one for the end, whatever follows.
+    if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos)
+        fail("byte " + std::to_string(nul) + ": a NUL byte, which no JSON contains; the file is damaged.");
     check_structure(text);
     try {
         json document = json::parse(text.begin(), text.end());

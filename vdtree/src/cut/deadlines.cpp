@@ -37,6 +37,7 @@ void CutFront::clear() {
     size_ = 0;
     first_unplaced_ = 0;
     path_ = 0;
+    moves_ = 0;
     set_clocks(0, 0);
 }
 
@@ -273,13 +274,14 @@ void CutFront::move_to(const glm::dvec3& eye, double facing) {
     set_clocks(position_clock_, facing_clock_ + facing);
     if (blocks_.empty() || path == 0) return;
     path_ += path;
+    ++moves_;
     move_blocks(eye_high_, eye_low_, rounded_up(path), spheres_);
 }
 
 void CutFront::restart_clocks(double longest) {
     lights_.restart(longest);
     planes_.restart(longest);
-    if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
+    if (!(std::max({position_clock_, facing_clock_, path_}) > longest) && moves_ < most_moves) return;
     const double position = position_clock_, facing = facing_clock_;
     for (BlockId block = 0; block < blocks_.size(); ++block) {
         std::array<Slacks, block_slots> left;
@@ -292,6 +294,7 @@ void CutFront::restart_clocks(double longest) {
     }
     set_clocks(0, 0);
     path_ = 0;
+    moves_ = 0;
 }
 
 void CutFront::advance_lights(double light) {

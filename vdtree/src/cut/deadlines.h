@@ -114,7 +114,8 @@ public:
     // `view` may have changed by so much; what is unfolded in blocks wholly inside a frustum needs no test.
     void advance_lights(double light);
     void advance_planes(double planes, const KernelView& view);
-    // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
+    // Sets back what has grown beyond `longest`, or has been added to very often, so that deadlines in floats stay fine
+    // enough.
     void restart_clocks(double longest);
 
     // The slots that are due, until the next call. These get new deadlines.
@@ -132,6 +133,9 @@ private:
     static constexpr std::size_t appended_slots = 12; // a quarter is left for what comes later
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();
+    // Each move rounds the blocks' errors up by a share of 5e-7: so many by a twentieth, and a hundred times as many beyond
+    // all bounds, however small the moves are.
+    static constexpr int most_moves = 100'000;
 
     // What there is left until a slot is due, from now; 0 or more. `unfolded`: what the verdict is, which only growing
     // distances change; else only shrinking ones.
@@ -175,6 +179,7 @@ private:
     glm::dvec3 eye_{0};
     float eye_high_[3] = {}, eye_low_[3] = {};
     double path_ = 0; // since the clocks were restarted
+    int moves_ = 0;   // likewise
     double position_clock_ = 0, facing_clock_ = 0;
     float position_clock_float_ = 0;
     KernelClock facing_clock_float_;
