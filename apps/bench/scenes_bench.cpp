@@ -12,6 +12,7 @@
 #include <session_gpu/level_control.h>
 
 #include "bench_tools.h"
+#include "level_cuts.h"
 #include "made_scenes.h"
 #include "picture_judge.h"
 #include "terminal.h"
@@ -82,17 +83,8 @@ public:
         return row;
     }
 
-    // The cuts of a frame's levels. What is out of the window is whole where it may cast shadows into it, and else not
-    // there.
     std::vector<vdtree::Cut> cuts_of(const LevelControl& control, const session::LevelFrame& frame) const {
-        const auto& lights = session_->scene().lights;
-        const bool casts = lights && !lights->casting().empty();
-        std::vector<vdtree::Cut> cuts;
-        for (std::size_t i = 0; i < frame.levels.size(); ++i) {
-            if (frame.levels[i] >= 0) cuts.push_back(control.chain(i).cut(frame.levels[i]));
-            else if (cuts.emplace_back(session_->tree(i)); casts) cuts.back().unfold_all();
-        }
-        return cuts;
+        return level_cuts(*session_, control, frame);
     }
 
     Result<TreeWalk> walk(const TreeWalkOptions& how) const {
