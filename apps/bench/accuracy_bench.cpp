@@ -13,6 +13,7 @@
 #include "accuracy_plot.h"
 #include "bench_tools.h"
 #include "made_scenes.h"
+#include "progress_bar.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -36,7 +37,7 @@ const std::vector<AxisMeasure>& all_axes() {
           "Which fold test, threshold and budget, or which other simplification: what is left, whether it shows, and "
           "what a frame takes.",
           {"ms a frame, followed and drawn", "V: the largest difference that a judge sees, in thresholds", "triangles",
-           "pixels visible", "by the second judge", "SSIM", "largest shift, mm", "seconds of preparation",
+           "pixels visible", "by the second judge", "1 - SSIM", "largest shift, mm", "seconds of preparation",
            "bytes a triangle"},
           {{0, 1}, {2, 3}}},
          Of::all,
@@ -332,6 +333,7 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
     auto context = render::Context::headless();
     if (!context) return context.error();
     AccuracyBenchResult result;
+    Json seconds = Json::array(); // that the benchmark took
     for (const AxisMeasure* axis : axes) result.axes.push_back(axis->axis);
     const auto add = [&](const AccuracyAxis& axis, const std::string& subject,
                          Result<AccuracyPoints> points) -> Result<void> {
@@ -350,18 +352,34 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
         if (axis->of == Of::nothing)
             if (auto ok = add(axis->axis, "", axis->measure_alone(options)); !ok) return ok.error();
     const bool needs_models = std::ranges::any_of(axes, [](const AxisMeasure* a) { return a->of != Of::nothing; });
-    for (const std::string& file : needs_models ? models : std::vector<std::string>()) {
+    if (!needs_models) models.clear();
+    ProgressBar bar("Measuring");
+    const double steps = static_cast<double>(models.size() * (axes.size() + 1));
+    double step = 0;
+    for (const std::string& file : models) {
+        bar(step++ / steps, "loading");
         auto loaded = load_subject(file, *context, options);
         if (!loaded) return loaded.error();
-        for (const AxisMeasure* axis : axes)
-            if (axis->of != Of::nothing && axis->takes(loaded->subject.is_scene))
-                if (auto ok = add(axis->axis, loaded->subject.name, axis->measure(loaded->subject, options)); !ok)
-                    return ok.error();
+        for (const AxisMeasure* axis : axes) {
+            bar(step++ / steps, axis->axis.name.c_str());
+            if (axis->of == Of::nothing || !axis->takes(loaded->subject.is_scene)) continue;
+            const auto start = BenchClock::now();
+            if (auto ok = add(axis->axis, loaded->subject.name, axis->measure(loaded->subject, options)); !ok)
+                return ok.error();
+            seconds.push_back({{"axis", axis->axis.key},
+                               {"subject", loaded->subject.name},
+                               {"seconds", number_or_null(seconds_since(start))}});
+        }
     }
+    // Levels and pictures of depth are of scenes alone, and other axes of meshes.
+    std::erase_if(result.axes, [&](const AccuracyAxis& axis) {
+        return std::ranges::find(result.points, axis.key, &AccuracyPoint::axis) == result.points.end();
+    });
     find_fronts(result.axes, result.points);
     result.tables.push_back(defaults_table(result.axes, result.points));
     for (const AccuracyAxis& axis : result.axes) result.tables.push_back(axis_table(axis, result.points));
     result.json = to_json(result);
+    result.json["seconds"] = std::move(seconds);
     return result;
 }
 

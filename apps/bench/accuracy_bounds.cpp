@@ -439,10 +439,10 @@ Result<AccuracyPoints> facing_points(AccuracySubject& subject, const AccuracyBen
     add(
         "slabs, then mask of 6 x 8 x 8", sizeof(vdtree::NormalSlabs) + sizeof(vdtree::NormalMask),
         [&](std::size_t k, const Sight& s) { return facing(slabs[k], masks[k], s.to_eye, s.distance, s.radius); },
-        "the program's", true);
+        "the program's; here one by one, cuts test many at once", true);
     add(
-        "cone", 4 * sizeof(float), [&](std::size_t k, const Sight& s) { return cones[k].facing_of(s); }, "a twin",
-        false);
+        "cone", 4 * sizeof(float), [&](std::size_t k, const Sight& s) { return cones[k].facing_of(s); },
+        "a twin; cones around cones are wider than what they hold", false);
     add(
         "each triangle, exact", triangles * 2 * sizeof(glm::vec3),
         [&](std::size_t k, const Sight& s) { return facing_exactly(rings[k], s); },

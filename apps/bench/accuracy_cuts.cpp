@@ -141,10 +141,10 @@ Result<AccuracyPoints> cut_points(AccuracySubject& subject, const AccuracyBenchO
         }
         return points;
     }
-    for (const float hysteresis : {1.0f, 1.02f, 1.1f, 1.5f, 2.0f}) {
+    for (const double hysteresis : {1.0, 1.02, 1.1, 1.5, 2.0}) {
         session::Request within = budget;
-        within.hysteresis = hysteresis;
-        const bool is_default = hysteresis == session::Request().hysteresis;
+        within.hysteresis = static_cast<float>(hysteresis);
+        const bool is_default = within.hysteresis == session::Request().hysteresis;
         const std::string name = hysteresis == 1 ? "budget, exact" : "budget, hysteresis " + shortest(hysteresis);
         if (auto ok = add(name, within, false, is_default); !ok) return ok.error();
     }

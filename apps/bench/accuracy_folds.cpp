@@ -77,7 +77,7 @@ public:
         return AccuracyPoint{
             .name = name,
             .values = {median(std::move(times)), verdict->v, triangles, static_cast<double>(verdict->visible),
-                       static_cast<double>(verdict->second_visible), verdict->ssim, unknown, preparation_s, bytes},
+                       static_cast<double>(verdict->second_visible), 1 - verdict->ssim, unknown, preparation_s, bytes},
             .note = note};
     }
 
@@ -232,7 +232,7 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
         points.push_back(
             {.name = p.name,
              .values = {p.draw_ms + (std::isnan(p.follow_ms) ? 0 : p.follow_ms), p.v, static_cast<double>(p.triangles),
-                        static_cast<double>(p.visible_pixels), static_cast<double>(p.second_visible_pixels), p.ssim,
+                        static_cast<double>(p.visible_pixels), static_cast<double>(p.second_visible_pixels), 1 - p.ssim,
                         1e3 * p.shift, is_full ? 0 : subject.build_s + (is_error ? subject.measure_s : 0),
                         is_error ? bytes.measured : bytes.plain},
              .note = p.is_of_view ? "this view alone" : "",
@@ -250,7 +250,8 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
     const auto imperceptible = subject.session.simplify(subject.view, request);
     if (!imperceptible) return imperceptible.error();
     const double prepared_s = subject.build_s + subject.measure_s;
-    if (subject.session.scene().objects.size() > 1) {
+    const session::Scene& scene = subject.session.scene();
+    if (scene.objects.size() > 1 || !scene.backdrop.empty()) {
         const auto masked = session::simplify_as_seen(subject.session, subject.context, subject.view, request,
                                                       {.folds_hidden = true, .masking = session::Masking::scene});
         if (!masked) return masked.error();

@@ -117,7 +117,6 @@ Result<void> write_pictures(const AccuracyBenchResult& result, const std::string
                   height = static_cast<int>(AccuracyPlot::height) + title_height;
     for (const AccuracyAxis& axis : result.axes) {
         std::vector<std::string> subjects = subjects_of(result, axis);
-        if (subjects.empty()) continue;
         if (subjects.size() > 2) subjects = {subjects.front(), subjects.back()};
         auto drawing = Drawing::create(width, height * static_cast<int>(subjects.size()), plot_paper);
         if (!drawing) return drawing.error();

@@ -69,6 +69,7 @@ public:
         }
         if (style_ == TableStyle::markdown) return exit_done;
         if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        std::erase_if(outputs_, [](const std::string& file) { return !std::filesystem::exists(file); });
         print_written(outputs_);
         return exit_done;
     }
