@@ -44,7 +44,7 @@ Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyB
     constexpr double degrees_a_frame = 30.0 / 60;
     if (auto ok = add("no gaze", {}, true); !ok) return ok.error();
     if (auto ok = add("of this frame", gaze_at(0, 0), false); !ok) return ok.error();
-    for (const int frames : {1, 2, 4, 8, 16}) {
+    for (const int frames : {1, 4, 16}) {
         const double degrees = degrees_a_frame * frames;
         const std::string name = std::to_string(frames) + (frames == 1 ? " frame old" : " frames old");
         if (auto ok = add(name, gaze_at(degrees, 0), false); !ok) return ok.error();
@@ -61,7 +61,7 @@ Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const Accuracy
     double without = 0;
     for (const int served : {0, 1, 2, 4, 8}) { // frames; 0: no pictures
         TreeWalkOptions how;
-        how.frames = 24;
+        how.frames = 16;
         how.first_counted = 3;
         if (served > 0) how.occlusion = session::MovingOcclusionOptions{.frames = served};
         const auto walk = walk_tree(subject.session, subject.context, *renderer, subject.view, how);

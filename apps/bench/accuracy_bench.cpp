@@ -80,7 +80,7 @@ const std::vector<AxisMeasure>& all_axes() {
         {{"levels",
           "levels by masking",
           "What decides on discrete levels while the eye walks: recipe, layers, resolution and bits of maps, and how "
-          "often objects are tested.",
+          "often objects are tested. In half of the window.",
           {"ms a frame", "V at the end of the walk", "triangles", "pixels visible", "MB of textures"},
           {{0, 1}, {2, 3}}},
          Of::scenes,

@@ -16,20 +16,23 @@ namespace unseen::app {
 Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     using session::LevelControlOptions;
     constexpr int frames = 12;
-    const vdtree::View last = view_on_walk(subject.view, frames);
+    // Each setting is drawn until nothing changes any more, and then walked with: in half of the window.
+    vdtree::View first = subject.view;
+    first.width = std::max(first.width / 2, 1), first.height = std::max(first.height / 2, 1);
+    const vdtree::View last = view_on_walk(first, frames);
     auto judge = PictureJudge::create(subject.context, subject.session, last, options.samples);
     if (!judge) return judge.error();
     AccuracyPoints points;
     const auto add = [&](const std::string& name, const LevelControlOptions& how, bool is_default) -> Result<void> {
-        auto control = session::LevelControl::create(subject.context, subject.session, subject.view, how);
+        auto control = session::LevelControl::create(subject.context, subject.session, first, how);
         if (!control) return control.error();
-        if (const auto settled = control->settle(subject.view); !settled) return settled.error();
+        if (const auto settled = control->settle(first); !settled) return settled.error();
         std::vector<double> times;
         Result<session::LevelFrame> frame = session::LevelFrame();
         std::uint64_t bytes = 0;
         for (int i = 1; i <= frames; ++i) {
             const auto start = BenchClock::now();
-            frame = control->draw(view_on_walk(subject.view, i));
+            frame = control->draw(view_on_walk(first, i));
             if (!frame) return frame.error();
             if (const auto counted = control->wait(); !counted) return counted.error();
             times.push_back(1e3 * seconds_since(start));
