@@ -440,7 +440,7 @@ struct AccuracyArguments {
     AccuracyBenchOptions options;
     std::string csv, html, plots;
     ReportArguments report;
-    bool quick = false;
+    bool quick = false, brief = false;
 };
 
 // Written whole or not at all.
@@ -465,7 +465,8 @@ Result<int> run(AccuracyArguments& a) {
     if (auto ok = write_text(a.html, to_html(*result)); !ok) return ok.error();
     if (!a.plots.empty())
         if (auto ok = write_pictures(*result, a.plots); !ok) return ok.error();
-    return bench->close(result->json, result->tables);
+    const auto& tables = result->tables;
+    return bench->close(result->json, a.brief ? std::vector(tables.begin(), tables.begin() + 1) : tables);
 }
 
 Command accuracy_command(CLI::App& app) {
@@ -492,6 +493,7 @@ Command accuracy_command(CLI::App& app) {
     verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
+    verb->add_flag("--brief", a->brief, "Print the first table alone: what the defaults buy and cost");
     verb->add_flag("--quick", a->quick, "Fewer samples a pixel, fewer nodes, and less time");
     add_report_options(*verb, a->report);
     verb->callback([a] {
