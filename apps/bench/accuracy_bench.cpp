@@ -67,7 +67,7 @@ const std::vector<AxisMeasure>& all_axes() {
         {{"measurement",
           "fold measurement",
           "What the errors of folds are measured by, and whether what folds by them shows.",
-          {"seconds", "V", "triangles", "pixels visible"},
+          {"seconds", "V", "triangles", "pixels visible", "triangles from 8 times as far"},
           {{0, 1}, {2, 1}}},
          Of::meshes,
          measurement_points},

@@ -14,6 +14,17 @@
 #include "terminal.h"
 
 namespace unseen::app {
+namespace {
+
+// No pictures of the whole mesh, and so no node that folds by one.
+Result<vdtree::VertexTree> without_stages(const vdtree::VertexTree& tree) {
+    const auto none = tree.with_attribute("fold_stages", vdtree::AttributeDomain::tree, std::vector<float>());
+    if (!none) return none.error();
+    return none->with_attribute("fold_stage", vdtree::AttributeDomain::interior_node,
+                                std::vector<std::uint8_t>(tree.interior_count()));
+}
+
+} // namespace
 
 Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     // Measured once for each way: larger meshes take minutes.
@@ -35,17 +46,23 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
         request.reasons = false;
         const auto made = session->simplify(subject.view, request);
         if (!made) return made.error();
+        constexpr double times_as_far = 8;
+        vdtree::View far = subject.view;
+        far.eye = far.target + times_as_far * (far.eye - far.target);
+        const auto made_far = session->simplify(far, request);
+        if (!made_far) return made_far.error();
         auto renderer = session::SceneRenderer::create(subject.context, *session);
         if (!renderer) return renderer.error();
         const auto frame = renderer->draw(session::drawn_cuts(made->cuts), subject.view, judge->drawing());
         if (!frame) return frame.error();
         const auto verdict = judge->judge(*frame);
         if (!verdict) return verdict.error();
-        points.push_back({.name = name,
-                          .values = {seconds, verdict->v, static_cast<double>(made->stats.triangles),
-                                     static_cast<double>(verdict->visible)},
-                          .note = note,
-                          .is_default = is_default});
+        points.push_back(
+            {.name = name,
+             .values = {seconds, verdict->v, static_cast<double>(made->stats.triangles),
+                        static_cast<double>(verdict->visible), static_cast<double>(made_far->stats.triangles)},
+             .note = note,
+             .is_default = is_default});
         return {};
     };
     // Without what is measured of it, which is of the light that was conserved.
@@ -77,11 +94,7 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
         !ok)
         return ok.error();
     if (auto ok = add(
-            "without stages",
-            [&] {
-                return usual->with_attribute("fold_stage", vdtree::AttributeDomain::interior_node,
-                                             std::vector<std::uint8_t>(usual->interior_count()));
-            },
+            "without stages", [&] { return without_stages(*usual); },
             "what the pictures of the whole mesh add; its time is not told apart", false);
         !ok)
         return ok.error();
