@@ -12,6 +12,9 @@ namespace unseen::app {
 
 Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     session::Session& session = subject.session;
+    // Each gaze asks for criteria of its own, of every object: with many that takes minutes.
+    constexpr std::size_t most_objects = 16;
+    if (session.scene().objects.size() > most_objects) return AccuracyPoints();
     session::Request request{.purpose = session::Purpose::picture};
     request.reasons = false;
     // Whatever happens, the session is left without a gaze, as it was.
