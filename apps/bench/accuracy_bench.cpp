@@ -4,318 +4,298 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
+#include <map>
 #include <optional>
-#include <random>
 #include <utility>
 
-#include <perception/csf.h>
-#include <perception/person.h>
-#include <session/session.h>
-#include <session_gpu/moving_occlusion.h>
-#include <session_gpu/tradeoff.h>
-
+#include "accuracy_axes.h"
+#include "accuracy_plot.h"
 #include "bench_tools.h"
 #include "made_scenes.h"
+#include "progress_bar.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
-constexpr const char *fold_axis = "fold decision", *csf_axis = "contrast sensitivity", *cut_axis = "following a cut",
-                     *stale_axis = "age of a picture of depth";
+enum class Of { nothing, meshes, scenes, all };
 
-const std::vector<AccuracyAxis> all_axes = {
-    {fold_axis, "ms a frame, followed and drawn", "V: the largest difference that a judge sees, in thresholds",
-     "Which fold test, threshold and budget: what is left out, whether it shows, and what a frame takes."},
-    {csf_axis, "ns a look-up", "largest relative error against the closed form, where anything is seen",
-     "How sensitivity is known: by its formula, or by tables of so many samples an axis."},
-    {cut_axis, "us a frame", "triangles beyond those of the cut from scratch, of all",
-     "How a cut is kept at what a moving eye asks for."},
-    {stale_axis, "pictures a frame", "triangles kept, of those without occlusion",
-     "How long one picture of depth serves a moving eye: what it may not hide for that."}};
+struct AxisMeasure {
+    AccuracyAxis axis;
+    Of of = Of::all;
+    std::function<Result<AccuracyPoints>(AccuracySubject&, const AccuracyBenchOptions&)> measure = {};
+    std::function<Result<AccuracyPoints>(const AccuracyBenchOptions&)> measure_alone = {}; // of nothing
 
-// ---- fold decisions
-
-Result<std::vector<AccuracyPoint>> fold_points(session::Session& session, const render::Context& context,
-                                               const vdtree::View& view, const std::string& subject,
-                                               const AccuracyBenchOptions& options) {
-    session::TradeoffOptions tradeoff;
-    tradeoff.seconds = options.seconds;
-    tradeoff.samples = options.samples;
-    const auto measured = session::measure_tradeoff(session, context, view, tradeoff);
-    if (!measured) return measured.error();
-    std::vector<AccuracyPoint> points;
-    for (const session::TradeoffPoint& p : measured->points) {
-        AccuracyPoint point{fold_axis, subject, p.name};
-        point.time = p.draw_ms + (std::isnan(p.follow_ms) ? 0 : p.follow_ms);
-        point.error = p.v;
-        point.note = grouped(p.triangles) + " triangles, " + grouped(p.visible_pixels) + " px visible, " +
-                     grouped(p.second_visible_pixels) + " by the second judge, SSIM " +
-                     (std::isnan(p.ssim) ? "-" : rounded(p.ssim, 5)) + ", shift " + rounded(1e3 * p.shift, 2) + " mm" +
-                     (p.is_of_view ? ", this view alone" : "");
-        point.is_default = p.name == "imperceptible";
-        points.push_back(std::move(point));
-    }
-    return points;
-}
-
-// ---- contrast sensitivity
-
-struct Stimuli {
-    std::vector<double> cpd, degrees, cdm2;
+    bool takes(bool is_scene) const { return of == Of::all || of == (is_scene ? Of::scenes : Of::meshes); }
 };
 
-Stimuli random_stimuli(std::size_t count) {
-    std::mt19937_64 random(1);
-    const auto between = [&](double a, double b) {
-        return a + (b - a) * static_cast<double>(random() >> 11) * 0x1p-53;
-    };
-    Stimuli all;
-    for (std::size_t i = 0; i < count; ++i) {
-        all.cpd.push_back(std::exp2(between(-3, 5)));
-        all.degrees.push_back(between(0, 60));
-        all.cdm2.push_back(std::exp2(between(-3, 8)));
+const std::vector<AxisMeasure>& all_axes() {
+    static const std::vector<AxisMeasure> axes = {
+        {{"folds",
+          "fold decision",
+          "Which fold test, threshold and budget, or which other simplification: what is left, whether it shows, and "
+          "what a frame takes.",
+          {"ms a frame, followed and drawn", "V: the largest difference that a judge sees, in thresholds", "triangles",
+           "pixels visible", "by the second judge", "1 - SSIM", "largest shift, mm", "seconds of preparation",
+           "bytes a triangle"},
+          {{0, 1}, {2, 3}}},
+         Of::all,
+         fold_points},
+        {{"csf",
+          "contrast sensitivity",
+          "How sensitivity is known: by its formula, or by tables of so many samples an axis.",
+          {"ns a look-up", "largest relative error against the closed form, where anything is seen",
+           "95% err by less than", "bytes"}},
+         Of::nothing,
+         {},
+         csf_points},
+        {{"spheres",
+          "bounding spheres",
+          "What a node's support is enclosed by: spheres of the same points, against the exact smallest ones.",
+          {"us a node", "radius beyond the exact one, mean share", "largest share",
+           "points outside, largest share of the radius"}},
+         Of::meshes,
+         sphere_points},
+        {{"facing",
+          "facing",
+          "How a node knows that all of its ring faces the eye, or faces away, without a look at each triangle.",
+          {"ns a test", "false silhouettes, share of the tests that need none", "misses", "bytes a node"},
+          {{0, 1}, {3, 1}}},
+         Of::meshes,
+         facing_points},
+        {{"measurement",
+          "fold measurement",
+          "What the errors of folds are measured by, and whether what folds by them shows.",
+          {"seconds", "V", "triangles", "pixels visible", "triangles from 8 times as far"},
+          {{0, 1}, {2, 1}}},
+         Of::meshes,
+         measurement_points},
+        {{"maps",
+          "threshold maps",
+          "How the map of just visible steps of a picture is made, against the CPU's of the same recipe.",
+          {"ms a map", "relative error, 99% of pixels below", "median", "bytes a pixel of the picture"}},
+         Of::all,
+         map_points},
+        {{"levels",
+          "levels by masking",
+          "What decides on discrete levels while the eye walks: recipe, layers, resolution and bits of maps, and how "
+          "often objects are tested. In half of the window.",
+          {"ms a frame", "V at the end of the walk", "triangles", "pixels visible", "MB of textures"},
+          {{0, 1}, {2, 3}}},
+         Of::scenes,
+         level_points},
+        {{"cut",
+          "following a cut",
+          "How a cut is kept at what a moving eye asks for.",
+          {"us a frame", "triangles off those of the cut from scratch, share"}},
+         Of::all,
+         cut_points},
+        {{"tests",
+          "testing nodes",
+          "In which precision nodes are tested, all of them one by one, by extent.",
+          {"ns a node", "nodes decided otherwise than in double, share"}},
+         Of::meshes,
+         node_test_points},
+        {{"trees",
+          "trees",
+          "How vertices are clustered, and by how many threads: the surface at a tenth of the triangles.",
+          {"seconds to build", "mean distance of vertices from the surface, millionths of the extent",
+           "V, drawn in the default view", "bytes a triangle"}},
+         Of::meshes,
+         tree_points},
+        {{"gaze",
+          "age of a gaze",
+          "What shows when the cut is made for where the viewer looked some frames ago, and what a margin for that "
+          "costs. The gaze moves at 30 degrees a second; frames are 1/60 s.",
+          {"triangles, of those without a gaze", "V, for the gaze as it is by now", "pixels visible"}},
+         Of::all,
+         gaze_age_points},
+        {{"depth",
+          "age of a picture of depth",
+          "How long one picture of depth serves a moving eye: what it may not hide for that.",
+          {"pictures a frame", "triangles kept, of those without occlusion"}},
+         Of::scenes,
+         depth_age_points}};
+    return axes;
+}
+
+std::vector<const AxisMeasure*> wanted_axes(const AccuracyBenchOptions& options) {
+    std::vector<const AxisMeasure*> wanted;
+    for (const AxisMeasure& axis : all_axes())
+        if (options.only.empty() || std::ranges::find(options.only, axis.axis.key) != options.only.end())
+            wanted.push_back(&axis);
+    return wanted;
+}
+
+// ---- subjects
+
+struct LoadedSubject {
+    std::unique_ptr<session::Session> session;
+    AccuracySubject subject;
+};
+
+// Built and measured anew, whatever is kept: that is timed.
+Result<LoadedSubject> load_subject(const std::string& file, const render::Context& context,
+                                   const AccuracyBenchOptions& options) {
+    session::LoadOptions load;
+    load.as = session::LoadAs::automatic;
+    load.cache.is_off = true;
+    load.measures = false;
+    const auto start = BenchClock::now();
+    auto scene = session::Scene::load(file, load);
+    if (!scene) return scene.error();
+    const double build_s = seconds_since(start);
+    const bool is_scene = scene->is_of_file();
+    auto made = session::Session::create(std::move(*scene));
+    if (!made) return made.error();
+    auto session = std::make_unique<session::Session>(std::move(*made));
+    vdtree::View window;
+    window.width = window.height = options.window_px;
+    window.fov_y_degrees = perception::physical_field(session->observer().display, options.window_px).value();
+    const auto camera = session->camera_view(window);
+    constexpr double filled = 0.5; // of the window's height
+    const vdtree::View view = camera ? *camera : session->frame({0.6, 0.5, 0.62}, filled, window);
+    const auto begin = BenchClock::now();
+    if (const auto ready = session->prepare(view, {.purpose = session::Purpose::picture}); !ready) return ready.error();
+    session::Session& lasting = *session;
+    return LoadedSubject{std::move(session),
+                         {.name = std::filesystem::path(file).stem().string(),
+                          .session = lasting,
+                          .context = context,
+                          .view = view,
+                          .is_scene = is_scene,
+                          .build_s = build_s,
+                          .measure_s = seconds_since(begin)}};
+}
+
+// ---- fronts
+
+// Whether a beats b in both columns, or equals it in one.
+bool beats(const AccuracyPoint& a, const AccuracyPoint& b, std::array<std::size_t, 2> columns) {
+    const double ax = a.values[columns[0]], ay = a.values[columns[1]], bx = b.values[columns[0]],
+                 by = b.values[columns[1]];
+    return ax <= bx && ay <= by && (ax < bx || ay < by);
+}
+
+void find_fronts(const std::vector<AccuracyAxis>& axes, std::vector<AccuracyPoint>& points) {
+    for (AccuracyPoint& point : points) {
+        const auto axis = std::ranges::find(axes, point.axis, &AccuracyAxis::key);
+        point.is_on_front = std::isfinite(point.cost()) && std::isfinite(point.error()) &&
+                            std::ranges::none_of(points, [&](const AccuracyPoint& other) {
+                                return other.axis == point.axis && other.subject == point.subject &&
+                                       beats(other, point, axis->plots[0]);
+                            });
     }
-    return all;
 }
 
-std::vector<double> steps(double first, double last, int count, bool is_log) {
-    std::vector<double> values;
-    for (int i = 0; i < count; ++i) {
-        const double share = static_cast<double>(i) / (count - 1);
-        values.push_back(is_log ? first * std::pow(last / first, share) : first + share * (last - first));
-    }
-    return values;
-}
+// ---- tables
 
-// By the closed form, so many samples an axis.
-Result<perception::CsfTable> table_of(int samples) {
-    perception::CsfSamples s;
-    s.source = "castle, " + std::to_string(samples) + " samples an axis";
-    s.frequency_cpd = steps(1.0 / 16, 64, samples, true);
-    s.eccentricity_deg = steps(0, 120, samples, false);
-    s.luminance_cdm2 = steps(1e-3, 1e4, samples, true);
-    for (const double e : s.eccentricity_deg)
-        for (const double l : s.luminance_cdm2)
-            for (const double f : s.frequency_cpd)
-                s.sensitivity.push_back(std::max(
-                    perception::sensitivity(perception::CsfModel::castle,
-                                            perception::stimulus_of({}, perception::CyclesPerDegree(f),
-                                                                    perception::Degrees(e), perception::Luminance(l))),
-                    1e-6));
-    return perception::CsfTable::create(std::move(s));
-}
-
-Result<std::vector<AccuracyPoint>> csf_points(int repeats) {
-    constexpr std::size_t count = 100'000;
-    const Stimuli stimuli = random_stimuli(count);
-    std::vector<double> truth(count), found(count);
-    const auto timed = [&](const std::function<double(std::size_t)>& look_up, std::vector<double>& into) {
-        std::vector<double> times;
-        for (int i = 0; i < std::max(1, repeats / 3); ++i) {
-            const auto start = BenchClock::now();
-            for (std::size_t k = 0; k < count; ++k) into[k] = look_up(k);
-            times.push_back(1e9 * seconds_since(start) / count);
-        }
-        return median(std::move(times));
-    };
-    const auto arguments = [&](std::size_t k) {
-        return perception::stimulus_of({}, perception::CyclesPerDegree(stimuli.cpd[k]),
-                                       perception::Degrees(stimuli.degrees[k]), perception::Luminance(stimuli.cdm2[k]));
-    };
-    std::vector<AccuracyPoint> points;
-    AccuracyPoint closed{csf_axis, "castleCSF", "closed form, double"};
-    closed.time = timed(
-        [&](std::size_t k) { return perception::sensitivity(perception::CsfModel::castle, arguments(k)); }, truth);
-    points.push_back(closed);
-    const auto add = [&](const std::string& name, const perception::CsfTable& table, bool is_default) {
-        AccuracyPoint point{csf_axis, "castleCSF", name};
-        point.time = timed(
-            [&](std::size_t k) {
-                return table.sensitivity(perception::CyclesPerDegree(stimuli.cpd[k]),
-                                         perception::Degrees(stimuli.degrees[k]),
-                                         perception::Luminance(stimuli.cdm2[k]));
-            },
-            found);
-        for (std::size_t k = 0; k < count; ++k)
-            if (truth[k] > 1) point.error = std::max(point.error, std::abs(found[k] / truth[k] - 1));
-        const perception::CsfSamples& s = table.samples();
-        point.note = std::to_string(s.frequency_cpd.size()) + " x " + std::to_string(s.eccentricity_deg.size()) +
-                     " x " + std::to_string(s.luminance_cdm2.size()) + " samples, " +
-                     file_size(sizeof(double) * s.sensitivity.size());
-        point.is_default = is_default;
-        points.push_back(std::move(point));
-    };
-    for (const int samples : {16, 32, 64}) {
-        const auto table = table_of(samples);
-        if (!table) return table.error();
-        add("table, " + std::to_string(samples) + " an axis, linear", *table, false);
-    }
-    add("the program's table", perception::CsfTable::standard(), true);
-    return points;
-}
-
-// ---- cuts
-
-vdtree::View turned(const vdtree::View& view, double degrees) {
-    const double angle = degrees / perception::degrees_per_radian;
-    const glm::dvec3 from = view.eye - view.target;
-    vdtree::View other = view;
-    other.eye = view.target + glm::dvec3(std::cos(angle) * from.x + std::sin(angle) * from.z, from.y,
-                                         std::cos(angle) * from.z - std::sin(angle) * from.x);
-    return other;
-}
-
-Result<std::vector<AccuracyPoint>> cut_points(session::Session& session, const vdtree::View& view,
-                                              const std::string& subject, int repeats) {
-    constexpr double degrees_a_frame = 0.1;
-    session::Request imperceptible{.purpose = session::Purpose::picture};
-    imperceptible.reasons = false;
-    session::Request budget = imperceptible;
-    const auto first = session.simplify(view, imperceptible);
-    if (!first) return first.error();
-    budget.goal = session::Goal::budget(std::max<vdtree::Index>(first->stats.triangles / 2, 1));
-    const Pinned pinned;
-    std::vector<AccuracyPoint> points;
-    const auto add = [&](const std::string& name, const session::Request& request, bool is_from_scratch,
-                         bool is_default) -> Result<void> {
-        AccuracyPoint point{cut_axis, subject, name};
-        point.is_default = is_default;
-        session::Request exact = request;
-        exact.hysteresis = 1;
-        exact.milliseconds.reset();
-        session::Follower follower(session);
-        std::vector<double> times;
-        for (int i = 0; i < repeats + 2; ++i) {
-            const vdtree::View now = turned(view, degrees_a_frame * i);
-            if (is_from_scratch) follower = session::Follower(session);
-            const auto start = BenchClock::now();
-            const auto made = follower.follow(now, request);
-            if (!made) return made.error();
-            if (i > 1) times.push_back(1e6 * seconds_since(start));
-            const auto truth = session.simplify(now, exact);
-            if (!truth) return truth.error();
-            const double all = std::max<double>(1, truth->stats.triangles);
-            point.error = std::max(point.error, std::abs(static_cast<double>(made->stats.triangles) / all - 1));
-        }
-        point.time = median(std::move(times));
-        points.push_back(std::move(point));
-        return {};
-    };
-    session::Request still = budget, limited = imperceptible;
-    still.hysteresis = 1;
-    limited.milliseconds = 0.2;
-    if (auto ok = add("imperceptible, from scratch", imperceptible, true, false); !ok) return ok.error();
-    if (auto ok = add("imperceptible, followed", imperceptible, false, true); !ok) return ok.error();
-    if (auto ok = add("imperceptible, followed, 0.2 ms at most", limited, false, false); !ok) return ok.error();
-    if (session.scene().objects.size() > 1) return points;
-    if (auto ok = add("budget, exact", still, false, false); !ok) return ok.error();
-    if (auto ok = add("budget, hysteresis 1.1", budget, false, true); !ok) return ok.error();
-    return points;
-}
-
-// ---- pictures of depth
-
-Result<std::vector<AccuracyPoint>> stale_points(session::Session& session, const render::Context& context,
-                                                const vdtree::View& first, const std::string& subject) {
-    constexpr int frames = 24;
-    constexpr double metres_a_frame = 1.5 / 60;
-    std::vector<AccuracyPoint> points;
-    double without = 0;
-    for (const int served : {0, 1, 2, 4, 8}) { // frames; 0: no pictures
-        std::optional<session::MovingOcclusion> occlusion;
-        if (served > 0) {
-            auto made = session::MovingOcclusion::create(context, session, {.frames = served});
-            if (!made) return made.error();
-            occlusion = std::move(*made);
-        }
-        auto renderer = session::SceneRenderer::create(context, session);
-        if (!renderer) return renderer.error();
-        session::Follower follower(session);
-        session::Request request{.purpose = session::Purpose::picture};
-        request.reasons = false;
-        vdtree::View view = first;
-        const glm::dvec3 step = metres_a_frame * glm::normalize(view.target - view.eye);
-        double triangles = 0;
-        for (int i = 0; i < frames; ++i, view.eye += step, view.target += step) {
-            if (occlusion) {
-                auto hidden = occlusion->begin_frame(view);
-                if (!hidden) return hidden.error();
-                request.hidden = std::move(*hidden);
-            }
-            const auto made = follower.follow(view, request);
-            if (!made) return made.error();
-            if (i >= 3) triangles += static_cast<double>(made->stats.triangles); // the first ones have no pictures yet
-            if (!occlusion) continue;
-            const auto cuts = session::drawn_cuts(follower, session.scene().objects.size());
-            const auto items = renderer->items(cuts, view);
-            if (!items) return items.error();
-            if (auto ended = occlusion->end_frame(*items, view, 0); !ended) return ended.error();
-        }
-        if (served == 0) without = triangles;
-        AccuracyPoint point{stale_axis, subject,
-                            served == 0 ? "no pictures"
-                                        : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames")};
-        if (occlusion) point.time = static_cast<double>(occlusion->facts().pictures) / frames;
-        point.error = triangles / std::max(without, 1.0);
-        point.is_default = served == session::MovingOcclusionOptions().frames;
-        points.push_back(std::move(point));
-    }
-    return points;
-}
-
-// ---- all of it
-
-void find_fronts(std::vector<AccuracyPoint>& points) {
-    for (AccuracyPoint& point : points)
-        point.is_on_front = std::ranges::none_of(points, [&](const AccuracyPoint& other) {
-            return other.axis == point.axis && other.subject == point.subject && other.time <= point.time &&
-                   other.error <= point.error && (other.time < point.time || other.error < point.error);
-        });
-}
-
-std::string shown(double value) { return value == 0 ? "0" : rounded(value, 3); }
-
-BenchTable table_of(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
+BenchTable axis_table(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
     BenchTable table;
     table.title = axis.name + ": " + axis.question;
-    table.rows.push_back({"of", "", axis.time_unit, axis.error_unit, "", ""});
-    for (const AccuracyPoint& p : points)
-        if (p.axis == axis.name)
-            table.rows.push_back({p.subject, p.name, shown(p.time), shown(p.error),
-                                  std::string(p.is_on_front ? "*" : "") + (p.is_default ? " default" : ""), p.note});
-    table.notes.push_back("* on the front: no other is both faster and nearer to the truth.");
-    return table;
-}
-
-BenchTable defaults_table(const std::vector<AccuracyPoint>& points) {
-    BenchTable table;
-    table.title = "What the defaults cost, and are off by";
-    table.rows.push_back({"axis", "of", "default", "time", "error", "on the front"});
+    std::vector<std::string> header = {"of", ""};
+    header.insert(header.end(), axis.columns.begin(), axis.columns.end());
+    header.insert(header.end(), {"", ""});
+    table.rows.push_back(std::move(header));
     for (const AccuracyPoint& p : points) {
-        if (!p.is_default) continue;
-        const auto axis = std::ranges::find(all_axes, p.axis, &AccuracyAxis::name);
-        table.rows.push_back({p.axis, p.subject, p.name, shown(p.time) + " " + axis->time_unit, shown(p.error),
-                              p.is_on_front ? "yes" : "no"});
+        if (p.axis != axis.key) continue;
+        std::vector<std::string> row = {p.subject, p.name};
+        for (const double value : p.values) row.push_back(accuracy_number(value));
+        row.push_back(std::string(p.is_on_front ? "*" : "") + (p.is_default ? " default" : ""));
+        row.push_back(p.note);
+        table.rows.push_back(std::move(row));
     }
+    table.notes.push_back("* on the front: no other costs less and is nearer to the truth.");
     return table;
 }
 
-Json to_json(const std::vector<AccuracyPoint>& points) {
-    Json list = Json::array();
+// One choice over all subjects.
+struct Choice {
+    std::vector<double> cost_ratios; // to the default's of the same subject
+    double worst_error = 0;
+};
+
+// What the default of an axis is among its other choices: of all subjects, the largest error, and the median of cost.
+std::vector<std::vector<std::string>> default_rows(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
+    std::vector<std::string> defaults;
     for (const AccuracyPoint& p : points)
-        list.push_back({{"axis", p.axis},
-                        {"subject", p.subject},
-                        {"name", p.name},
-                        {"time", number_or_null(p.time)},
-                        {"error", number_or_null(p.error)},
-                        {"default", p.is_default},
-                        {"pareto", p.is_on_front},
-                        {"note", p.note}});
-    return list;
+        if (p.axis == axis.key && p.is_default && std::ranges::find(defaults, p.name) == defaults.end())
+            defaults.push_back(p.name);
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& name : defaults) {
+        std::vector<double> costs;
+        double worst = 0;
+        std::map<std::string, Choice> others;
+        for (const AccuracyPoint& d : points) {
+            if (d.axis != axis.key || !d.is_default || d.name != name) continue;
+            costs.push_back(d.cost());
+            worst = std::max(worst, d.error());
+            for (const AccuracyPoint& p : points) {
+                if (p.axis != axis.key || p.subject != d.subject || p.is_default || std::isnan(p.cost()) ||
+                    std::isnan(p.error()))
+                    continue;
+                Choice& choice = others[p.name];
+                if (d.cost() > 0) choice.cost_ratios.push_back(p.cost() / d.cost());
+                choice.worst_error = std::max(choice.worst_error, p.error());
+            }
+        }
+        const std::pair<const std::string, Choice>*cheapest = nullptr, *nearest = nullptr;
+        const auto ratio = [](const Choice& c) {
+            return c.cost_ratios.empty() ? std::numeric_limits<double>::infinity() : median(c.cost_ratios);
+        };
+        for (const auto& other : others) {
+            if (!cheapest || ratio(other.second) < ratio(cheapest->second)) cheapest = &other;
+            const auto key = [&](const Choice& c) { return std::pair(c.worst_error, ratio(c)); };
+            if (!nearest || key(other.second) < key(nearest->second)) nearest = &other;
+        }
+        const auto cell = [&](const std::pair<const std::string, Choice>* other) {
+            if (!other) return std::string();
+            const double times = ratio(other->second);
+            return other->first + ": " + (std::isfinite(times) ? accuracy_number(times) + " x, " : "") +
+                   accuracy_number(other->second.worst_error);
+        };
+        rows.push_back({axis.name, name, accuracy_number(median(costs)) + " " + axis.columns[0], accuracy_number(worst),
+                        axis.columns[1], cell(cheapest), cell(nearest)});
+    }
+    return rows;
 }
 
-std::string quoted(const std::string& text) {
+BenchTable defaults_table(const std::vector<AccuracyAxis>& axes, const std::vector<AccuracyPoint>& points) {
+    BenchTable table;
+    table.title = "What the defaults buy and cost";
+    table.rows.push_back({"of", "default", "cost", "error", "which is", "cheapest instead: cost, error",
+                          "most exact instead: cost, error"});
+    for (const AccuracyAxis& axis : axes)
+        for (std::vector<std::string>& row : default_rows(axis, points)) table.rows.push_back(std::move(row));
+    table.notes.push_back(
+        "Costs are medians over the models, in the last two columns in times the default's; errors are "
+        "the largest of all models.");
+    return table;
+}
+
+// ---- files
+
+Json to_json(const AccuracyBenchResult& result) {
+    Json axes = Json::array(), points = Json::array();
+    for (const AccuracyAxis& axis : result.axes)
+        axes.push_back(
+            {{"key", axis.key}, {"name", axis.name}, {"question", axis.question}, {"columns", axis.columns}});
+    for (const AccuracyPoint& p : result.points) {
+        Json values = Json::array();
+        for (const double value : p.values) values.push_back(number_or_null(value));
+        points.push_back({{"axis", p.axis},
+                          {"subject", p.subject},
+                          {"name", p.name},
+                          {"values", std::move(values)},
+                          {"default", p.is_default},
+                          {"pareto", p.is_on_front},
+                          {"note", p.note}});
+    }
+    return {{"axes", std::move(axes)}, {"points", std::move(points)}};
+}
+
+std::string csv_quoted(const std::string& text) {
     std::string out = "\"";
     for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
     return out + "\"";
@@ -323,7 +303,23 @@ std::string quoted(const std::string& text) {
 
 } // namespace
 
+std::vector<std::string> accuracy_axis_keys() {
+    std::vector<std::string> keys;
+    for (const AxisMeasure& axis : all_axes()) keys.push_back(axis.axis.key);
+    return keys;
+}
+
+std::vector<bool> accuracy_front(const std::vector<AccuracyPoint>& points, std::array<std::size_t, 2> columns) {
+    std::vector<bool> front;
+    for (const AccuracyPoint& point : points)
+        front.push_back(
+            std::isfinite(point.values[columns[0]]) && std::isfinite(point.values[columns[1]]) &&
+            std::ranges::none_of(points, [&](const AccuracyPoint& other) { return beats(other, point, columns); }));
+    return front;
+}
+
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) {
+    const std::vector<const AxisMeasure*> axes = wanted_axes(options);
     std::vector<std::string> models = options.models;
     std::optional<MadeScenes> made;
     const bool is_default = models.empty();
@@ -337,48 +333,70 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
     auto context = render::Context::headless();
     if (!context) return context.error();
     AccuracyBenchResult result;
-    result.axes = all_axes;
-    const auto add = [&](Result<std::vector<AccuracyPoint>> points) -> Result<void> {
-        if (!points) return points.error();
-        result.points.insert(result.points.end(), points->begin(), points->end());
+    Json seconds = Json::array(); // that the benchmark took
+    for (const AxisMeasure* axis : axes) result.axes.push_back(axis->axis);
+    const auto add = [&](const AccuracyAxis& axis, const std::string& subject,
+                         Result<AccuracyPoints> points) -> Result<void> {
+        if (!points)
+            return Error{points.error().code,
+                         axis.name + (subject.empty() ? "" : " of " + subject) + ": " + points.error().message};
+        for (AccuracyPoint& point : *points) {
+            point.axis = axis.key;
+            if (point.subject.empty()) point.subject = subject;
+            point.values.resize(axis.columns.size(), std::numeric_limits<double>::quiet_NaN());
+            result.points.push_back(std::move(point));
+        }
         return {};
     };
-    if (auto ok = add(csf_points(options.repeats)); !ok) return ok.error();
+    for (const AxisMeasure* axis : axes)
+        if (axis->of == Of::nothing)
+            if (auto ok = add(axis->axis, "", axis->measure_alone(options)); !ok) return ok.error();
+    const bool needs_models = std::ranges::any_of(axes, [](const AxisMeasure* a) { return a->of != Of::nothing; });
+    if (!needs_models) models.clear();
+    ProgressBar bar("Measuring");
+    const double steps = static_cast<double>(models.size() * (axes.size() + 1));
+    double step = 0;
     for (const std::string& file : models) {
-        session::LoadOptions load;
-        load.as = session::LoadAs::automatic;
-        auto scene = session::Scene::load(file, load);
-        if (!scene) return scene.error();
-        const bool is_scene = scene->is_of_file();
-        auto session = session::Session::create(std::move(*scene));
-        if (!session) return session.error();
-        vdtree::View window;
-        window.width = window.height = options.window_px;
-        window.fov_y_degrees = perception::physical_field(session->observer().display, options.window_px).value();
-        const auto camera = session->camera_view(window);
-        constexpr double filled = 0.5; // of the window's height
-        const vdtree::View view = camera ? *camera : session->frame({0.6, 0.5, 0.62}, filled, window);
-        if (const auto ready = session->prepare(view, {.purpose = session::Purpose::picture}); !ready)
-            return ready.error();
-        const std::string name = std::filesystem::path(file).stem().string();
-        if (auto ok = add(fold_points(*session, *context, view, name, options)); !ok) return ok.error();
-        if (auto ok = add(cut_points(*session, view, name, options.repeats)); !ok) return ok.error();
-        if (is_scene)
-            if (auto ok = add(stale_points(*session, *context, view, name)); !ok) return ok.error();
+        bar(step++ / steps, "loading");
+        auto loaded = load_subject(file, *context, options);
+        if (!loaded) return loaded.error();
+        for (const AxisMeasure* axis : axes) {
+            bar(step++ / steps, axis->axis.name.c_str());
+            if (axis->of == Of::nothing || !axis->takes(loaded->subject.is_scene)) continue;
+            const auto start = BenchClock::now();
+            if (auto ok = add(axis->axis, loaded->subject.name, axis->measure(loaded->subject, options)); !ok)
+                return ok.error();
+            seconds.push_back({{"axis", axis->axis.key},
+                               {"subject", loaded->subject.name},
+                               {"seconds", number_or_null(seconds_since(start))}});
+        }
     }
-    find_fronts(result.points);
-    result.tables.push_back(defaults_table(result.points));
-    for (const AccuracyAxis& axis : result.axes) result.tables.push_back(table_of(axis, result.points));
-    result.json = {{"points", to_json(result.points)}};
+    // Levels and pictures of depth are of scenes alone, and other axes of meshes.
+    std::erase_if(result.axes, [&](const AccuracyAxis& axis) {
+        return std::ranges::find(result.points, axis.key, &AccuracyPoint::axis) == result.points.end();
+    });
+    find_fronts(result.axes, result.points);
+    result.tables.push_back(defaults_table(result.axes, result.points));
+    for (const AccuracyAxis& axis : result.axes) result.tables.push_back(axis_table(axis, result.points));
+    result.json = to_json(result);
+    result.json["seconds"] = std::move(seconds);
     return result;
 }
 
 std::string to_csv(const AccuracyBenchResult& result) {
-    std::string text = "axis,subject,name,time,error,default,pareto,note\n";
-    for (const AccuracyPoint& p : result.points)
-        text += quoted(p.axis) + "," + quoted(p.subject) + "," + quoted(p.name) + "," + shortest(p.time) + "," +
-                shortest(p.error) + "," + (p.is_default ? "1" : "0") + "," + (p.is_on_front ? "1" : "0") + "," +
-                quoted(p.note) + "\n";
+    std::string text = "axis,subject,name,default,pareto,cost,cost_unit,error,error_unit,more,note\n";
+    for (const AccuracyPoint& p : result.points) {
+        const auto axis = std::ranges::find(result.axes, p.axis, &AccuracyAxis::key);
+        const auto number = [](double value) { return std::isfinite(value) ? shortest(value) : std::string(); };
+        std::string more;
+        for (std::size_t i = 2; i < p.values.size(); ++i)
+            if (std::isfinite(p.values[i]))
+                more += (more.empty() ? "" : "; ") + axis->columns[i] + " = " + shortest(p.values[i]);
+        text += p.axis + "," + csv_quoted(p.subject) + "," + csv_quoted(p.name) + "," + (p.is_default ? "1" : "0") +
+                "," + (p.is_on_front ? "1" : "0") + "," + number(p.cost()) + "," + csv_quoted(axis->columns[0]) + "," +
+                number(p.error()) + "," + csv_quoted(axis->columns[1]) + "," + csv_quoted(more) + "," +
+                csv_quoted(p.note) + "\n";
+    }
     return text;
 }
 

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iterator>
 #include <memory>
 
@@ -68,6 +69,7 @@ public:
         }
         if (style_ == TableStyle::markdown) return exit_done;
         if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        std::erase_if(outputs_, [](const std::string& file) { return !std::filesystem::exists(file); });
         print_written(outputs_);
         return exit_done;
     }
@@ -436,9 +438,9 @@ Command scenes_command(CLI::App& app) {
 
 struct AccuracyArguments {
     AccuracyBenchOptions options;
-    std::string csv, html;
+    std::string csv, html, plots;
     ReportArguments report;
-    bool quick = false;
+    bool quick = false, brief = false;
 };
 
 // Written whole or not at all.
@@ -451,18 +453,25 @@ Result<void> write_text(const std::string& file, const std::string& text) {
 }
 
 Result<int> run(AccuracyArguments& a) {
-    auto bench = BenchRun::open(a.options.models, {a.csv, a.html}, a.report);
+    std::vector<std::string> outputs = {a.csv, a.html};
+    if (!a.plots.empty())
+        for (const std::string& key : a.options.only.empty() ? accuracy_axis_keys() : a.options.only)
+            outputs.push_back((std::filesystem::path(a.plots) / accuracy_picture_name(key)).string());
+    auto bench = BenchRun::open(a.options.models, outputs, a.report);
     if (!bench) return bench.error();
     const auto result = bench_accuracy(a.options);
     if (!result) return result.error();
     if (auto ok = write_text(a.csv, to_csv(*result)); !ok) return ok.error();
     if (auto ok = write_text(a.html, to_html(*result)); !ok) return ok.error();
-    return bench->close(result->json, result->tables);
+    if (!a.plots.empty())
+        if (auto ok = write_pictures(*result, a.plots); !ok) return ok.error();
+    const auto& tables = result->tables;
+    return bench->close(result->json, a.brief ? std::vector(tables.begin(), tables.begin() + 1) : tables);
 }
 
 Command accuracy_command(CLI::App& app) {
     auto a = std::make_shared<AccuracyArguments>();
-    CLI::App* verb = app.add_subcommand("accuracy", "What accuracy costs in time: error against time for each choice");
+    CLI::App* verb = app.add_subcommand("accuracy", "What accuracy costs: error against cost for each choice");
     verb->add_option(
             "MODEL", a->options.models,
             "Meshes, trees and scenes (default: the meshes that are installed, and the scenes of 'unseen scene "
@@ -472,19 +481,29 @@ Command accuracy_command(CLI::App& app) {
     verb->add_option("--csv", a->csv, "One line a point")->type_name("FILE.csv");
     verb->add_option("--html", a->html, "A page with plots, for browsers; it needs no other file")
         ->type_name("FILE.html");
+    verb->add_option("--plots", a->plots, "A folder for a plot of each axis, accuracy_AXIS.png")->type_name("FOLDER");
+    std::string keys;
+    for (const std::string& key : accuracy_axis_keys()) keys += (keys.empty() ? "" : ", ") + key;
+    verb->add_option("--only", a->options.only, "These axes alone, of " + keys + "; may be given again (default: all)")
+        ->type_name("AXIS")
+        ->check(one_of(accuracy_axis_keys()));
     verb->add_option("--seconds", a->options.seconds, "For the ways to fold of each model (default: 45)")
         ->type_name("T")
         ->check(positive());
     verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
-    verb->add_flag("--quick", a->quick, "Fewer samples a pixel, and less time");
+    verb->add_flag("--brief", a->brief, "Print the first table alone: what the defaults buy and cost");
+    verb->add_flag("--quick", a->quick, "Fewer samples a pixel, fewer nodes, and less time");
     add_report_options(*verb, a->report);
     verb->callback([a] {
-        if (a->quick) a->options.samples = 16, a->options.seconds = std::min(a->options.seconds, 15.0);
+        if (!a->quick) return;
+        a->options.samples = 16, a->options.nodes = 500;
+        a->options.seconds = std::min(a->options.seconds, 15.0);
     });
     verb->footer("Examples:\n  unseen-bench accuracy --quick\n"
-                 "  unseen-bench accuracy mine.glb part.stl --html accuracy.html --csv accuracy.csv");
+                 "  unseen-bench accuracy mine.glb part.stl --html accuracy.html --csv accuracy.csv\n"
+                 "  unseen-bench accuracy bunny.ply --only spheres --only facing --plots plots");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -25,6 +25,9 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pi
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions&) { return no_pictures(); }
 std::string to_csv(const AccuracyBenchResult&) { return {}; }
 std::string to_html(const AccuracyBenchResult&) { return {}; }
+std::vector<std::string> accuracy_axis_keys() { return {}; }
+std::string accuracy_picture_name(const std::string&) { return {}; }
+Result<void> write_pictures(const AccuracyBenchResult&, const std::string&) { return no_pictures(); }
 std::vector<std::string> fit_factors() { return {}; }
 
 } // namespace unseen::app

@@ -7,17 +7,16 @@
 #include <optional>
 #include <utility>
 
-#include <perception/judge.h>
 #include <session/session.h>
 #include <session_gpu/as_seen.h>
-#include <session_gpu/frame_image.h>
 #include <session_gpu/level_control.h>
-#include <session_gpu/moving_occlusion.h>
-#include <session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
+#include "level_cuts.h"
 #include "made_scenes.h"
+#include "picture_judge.h"
 #include "terminal.h"
+#include "tree_walk.h"
 
 namespace unseen::app {
 namespace {
@@ -65,15 +64,12 @@ public:
     const vdtree::View& view() const { return view_; }
 
     Result<Row> judge(std::string method, const std::vector<vdtree::Cut>& cuts, double seconds) {
-        const auto picture = draw(cuts);
-        if (!picture) return picture.error();
+        const auto verdict = judge_->judge(cuts);
+        if (!verdict) return verdict.error();
         Row row{.method = std::move(method), .seconds = seconds};
         for (const vdtree::Cut& cut : cuts) row.triangles += cut.triangle_count();
-        const auto verdict = judge_->judge(*picture), second = second_->judge(*picture);
-        if (!verdict) return verdict.error();
-        if (!second) return second.error();
-        row.visible = verdict->visible_pixels, row.v = verdict->max_ratio;
-        row.second_visible = second->visible_pixels, row.second_v = second->max_ratio;
+        row.visible = verdict->visible, row.v = verdict->v;
+        row.second_visible = verdict->second_visible, row.second_v = verdict->second_v;
         return row;
     }
 
@@ -87,31 +83,13 @@ public:
         return row;
     }
 
-    // The cuts of a frame's levels. What is out of the window is whole where it may cast shadows into it, and else not
-    // there.
     std::vector<vdtree::Cut> cuts_of(const LevelControl& control, const session::LevelFrame& frame) const {
-        const auto& lights = session_->scene().lights;
-        const bool casts = lights && !lights->casting().empty();
-        std::vector<vdtree::Cut> cuts;
-        for (std::size_t i = 0; i < frame.levels.size(); ++i) {
-            if (frame.levels[i] >= 0) cuts.push_back(control.chain(i).cut(frame.levels[i]));
-            else if (cuts.emplace_back(session_->tree(i)); casts) cuts.back().unfold_all();
-        }
-        return cuts;
+        return level_cuts(*session_, control, frame);
     }
 
-    // Of a cut alone, one sample a pixel: what a moving view draws.
-    Result<void> draw_frame(const session::Follower& follower, const vdtree::View& view) {
-        render::DrawOptions drawing;
-        drawing.samples = 1;
-        drawing.background = session_->background();
-        const auto cuts = session::drawn_cuts(follower, session_->scene().objects.size());
-        const auto frame = renderer_->draw(cuts, view, drawing);
-        if (!frame) return frame.error();
-        return {};
+    Result<TreeWalk> walk(const TreeWalkOptions& how) const {
+        return walk_tree(*session_, context_, judge_->renderer(), view_, how);
     }
-    const session::SceneRenderer& renderer() const { return *renderer_; }
-    const render::Context& context() const { return context_; }
 
     Result<LevelControl> levels(const session::LevelControlOptions& how) const {
         return LevelControl::create(context_, *session_, view_, how);
@@ -126,32 +104,10 @@ private:
     Result<void> prepare() {
         const session::Request request{.purpose = session::Purpose::picture};
         if (const auto prepared = session_->prepare(view_, request); !prepared) return prepared.error();
-        auto renderer = session::SceneRenderer::create(context_, *session_);
-        if (!renderer) return renderer.error();
-        renderer_ = std::make_unique<session::SceneRenderer>(std::move(*renderer));
-        std::vector<vdtree::Cut> whole;
-        for (std::size_t i = 0; i < session_->scene().objects.size(); ++i)
-            whole.emplace_back(session_->tree(i)).unfold_all();
-        const auto full = draw(whole);
-        if (!full) return full.error();
-        const perception::Display& display = session_->observer().display;
-        auto judge = perception::Judge::create(*full, session::judge_options(session_->observer()));
-        auto second =
-            perception::Judge::create(*full, perception::second_judge_options(session_->observer().person, display));
+        auto judge = PictureJudge::create(context_, *session_, view_, options_.samples);
         if (!judge) return judge.error();
-        if (!second) return second.error();
-        judge_ = std::make_unique<perception::Judge>(std::move(*judge));
-        second_ = std::make_unique<perception::Judge>(std::move(*second));
+        judge_ = std::make_unique<PictureJudge>(std::move(*judge));
         return {};
-    }
-
-    Result<perception::Image> draw(const std::vector<vdtree::Cut>& cuts) {
-        render::DrawOptions drawing;
-        drawing.samples = options_.samples;
-        drawing.background = session_->background();
-        const auto frame = renderer_->draw(session::drawn_cuts(cuts), view_, drawing);
-        if (!frame) return frame.error();
-        return session::luminance_image(*frame, session_->observer().display);
     }
 
     const render::Context& context_;
@@ -159,8 +115,7 @@ private:
     std::unique_ptr<session::Session> session_;
     vdtree::View view_;
     const ScenesBenchOptions& options_;
-    std::unique_ptr<session::SceneRenderer> renderer_;
-    std::unique_ptr<perception::Judge> judge_, second_;
+    std::unique_ptr<PictureJudge> judge_;
 };
 
 // ---- triangles and what shows
@@ -314,66 +269,17 @@ Result<Walk> walk(JudgedScene& scene, int frames) {
 
 // ---- the same walk with one cut an object
 
-// At walking speed, and so many frames a second.
-constexpr double walking_m_s = 1.5, frames_a_second = 60;
-constexpr int tree_frames = 40; // enough for a try of what is not always on
-
-struct TreeWalk {
-    double triangles = 0, frame_ms = 0, occlusion_ms = 0; // means, of the frames after the first
-    std::size_t pictures = 0;
-    session::PassEffect effect;
-};
-
-// `use`: none: nothing is hidden by pictures.
-Result<TreeWalk> walk_tree(JudgedScene& scene, int frames, std::optional<session::MovingOcclusionOptions::Use> use) {
-    std::optional<session::MovingOcclusion> occlusion;
-    if (use) {
-        auto made = session::MovingOcclusion::create(scene.context(), scene.session(), {.use = *use});
-        if (!made) return made.error();
-        occlusion = std::move(*made);
-    }
-    session::Follower follower(scene.session());
-    session::Request request{.purpose = session::Purpose::picture};
-    request.reasons = false;
-    vdtree::View view = scene.view();
-    const glm::dvec3 step = walking_m_s / frames_a_second * glm::normalize(view.target - view.eye);
-    TreeWalk walk;
-    for (int i = 0; i <= frames; ++i, view.eye += step, view.target += step) {
-        const auto start = BenchClock::now();
-        if (occlusion) {
-            auto hidden = occlusion->begin_frame(view);
-            if (!hidden) return hidden.error();
-            request.hidden = std::move(*hidden);
-        }
-        const auto report = follower.follow(view, request);
-        if (!report) return report.error();
-        if (const auto drawn = scene.draw_frame(follower, view); !drawn) return drawn.error();
-        if (occlusion) {
-            const auto ended = occlusion->end_frame(*scene.renderer().drawn_depth(), view, 1e3 * seconds_since(start));
-            if (!ended) return ended.error();
-        }
-        if (i == 0) continue;
-        walk.triangles += static_cast<double>(report->stats.triangles) / frames;
-        walk.frame_ms += 1e3 * seconds_since(start) / frames;
-    }
-    if (!occlusion) return walk;
-    walk.pictures = occlusion->facts().pictures;
-    walk.occlusion_ms = occlusion->facts().milliseconds / static_cast<double>(occlusion->facts().frames);
-    walk.effect = occlusion->effect();
-    return walk;
-}
-
 struct TreeWalks {
     TreeWalk without, with, where_it_saves_time;
 };
 
-Result<TreeWalks> walk_trees(JudgedScene& scene, int frames) {
+Result<TreeWalks> walk_trees(const JudgedScene& scene) {
     using Use = session::MovingOcclusionOptions::Use;
-    auto without = walk_tree(scene, frames, {});
+    auto without = scene.walk({});
     if (!without) return without.error();
-    auto with = walk_tree(scene, frames, Use::always);
+    auto with = scene.walk({.occlusion = session::MovingOcclusionOptions{.use = Use::always}});
     if (!with) return with.error();
-    auto tried = walk_tree(scene, frames, Use::where_it_saves_time);
+    auto tried = scene.walk({.occlusion = session::MovingOcclusionOptions{.use = Use::where_it_saves_time}});
     if (!tried) return tried.error();
     return TreeWalks{std::move(*without), std::move(*with), std::move(*tried)};
 }
@@ -511,7 +417,7 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
         if (!walked) return walked.error();
         result.walks.push_back(to_json(*walked, scene->name()));
         walks.emplace_back(scene->name(), std::move(*walked));
-        auto by_trees = walk_trees(*scene, tree_frames);
+        auto by_trees = walk_trees(*scene);
         if (!by_trees) return by_trees.error();
         result.walks.back()["tree"] = {{"without", to_json(by_trees->without)},
                                        {"with", to_json(by_trees->with)},

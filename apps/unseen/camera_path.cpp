@@ -4,12 +4,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numbers>
 #include <sstream>
 #include <string_view>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 #include <vdtree/internal/text_file.h>
@@ -51,13 +49,10 @@ Result<Orbit> parse_orbit(const std::string& path) {
 }
 
 std::vector<CameraPose> poses_of(const Orbit& orbit, const vdtree::View& first) {
-    const glm::dvec3 axis = glm::normalize(first.up);
     std::vector<CameraPose> poses;
     poses.reserve(static_cast<std::size_t>(orbit.frames));
-    for (int frame = 0; frame < orbit.frames; ++frame) {
-        const glm::dquat turn = glm::angleAxis(orbit.degrees * frame * std::numbers::pi / 180, axis);
-        poses.push_back({first.target + turn * (first.eye - first.target), first.target, first.up, {}});
-    }
+    for (int frame = 0; frame < orbit.frames; ++frame)
+        poses.push_back({vdtree::orbited(first, orbit.degrees * frame).eye, first.target, first.up, {}});
     return poses;
 }
 

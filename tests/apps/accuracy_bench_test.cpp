@@ -2,6 +2,7 @@
 #include "run_bench.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 namespace {
@@ -10,43 +11,104 @@ using namespace unseen::app::testing;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class AccuracyBenchTest : public BenchTest {};
+class AccuracyBenchTest : public BenchTest {
+protected:
+    static Json named(const Json& points, const std::string& name) {
+        const auto found = std::ranges::find_if(points, [&](const Json& p) { return p["name"] == name; });
+        if (found == points.end()) ADD_FAILURE() << "no point '" << name << "'";
+        return found == points.end() ? Json() : *found;
+    }
+    static double cost(const Json& points, const std::string& name) { return named(points, name)["values"][0]; }
+    static double error(const Json& points, const std::string& name) { return named(points, name)["values"][1]; }
+
+    // The axes that have points, all of which have a front and a default.
+    static std::set<std::string> sound_axes(const Json& report) {
+        std::set<std::string> axes, with_default, with_front;
+        for (const Json& point : report["points"]) {
+            const std::string axis = point["axis"];
+            axes.insert(axis);
+            if (point["default"]) with_default.insert(axis);
+            if (point["pareto"]) with_front.insert(axis);
+            EXPECT_GE(point["values"][0], 0) << point;
+            EXPECT_GE(point["values"][1], 0) << point;
+        }
+        EXPECT_EQ(with_default, axes);
+        EXPECT_EQ(with_front, axes);
+        EXPECT_EQ(report["axes"].size(), axes.size());
+        return axes;
+    }
+};
 
 TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
     write_ball("ball.obj");
     const Outcome outcome = bench({"accuracy", "--quick", "ball.obj", "--seconds", "5", "--window", "96", "--csv",
-                                   "points.csv", "--html", "page.html", "--json", "-"});
+                                   "points.csv", "--html", "page.html", "--plots", "plots", "--json", "-"});
     if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const Json report = outcome.json();
     const Json& points = report["points"];
-    std::set<std::string> axes, with_default, with_front;
-    for (const Json& point : points) {
-        const std::string axis = point["axis"];
-        axes.insert(axis);
-        if (point["default"]) with_default.insert(axis);
-        if (point["pareto"]) with_front.insert(axis);
-        EXPECT_GE(point["time"], 0) << point;
-        EXPECT_GE(point["error"], 0) << point;
-    }
-    EXPECT_EQ(axes.size(), 3u) << "pictures of depth are of scenes";
-    EXPECT_EQ(with_default, axes);
-    EXPECT_EQ(with_front, axes);
-    const auto named = [&](const std::string& name) {
-        const auto found = std::ranges::find_if(points, [&](const Json& p) { return p["name"] == name; });
-        return found == points.end() ? Json() : *found;
-    };
-    EXPECT_EQ(named("closed form, double")["error"], 0);
-    EXPECT_LT(named("the program's table")["error"], 0.005) << "what csf.h promises";
-    EXPECT_GT(named("table, 16 an axis, linear")["error"], named("table, 64 an axis, linear")["error"]);
-    EXPECT_EQ(named("imperceptible, followed")["error"], 0) << "what a cut becomes does not depend on the way to it";
-    EXPECT_EQ(named("full")["error"], 0);
-    EXPECT_LT(named("imperceptible")["error"], 1) << "in thresholds";
+    EXPECT_EQ(sound_axes(report), (std::set<std::string>{"csf", "cut", "facing", "folds", "gaze", "maps", "measurement",
+                                                         "spheres", "tests", "trees"}))
+        << "levels and pictures of depth are of scenes";
+    EXPECT_EQ(error(points, "closed form, double"), 0);
+    EXPECT_LT(error(points, "closed form, float"), 1e-5) << "the twin is the formula";
+    EXPECT_LT(error(points, "the program's table"), 0.005) << "what csf.h promises";
+    EXPECT_GT(error(points, "table, 16 an axis, linear"), error(points, "table, 64 an axis, linear"));
+    EXPECT_EQ(error(points, "imperceptible, followed"), 0) << "what a cut becomes does not depend on the way to it";
+    EXPECT_EQ(error(points, "full"), 0);
+    EXPECT_LT(error(points, "imperceptible"), 1) << "in thresholds";
+    EXPECT_LE(error(points, "modern"), 1e-3) << "what <render/visibility.h> promises";
+    EXPECT_EQ(error(points, "modern, CPU"), 0);
+    EXPECT_LT(error(points, "16 frames old, margin of 8 deg"), 1) << "what a margin promises";
+    EXPECT_EQ(named(points, "quadric, one thread")["values"][1], named(points, "quadric, two threads")["values"][1]);
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(read_text(path("points.csv")), '\n')), points.size() + 1);
     const std::string page = read_text(path("page.html"));
     EXPECT_THAT(page, HasSubstr("<svg"));
     EXPECT_THAT(page, HasSubstr("the program's table"));
     EXPECT_THAT(page, Not(HasSubstr("src="))) << "nothing is loaded from elsewhere";
+    for (const Json& axis : report["axes"])
+        EXPECT_TRUE(std::filesystem::exists(path("plots/accuracy_" + axis["key"].get<std::string>() + ".png")));
+}
+
+TEST_F(AccuracyBenchTest, BoundsHoldAndTighterOnesCostMore) {
+    write_ball("ball.obj");
+    const Outcome outcome =
+        bench({"accuracy", "ball.obj", "--only", "spheres", "--only", "facing", "--window", "96", "--json", "-"});
+    if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json report = outcome.json();
+    const Json& points = report["points"];
+    EXPECT_EQ(sound_axes(report), (std::set<std::string>{"facing", "spheres"}));
+    constexpr double rounding = 1e-6; // of the tree's floats
+    for (const Json& point : points) {
+        if (point["axis"] == "facing") EXPECT_EQ(point["values"][2], 0) << "no silhouette is missed: " << point;
+        else EXPECT_LE(point["values"][3], rounding) << "nothing is outside: " << point;
+    }
+    EXPECT_LE(error(points, "Welzl, of points"), 1e-12);
+    EXPECT_LE(error(points, "Ritter"), 0.2) << "what Ritter says of his spheres, and more";
+    EXPECT_EQ(error(points, "each triangle, exact"), 0);
+    EXPECT_GE(error(points, "mask of 6 x 2 x 2"), error(points, "mask of 6 x 8 x 8"));
+    EXPECT_GE(error(points, "mask of 6 x 8 x 8"), error(points, "mask of 6 x 16 x 16"));
+    EXPECT_GE(error(points, "slabs"), error(points, "slabs, then mask of 6 x 8 x 8"));
+}
+
+TEST_F(AccuracyBenchTest, ScenesHaveLevelsAndPicturesOfDepth) {
+    ASSERT_EQ(run({"scene", "make", "museum", "--triangles", "10000", "-o", "museum.glb"}).status, 0);
+    const Outcome outcome = bench(
+        {"accuracy", "--quick", "museum.glb", "--only", "levels", "--only", "depth", "--window", "96", "--json", "-"});
+    if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json report = outcome.json();
+    EXPECT_EQ(sound_axes(report), (std::set<std::string>{"depth", "levels"}));
+    EXPECT_EQ(error(report["points"], "no pictures"), 1);
+    EXPECT_LE(error(report["points"], "serves 1 frame"), 1);
+}
+
+TEST_F(AccuracyBenchTest, NamesTheAxesThatThereAre) {
+    const Outcome outcome = bench({"accuracy", "--only", "colour"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("colour"));
+    EXPECT_THAT(outcome.err, HasSubstr("spheres"));
 }
 
 } // namespace

@@ -684,6 +684,32 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
     EXPECT_LT(flickers, folds / 100) << flickers << " of " << folds;
 }
 
+TEST(FollowBudget, WithMuchHysteresisIsStillFollowed) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 9, false);
+    const Sphere sphere = tree.bounding_sphere();
+    constexpr Index budget = 4000;
+    for (const float hysteresis : {1.1f, 1.5f, 2.0f}) {
+        Cut steady(tree), exact(tree);
+        std::uint64_t tests = 0, tests_from_scratch = 0;
+        for (int frame = 0; frame < 60; ++frame) {
+            const double angle = frame * 0.002;
+            const Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) +
+                                             4.0 * sphere.radius * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
+            const auto with =
+                steady.follow(criterion, viewpoint, {.triangle_budget = budget, .hysteresis = hysteresis});
+            const auto without = exact.follow(criterion, viewpoint, {.triangle_budget = budget});
+            ASSERT_TRUE(with && without);
+            ASSERT_LE(with->triangles, budget) << "frame " << frame;
+            ASSERT_LE(with->max_fold_cost, hysteresis * without->max_fold_cost * 1.0001f) << "frame " << frame;
+            if (frame < 2) continue; // the cut, and what to watch
+            tests += with->node_tests;
+            tests_from_scratch += without->node_tests;
+        }
+        EXPECT_LT(tests, tests_from_scratch / 4) << "hysteresis " << hysteresis;
+    }
+}
+
 TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
     const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
     const DistanceCriterion criterion = rich_criterion(tree, 10, false);

@@ -99,6 +99,18 @@ TEST(CameraFrame, LooksDownMinusZByDefault) {
     EXPECT_EQ(f.back, glm::dvec3(0, 0, 1));
 }
 
+TEST(Orbited, TurnsTheEyeAroundTheUprightAxis) {
+    View view;
+    view.eye = {1, 5, 3}, view.target = {1, 2, 1}, view.up = {0, 2, 0};
+    const View quarter = orbited(view, 90), back = orbited(quarter, -90);
+    EXPECT_LT(glm::distance(quarter.eye, glm::dvec3(3, 5, 1)), 10 * rounding);
+    EXPECT_LT(glm::distance(back.eye, view.eye), 10 * rounding);
+    EXPECT_EQ(quarter.target, view.target);
+    EXPECT_EQ(orbited(view, 0).eye, view.eye);
+    view.up = {0, 0, 1};
+    EXPECT_LT(glm::distance(orbited(view, 180).eye, glm::dvec3(1, -1, 3)), 10 * rounding);
+}
+
 // The largest height above the middle of the window, as a share of half its height, of points of the sphere.
 double outline_share(const View& view, glm::dvec3 centre, double radius) {
     const CameraFrame f = camera_frame(view);

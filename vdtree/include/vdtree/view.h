@@ -44,4 +44,7 @@ CameraFrame camera_frame(const View& view);
 // height: distance = radius / sin(atan(fill tan(fov / 2))). Field and size come from `window`; target: the centre.
 View frame_sphere(glm::dvec3 centre, double radius, glm::dvec3 direction, double fill, const View& window);
 
+// The view with its eye turned around the axis through the target along `up`, counterclockwise as seen from above.
+View orbited(const View& view, double degrees);
+
 } // namespace unseen::vdtree

@@ -216,6 +216,8 @@ void CutFollower::keep_within_budget(CutState& cut) {
     const double enough = budget / std::sqrt(static_cast<double>(options_.hysteresis));
     settle_due(cut);
     constexpr int most_rounds = 24;
+    // What hysteresis keeps unfolded folds only when the threshold has grown by that factor: half of the rounds suffice.
+    const double least_step = std::max(1.005, std::pow(static_cast<double>(keeping_factor()), 2.0 / most_rounds));
     bool was_above = false;
     for (int round = 0;; ++round) {
         const double triangles = cut.triangle_count();
@@ -230,10 +232,10 @@ void CutFollower::keep_within_budget(CutState& cut) {
         // Jumps in the number of triangles, or a threshold that nothing leads down from: from scratch.
         if (round == most_rounds || !std::isfinite(threshold_)) break;
         was_above |= is_above;
-        change_threshold(cut, is_above
-                                  ? static_cast<float>(std::clamp(std::sqrt(triangles / budget) * 1.002, 1.005, 1.1))
-                                  : 1 / static_cast<float>(std::clamp(
-                                            std::sqrt(budget / std::max(triangles, 1.0)) * 0.99, 1.005, 1.1)));
+        change_threshold(
+            cut, is_above ? static_cast<float>(std::clamp(std::sqrt(triangles / budget) * 1.002, least_step, 1.1))
+                          : 1 / static_cast<float>(
+                                    std::clamp(std::sqrt(budget / std::max(triangles, 1.0)) * 0.99, 1.005, 1.1)));
     }
     cut.change_further(decide_with_budget());
 }

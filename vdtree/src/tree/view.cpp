@@ -54,4 +54,11 @@ View frame_sphere(glm::dvec3 centre, double radius, glm::dvec3 direction, double
     return view;
 }
 
+View orbited(const View& view, double degrees) {
+    const glm::dquat turn = glm::angleAxis(degrees * std::numbers::pi / 180, unit(view.up));
+    View other = view;
+    other.eye = view.target + turn * (view.eye - view.target);
+    return other;
+}
+
 } // namespace unseen::vdtree

@@ -6,9 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include <glm/geometric.hpp>
-#include <glm/gtc/constants.hpp>
-
 #include <perception/judge.h>
 #include <session_gpu/as_seen.h>
 #include <session_gpu/frame_image.h>
@@ -63,16 +60,6 @@ std::vector<Way> ways(const Session& session) {
         add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
     for (const double pixels : {4.0, 8.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
     return all;
-}
-
-// Around the upright axis through the target.
-vdtree::View turned(const vdtree::View& view, double degrees) {
-    const double angle = degrees * (glm::pi<double>() / 180);
-    const glm::dvec3 axis = glm::normalize(view.up), from = view.eye - view.target;
-    vdtree::View other = view;
-    other.eye = view.target + from * std::cos(angle) + glm::cross(axis, from) * std::sin(angle) +
-                axis * (glm::dot(axis, from) * (1 - std::cos(angle)));
-    return other;
 }
 
 double largest_shift(const Session& session, const std::vector<vdtree::Cut>& cuts) {
@@ -182,7 +169,7 @@ private:
         std::vector<double> times;
         for (int i = 0; i <= timed_frames + 1; ++i) {
             const auto start = Clock::now();
-            const auto followed = follower.follow(turned(view_, degrees_a_frame * i), request);
+            const auto followed = follower.follow(vdtree::orbited(view_, degrees_a_frame * i), request);
             if (!followed) return followed.error();
             if (i > 1) times.push_back(ms_since(start)); // the first makes the cut, the second what to watch
         }

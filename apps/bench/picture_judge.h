@@ -1,0 +1,50 @@
+// Judges pictures of a session's view against the full model's: by both judges on the CPU, and SSIM.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <perception/judge.h>
+#include <session/session.h>
+#include <session_gpu/scene_renderer.h>
+
+namespace unseen::app {
+
+struct PictureVerdict {
+    std::uint64_t visible = 0, second_visible = 0; // pixels
+    double v = 0, second_v = 0;                    // the largest difference, in thresholds
+    double ssim = 1;                               // of code values; NaN: the window is too small for it
+};
+
+// Refers to the session; keeps a handle to the context. Move-only.
+class PictureJudge {
+public:
+    // Draws the full model, with so many samples a pixel. The judges are of the session's observer and gaze.
+    static Result<PictureJudge> create(const render::Context& context, const session::Session& session,
+                                       const vdtree::View& view, int samples);
+
+    // Others' cuts or frames of the same view and window.
+    Result<PictureVerdict> judge(std::span<const vdtree::Cut> cuts);
+    Result<PictureVerdict> judge(const render::Frame& frame) const;
+
+    const perception::Image& full() const { return full_; } // luminance, cd/m2
+    session::SceneRenderer& renderer() { return *renderer_; }
+    render::DrawOptions drawing() const; // what judged pictures are drawn with
+
+private:
+    PictureJudge(const session::Session& session, const vdtree::View& view, int samples,
+                 session::SceneRenderer renderer);
+
+    const session::Session* session_;
+    vdtree::View view_;
+    int samples_;
+    std::unique_ptr<session::SceneRenderer> renderer_;
+    perception::Image full_ = {}, full_codes_ = {};
+    std::unique_ptr<perception::Judge> judge_ = {}, second_ = {};
+};
+
+std::vector<vdtree::Cut> whole_cuts(const session::Session& session); // the full model, by object
+
+} // namespace unseen::app
