@@ -64,6 +64,8 @@ public:
 
     bool is_closed() const { return glfwWindowShouldClose(window()); }
 
+    void set_title(const std::string& title) { glfwSetWindowTitle(window(), title.c_str()); }
+
     // The last key since the last call; 0: none.
     int take_key() { return std::exchange(key_, 0); }
 
@@ -196,6 +198,7 @@ Result<void> run_study_window(const calibration::Study& study, const std::vector
         const auto& [left, right] =
             trial.is_other_left ? std::pair(pair.other, pair.original) : std::pair(pair.original, pair.other);
         if (auto loaded = stage.load(left, right); !loaded) return loaded;
+        stage.set_title("Unseen - study, " + std::to_string(i + 1) + " of " + std::to_string(trials.size()));
         const double began = glfwGetTime();
         while (!stage.is_closed() &&
                (waits ? stage.take_key() != GLFW_KEY_SPACE : glfwGetTime() < began + options.pause_s))
