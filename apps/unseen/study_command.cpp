@@ -44,6 +44,7 @@ struct StudyArguments {
     // analyse
     std::vector<std::string> files;
     std::string json;
+    bool markdown = false;
     enum class Part { make, run, analyse } part = Part::make;
 };
 
@@ -256,14 +257,15 @@ Json to_json(const calibration::StudyAnalysis& analysis) {
 std::string percent(double share) { return rounded(100 * share, 3) + "%"; }
 std::string interval(const calibration::Share& share) { return percent(share.low()) + " to " + percent(share.high()); }
 
-void print(const calibration::StudyAnalysis& analysis) {
+void print(const calibration::StudyAnalysis& analysis, bool markdown) {
     std::vector<std::vector<std::string>> rows = {
         {"condition", "trials", "seen", "95%", "by chance", "as predicted", "median s"}};
     for (const calibration::ConditionResult& result : analysis.conditions)
         rows.push_back({result.condition, std::to_string(result.seen.of), percent(result.seen.value()),
                         interval(result.seen), rounded(result.chance, 3),
                         result.agreed ? percent(result.agreed->value()) : "-", rounded(result.median_s, 3)});
-    print_table(rows);
+    markdown ? print_markdown(rows) : print_table(rows);
+    if (markdown) print_line("");
     print_line(
         "seen: of `which` right answers, half of them by guessing; of `differ` \"different\". by chance: how likely "
         "so many, or more, are for who sees nothing.");
@@ -286,7 +288,7 @@ Result<int> analyse_study(StudyArguments& a) {
     if (!analysis) return analysis.error();
     if (auto ok = report->prepare(to_json(*analysis)); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*analysis);
+    if (!report->is_on_stdout()) print(*analysis, a.markdown);
     return exit_done;
 }
 
@@ -392,6 +394,7 @@ void add_analyse(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
     CLI::App* part = verb.add_subcommand("analyse", "What the answers of all subjects come to");
     part->add_option("ANSWERS", a->files, "Of 'unseen study run'")->required()->type_name("ANSWERS.csv ...");
     add_json_option(*part, a->json);
+    part->add_flag("--markdown", a->markdown, "The table in Markdown");
     part->callback([a] { a->part = StudyArguments::Part::analyse; });
     part->footer("Examples:\n  unseen study analyse study/answers-*.csv\n"
                  "  unseen study analyse levels/answers-*.csv --json levels.json");

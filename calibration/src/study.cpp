@@ -465,6 +465,7 @@ Result<StudyAnalysis> analyse_answers(std::span<const fs::path> files) {
         if (tally.is_predicted) result.agreed = tally.agreed;
         all.conditions.push_back(std::move(result));
     }
+    std::ranges::sort(all.conditions, {}, &ConditionResult::condition);
     for (const auto& [subject, right] : training)
         if (1 - right.value() > careless_share) all.careless.push_back(subject);
     if (false_alarms.of > 0) all.false_alarms = false_alarms;

@@ -99,7 +99,7 @@ struct ConditionResult {
 };
 
 struct StudyAnalysis {
-    std::vector<ConditionResult> conditions; // in the order of the answers
+    std::vector<ConditionResult> conditions; // sorted by name
     std::vector<std::string> subjects;
     std::vector<std::string> careless; // subjects who were wrong in more than a third of the training
     std::optional<Share> false_alarms; // differ: of pairs of one picture
