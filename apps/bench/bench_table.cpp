@@ -20,16 +20,6 @@ std::string verdict(const BenchRow& row) {
     return holds(row, *must) ? "must met" : "must missed";
 }
 
-void print_markdown(const std::vector<std::vector<std::string>>& rows) {
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-        for (const std::string& cell : rows[r]) std::printf("| %s ", printable(cell).c_str());
-        std::printf("|\n");
-        if (r > 0) continue;
-        for (std::size_t column = 0; column < rows[r].size(); ++column) std::printf(column == 0 ? "|---" : "|---:");
-        std::printf("|\n");
-    }
-}
-
 } // namespace
 
 BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows) {

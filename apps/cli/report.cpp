@@ -68,6 +68,16 @@ void print_table(std::vector<std::vector<std::string>> rows) {
     }
 }
 
+void print_markdown(const std::vector<std::vector<std::string>>& rows) {
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+        for (const std::string& cell : rows[r]) std::printf("| %s ", printable(cell).c_str());
+        std::printf("|\n");
+        if (r > 0) continue;
+        for (std::size_t column = 0; column < rows[r].size(); ++column) std::printf(column == 0 ? "|---" : "|---:");
+        std::printf("|\n");
+    }
+}
+
 Json texture_json(const vdtree::VertexTree& tree) {
     const vdtree::TextureView texture = tree.texture();
     if (texture.empty()) return nullptr;

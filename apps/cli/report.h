@@ -46,6 +46,8 @@ void print_line(std::string_view text);
 
 // Columns of text, the first to the left and the others to the right, for stdout.
 void print_table(std::vector<std::vector<std::string>> rows);
+// The same as a table of Markdown.
+void print_markdown(const std::vector<std::vector<std::string>>& rows);
 
 // Of a tree's texture: null and "none" where it has none.
 Json texture_json(const vdtree::VertexTree& tree);

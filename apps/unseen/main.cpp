@@ -27,6 +27,6 @@ int main(int argc, char** argv) {
                                     render_command(app),   sheet_command(app), compare_command(app),
                                     tradeoff_command(app), csf_command(app),   calibrate_command(app),
                                     view_command(app),     demo_command(app),  make_command(app),
-                                    scene_command(app),    cache_command(app)};
+                                    scene_command(app),    study_command(app), cache_command(app)};
     });
 }

@@ -17,6 +17,7 @@ Command cache_command(CLI::App& app);
 Command calibrate_command(CLI::App& app);
 Command csf_command(CLI::App& app);
 Command sheet_command(CLI::App& app);
+Command study_command(CLI::App& app);
 Command tradeoff_command(CLI::App& app);
 Command view_command(CLI::App& app);
 

@@ -25,3 +25,7 @@
 #include <calibration/quest.h>
 #include <calibration/sensitivity_field.h>
 #include <calibration/simulated_observer.h>
+
+// Studies.
+#include <calibration/picture_observer.h>
+#include <calibration/study.h>

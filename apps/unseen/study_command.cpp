@@ -1,0 +1,419 @@
+// unseen study: whether people, or a simulated one, tell a simplification from its original.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <calibration/picture_observer.h>
+#include <calibration/study.h>
+#include <session_gpu/study_pictures.h>
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_text.h>
+
+#include "options.h"
+#include "output_files.h"
+#include "progress_bar.h"
+#include "report.h"
+#include "session_options.h"
+#include "study_window.h"
+#include "terminal.h"
+#include "verbs.h"
+
+namespace unseen::app {
+namespace {
+
+using calibration::Study;
+using calibration::StudyTask;
+namespace fs = std::filesystem;
+
+constexpr const char* study_file = "study.json";
+
+struct StudyArguments {
+    // make
+    std::vector<std::string> models, conditions, training;
+    std::string folder;
+    std::optional<StudyTask> task;
+    bool levels = false;
+    std::optional<double> views, degrees, samples, repeats, seed;
+    ViewOptions view;
+    DisplayOptions display;
+    // run
+    std::string subject = "unnamed", simulate, answers;
+    StudyWindowOptions window;
+    std::optional<double> criterion;
+    // analyse
+    std::vector<std::string> files;
+    std::string json;
+    bool markdown = false;
+    enum class Part { make, run, analyse } part = Part::make;
+};
+
+// ---- make
+
+// "imperceptible", "threshold:4", "pixels:2", "triangles:5000" or "triangles:5%".
+Result<session::StudyCondition> condition_named(const std::string& text, std::uint64_t all_triangles) {
+    session::StudyCondition condition{.name = text, .request = {}};
+    const std::size_t colon = text.find(':');
+    const std::string kind = text.substr(0, colon), value = colon == text.npos ? "" : text.substr(colon + 1);
+    const bool is_share = value.ends_with('%');
+    const auto number = finite_from(is_share ? value.substr(0, value.size() - 1) : value);
+    if (kind == "imperceptible" && colon == text.npos) return condition;
+    if (number && *number > 0) {
+        if (kind == "threshold" && !is_share) {
+            condition.request.threshold = *number;
+            return condition;
+        }
+        if (kind == "pixels" && !is_share) {
+            condition.request.goal = Goal::pixels(*number);
+            return condition;
+        }
+        const double triangles = is_share ? *number / 100 * static_cast<double>(all_triangles) : *number;
+        if (kind == "triangles" && triangles < 4e9) {
+            condition.request.goal = Goal::budget(static_cast<vdtree::Index>(std::max(triangles, 1.0)));
+            return condition;
+        }
+    }
+    return invalid_argument("'" + text +
+                            "' is no condition: imperceptible, threshold:X, pixels:E, triangles:N or "
+                            "triangles:P%, with a number above 0.");
+}
+
+Result<std::vector<session::StudyCondition>> conditions_of(const StudyArguments& a, std::uint64_t all_triangles) {
+    std::vector<session::StudyCondition> all;
+    for (const bool is_training : {true, false})
+        for (const std::string& text : is_training ? a.training : a.conditions) {
+            auto condition = condition_named(text, all_triangles);
+            if (!condition) return condition.error();
+            condition->is_training = is_training;
+            all.push_back(std::move(*condition));
+        }
+    return all;
+}
+
+Result<int> make_study(StudyArguments& a) {
+    const fs::path folder = a.folder;
+    std::vector<std::string> inputs;
+    for (const std::string& model : a.models)
+        for (const std::string& input : inputs_of(model, a.view, a.display)) inputs.push_back(input);
+    if (const auto ready = check_outputs(inputs, {(folder / study_file).string()}); !ready) return ready.error();
+    auto context = render::Context::headless();
+    if (!context) return context.error();
+    Study study;
+    study.task = a.task.value_or(a.levels ? StudyTask::differ : StudyTask::which);
+    if (a.repeats) study.repeats = static_cast<int>(*a.repeats);
+    if (a.seed) study.seed = static_cast<std::uint64_t>(*a.seed);
+    for (std::size_t i = 0; i < a.models.size(); ++i) {
+        auto session = open_session(a.models[i], a.view, a.display);
+        if (!session) return session.error();
+        study.pixels_per_degree = perception::pixels_per_degree(session->observer().display).value();
+        session::StudyPicturesOptions options;
+        options.folder = folder;
+        options.prefix =
+            fs::path(a.models[i]).stem().string() + "-" + (a.models.size() > 1 ? std::to_string(i + 1) + "-" : "");
+        const bool is_scene = session->scene().objects.size() > 1 || !session->scene().backdrop.empty();
+        options.views = static_cast<int>(a.views.value_or(is_scene ? 1 : 5));
+        // All around a model; a scene is looked at from about where its camera is.
+        options.degrees = a.degrees.value_or(is_scene ? 3 : 360.0 / options.views);
+        options.samples = static_cast<int>(a.samples.value_or(64));
+        options.pairs_original = study.task == StudyTask::differ;
+        ProgressBar bar("drawing " + a.models[i]);
+        options.progress = [&](double share) { bar(share, "pictures"); };
+        const vdtree::View view = make_view(*session, a.view);
+        Result<std::vector<calibration::StudyPair>> pairs = std::vector<calibration::StudyPair>();
+        if (a.levels) {
+            pairs = session::draw_level_pairs(*session, *context, view, {}, options);
+        } else {
+            const auto conditions = conditions_of(a, session->triangle_count());
+            if (!conditions) return conditions.error();
+            pairs = session::draw_study_pairs(*session, *context, view, *conditions, options);
+        }
+        if (!pairs) return pairs.error();
+        for (calibration::StudyPair& pair : *pairs) {
+            if (a.models.size() > 1 && a.levels)
+                pair.condition = fs::path(a.models[i]).stem().string() + ", " + pair.condition;
+            study.pairs.push_back(std::move(pair));
+        }
+    }
+    if (const auto written = calibration::write_study(folder / study_file, study); !written) return written.error();
+    print_line(std::to_string(study.pairs.size()) + " pairs, " +
+               std::to_string(calibration::trials_of(study, "").size()) + " trials a subject");
+    print_written({(folder / study_file).string()});
+    return exit_done;
+}
+
+// ---- run
+
+// Pictures are judged once, however often they are shown.
+class SimulatedSubject {
+public:
+    SimulatedSubject(calibration::PictureObserver observer, const perception::Display& display, const Study& study)
+        : observer_(observer), display_(display), study_(study), visibility_(study.pairs.size()) {}
+
+    Result<calibration::StudyAnswer> answer(const calibration::StudyTrial& trial) {
+        std::optional<double>& visibility = visibility_[trial.pair];
+        if (!visibility) {
+            const auto looked = look(study_.pairs[trial.pair]);
+            if (!looked) return looked.error();
+            visibility = *looked;
+        }
+        return calibration::StudyAnswer{trial, observer_.choose(study_.task, trial, *visibility), 0};
+    }
+
+private:
+    Result<double> look(const calibration::StudyPair& pair) const {
+        const auto original = perception::read_image(pair.original);
+        if (!original) return original.error();
+        const auto other = perception::read_image(pair.other);
+        if (!other) return other.error();
+        auto seen = observer_.visibility(perception::to_luminance(*original, display_),
+                                         perception::to_luminance(*other, display_), display_);
+        if (!seen)
+            return Error{seen.error().code,
+                         pair.original.string() + " and " + pair.other.string() + ": " + seen.error().message};
+        return seen;
+    }
+
+    calibration::PictureObserver observer_;
+    const perception::Display& display_;
+    const Study& study_;
+    std::vector<std::optional<double>> visibility_;
+};
+
+Result<int> run_study(StudyArguments& a) {
+    const auto display = make_display(a.display);
+    if (!display) return display.error();
+    const fs::path file = fs::path(a.folder) / study_file;
+    const auto study = calibration::read_study(file);
+    if (!study) return study.error();
+    if (a.answers.empty()) a.answers = (fs::path(a.folder) / ("answers-" + a.subject + ".csv")).string();
+    constexpr double alike = 0.02;
+    const double ppd = perception::pixels_per_degree(*display).value();
+    if (!(std::abs(ppd / study->pixels_per_degree - 1) <= alike))
+        print_warning("the pictures were made for " + rounded(study->pixels_per_degree, 3) +
+                      " pixels a degree, and this display has " + rounded(ppd, 3) +
+                      ": change the distance (--distance), or make them for it.");
+    const std::vector<calibration::StudyTrial> trials = calibration::trials_of(*study, a.subject);
+    std::vector<calibration::StudyAnswer> answers;
+    if (fs::exists(a.answers)) {
+        auto before = calibration::read_answers(a.answers, *study, a.subject);
+        if (!before) return before.error();
+        answers = std::move(*before);
+    } else if (const auto ready = check_outputs({file.string()}, {a.answers}); !ready) return ready.error();
+    const auto save = [&] { return calibration::write_answers(a.answers, *study, a.subject, answers); };
+    if (!a.simulate.empty()) {
+        const auto person = perception::person(a.simulate);
+        if (!person) return person.error();
+        calibration::PictureObserver observer{.person = *person, .seed = study->seed};
+        if (a.criterion) observer.criterion = *a.criterion;
+        SimulatedSubject subject(observer, *display, *study);
+        ProgressBar bar("answering");
+        for (std::size_t i = answers.size(); i < trials.size(); ++i) {
+            bar(static_cast<double>(i) / static_cast<double>(trials.size()), "trials");
+            auto answer = subject.answer(trials[i]);
+            if (!answer) return answer.error();
+            answers.push_back(*answer);
+        }
+        if (auto saved = save(); !saved) return saved.error();
+    } else if (answers.size() < trials.size()) {
+        const auto keep = [&](const calibration::StudyAnswer& answer) {
+            answers.push_back(answer);
+            return save();
+        };
+        if (auto shown = run_study_window(*study, trials, answers.size(), a.window, keep); !shown) return shown.error();
+    }
+    print_line(std::to_string(answers.size()) + " of " + std::to_string(trials.size()) + " trials are answered" +
+               (answers.size() < trials.size() ? "; the same command goes on." : "."));
+    if (!answers.empty()) print_written({a.answers});
+    return exit_done;
+}
+
+// ---- analyse
+
+Json to_json(const calibration::Share& share) {
+    return {{"count", share.count},
+            {"of", share.of},
+            {"share", share.value()},
+            {"low", share.low()},
+            {"high", share.high()}};
+}
+
+Json to_json(const calibration::StudyAnalysis& analysis) {
+    Json conditions = Json::array();
+    for (const calibration::ConditionResult& result : analysis.conditions) {
+        conditions.push_back({{"condition", result.condition},
+                              {"task", calibration::name(result.task)},
+                              {"seen", to_json(result.seen)},
+                              {"chance", result.chance},
+                              {"agreed", result.agreed ? to_json(*result.agreed) : Json()},
+                              {"median_s", result.median_s}});
+    }
+    return {{"subjects", analysis.subjects},
+            {"careless", analysis.careless},
+            {"false_alarms", analysis.false_alarms ? to_json(*analysis.false_alarms) : Json()},
+            {"agreed", analysis.agreed ? to_json(*analysis.agreed) : Json()},
+            {"conditions", std::move(conditions)}};
+}
+
+std::string percent(double share) { return rounded(100 * share, 3) + "%"; }
+std::string interval(const calibration::Share& share) { return percent(share.low()) + " to " + percent(share.high()); }
+
+void print(const calibration::StudyAnalysis& analysis, bool markdown) {
+    std::vector<std::vector<std::string>> rows = {
+        {"condition", "trials", "seen", "95%", "by chance", "as predicted", "median s"}};
+    for (const calibration::ConditionResult& result : analysis.conditions)
+        rows.push_back({result.condition, std::to_string(result.seen.of), percent(result.seen.value()),
+                        interval(result.seen), rounded(result.chance, 3),
+                        result.agreed ? percent(result.agreed->value()) : "-", rounded(result.median_s, 3)});
+    markdown ? print_markdown(rows) : print_table(rows);
+    if (markdown) print_line("");
+    print_line(
+        "seen: of `which` right answers, half of them by guessing; of `differ` \"different\". by chance: how likely "
+        "so many, or more, are for who sees nothing.");
+    if (analysis.false_alarms)
+        print_line("\"different\" of one picture and itself: " + percent(analysis.false_alarms->value()) + " (" +
+                   interval(*analysis.false_alarms) + ")");
+    if (analysis.agreed)
+        print_line("as predicted: " + percent(analysis.agreed->value()) + " (" + interval(*analysis.agreed) + ") of " +
+                   std::to_string(analysis.agreed->of));
+    for (const std::string& subject : analysis.careless)
+        print_warning("'" + subject + "' was wrong in more than a third of the training.");
+}
+
+Result<int> analyse_study(StudyArguments& a) {
+    if (const auto ready = check_outputs(a.files, {a.json}); !ready) return ready.error();
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const std::vector<fs::path> files(a.files.begin(), a.files.end());
+    const auto analysis = calibration::analyse_answers(files);
+    if (!analysis) return analysis.error();
+    if (auto ok = report->prepare(to_json(*analysis)); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout()) print(*analysis, a.markdown);
+    return exit_done;
+}
+
+Result<int> run(StudyArguments& a) {
+    switch (a.part) {
+    case StudyArguments::Part::make: return make_study(a);
+    case StudyArguments::Part::run: return run_study(a);
+    case StudyArguments::Part::analyse: return analyse_study(a);
+    }
+    return exit_failed;
+}
+
+// ---- options
+
+void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
+    CLI::App* make = verb.add_subcommand("make", "Draw the pictures of a study");
+    make->add_option("MODEL", a->models, "Trees, meshes or scenes")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb ...");
+    make->add_option("-o,--output", a->folder, "Where pictures and study.json go")->required()->type_name("FOLDER");
+    add_choice<std::optional<StudyTask>, StudyTask>(*make, "--task", a->task,
+                                                    {{"which", StudyTask::which}, {"differ", StudyTask::differ}},
+                                                    "What is asked: which of both is not the original, or whether they "
+                                                    "differ (default: which; of --levels: differ)");
+    make->add_option("--condition", a->conditions,
+                     "What is to be told from the original: imperceptible, threshold:X, pixels:E, triangles:N or "
+                     "triangles:P%; may be given again (default: imperceptible)")
+        ->type_name("NAME")
+        ->allow_extra_args(false);
+    make->add_option("--training", a->training, "Likewise, shown first and not counted (default: triangles:2%)")
+        ->type_name("NAME")
+        ->allow_extra_args(false);
+    CLI::Option* levels = make->add_flag("--levels", a->levels,
+                                         "Of scenes with one object: its discrete levels against the best one, and "
+                                         "what 'unseen render --method perceptual' decides about them");
+    const auto count = [&](const char* name, std::optional<double>& value, double most, const char* text) {
+        make->add_option(name, value, text)->type_name("N")->check(whole(1, most));
+    };
+    count("--views", a->views, 360, "Around each model (default: 5; of scenes 1)");
+    make->add_option("--degrees", a->degrees, "From a view to the next one (default: all around; of scenes 3)")
+        ->type_name("A")
+        ->check(finite_numbers(1));
+    count("--samples", a->samples, 256, "A pixel (default: 64)");
+    count("--repeats", a->repeats, 1000, "Of every pair (default: 2)");
+    make->add_option("--seed", a->seed, "Of orders and sides (default: 1)")
+        ->type_name("N")
+        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+    add_as_option(*make, a->view.as);
+    add_view_options(*make, a->view);
+    add_display_options(*make, a->display);
+    make->callback([a, levels] {
+        a->part = StudyArguments::Part::make;
+        if (*levels && (!a->conditions.empty() || !a->training.empty()))
+            refuse("--levels and --condition or --training exclude each other.");
+        if (*levels && a->task == StudyTask::which) refuse("--levels goes with --task differ.");
+        if (a->conditions.empty()) a->conditions = {"imperceptible"};
+        if (a->training.empty()) a->training = {"triangles:2%"};
+    });
+    make->footer("Examples:\n  unseen study make horse.ply bunny.vdt -o study --views 10 --size 512x512\n"
+                 "  unseen study make museum.glb -o levels --levels --size 512x512 --repeats 8");
+}
+
+void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
+    CLI::App* part = verb.add_subcommand("run", "Show a study to somebody, or let a simulated observer answer");
+    part->add_option("FOLDER", a->folder, "Of 'unseen study make'")->required();
+    part->add_option("--subject", a->subject, "Who answers: orders and sides follow from it (default: unnamed)")
+        ->type_name("NAME")
+        ->check([](const std::string& name) {
+            const bool is_file_name = !name.empty() && name.size() <= 100 && name.find_first_of("/\\\n\r") == name.npos;
+            return is_file_name ? std::string() : "a subject's name goes into a file's: 1 to 100 characters, no slash.";
+        });
+    part->add_option("--answers", a->answers,
+                     "What was answered, and goes on from there (default: answers-NAME.csv in the folder)")
+        ->type_name("FILE.csv");
+    CLI::Option* simulate =
+        part->add_option("--simulate", a->simulate,
+                         "Nobody looks: an observer answers who sees by Barten's model, with noise, "
+                         "and is right in three of four at the threshold: median, default or strict")
+            ->type_name("PERSON");
+    part->add_option("--criterion", a->criterion,
+                     "Of --simulate and the task differ: how many standard deviations of noise a difference must "
+                     "exceed (default: 1, 16% false alarms)")
+        ->type_name("X")
+        ->check(within(-5, 5))
+        ->needs(simulate);
+    part->add_flag("--full-screen", a->window.full_screen, "On the primary monitor")->excludes(simulate);
+    part->add_option("--seconds", a->window.seconds, "Show each pair for so long (default: until it is answered)")
+        ->type_name("T")
+        ->check(positive())
+        ->excludes(simulate);
+    part->add_option("--screenshot", a->window.screenshot, "Keep the last pair shown as a picture")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}))
+        ->excludes(simulate);
+    add_display_options(*part, a->display);
+    part->callback([a] { a->part = StudyArguments::Part::run; });
+    part->footer(std::string(study_window_help) +
+                 "\nExamples:\n  unseen study run study --subject ann --display lab.json --full-screen\n"
+                 "  unseen study run study --subject nobody --simulate median");
+}
+
+void add_analyse(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
+    CLI::App* part = verb.add_subcommand("analyse", "What the answers of all subjects come to");
+    part->add_option("ANSWERS", a->files, "Of 'unseen study run'")->required()->type_name("ANSWERS.csv ...");
+    add_json_option(*part, a->json);
+    part->add_flag("--markdown", a->markdown, "The table in Markdown");
+    part->callback([a] { a->part = StudyArguments::Part::analyse; });
+    part->footer("Examples:\n  unseen study analyse study/answers-*.csv\n"
+                 "  unseen study analyse levels/answers-*.csv --json levels.json");
+}
+
+} // namespace
+
+Command study_command(CLI::App& app) {
+    auto a = std::make_shared<StudyArguments>();
+    CLI::App* verb =
+        app.add_subcommand("study", "Whether people, or a simulated one, tell a simplification from its original");
+    verb->require_subcommand(1);
+    add_make(*verb, a);
+    add_run(*verb, a);
+    add_analyse(*verb, a);
+    verb->footer("Examples:\n  unseen study make horse.ply -o study --views 10 --size 512x512\n"
+                 "  unseen study run study --subject ann\n"
+                 "  unseen study analyse study/answers-*.csv\n\n'unseen study PART --help' tells more.");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

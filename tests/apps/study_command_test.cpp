@@ -1,0 +1,87 @@
+// unseen study: pictures, answers of a simulated observer, and what they come to.
+#include "run_command.h"
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::HasSubstr;
+
+class StudyCommandTest : public DrawingCommandTest {
+protected:
+    Outcome make(const std::vector<std::string>& more = {}) const {
+        std::vector<std::string> words = {"study",   "make",    "ball.vdt", "-o",        "s", "--size",
+                                          "200x160", "--views", "4",        "--samples", "4"};
+        words.insert(words.end(), more.begin(), more.end());
+        return run(words);
+    }
+    Json analysis(const std::vector<std::string>& files) const {
+        std::vector<std::string> words = {"study", "analyse"};
+        words.insert(words.end(), files.begin(), files.end());
+        words.insert(words.end(), {"--json", "-"});
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json();
+    }
+};
+
+TEST_F(StudyCommandTest, WhatIsPlainIsToldAndWhatIsImperceptibleIsNot) {
+    const Outcome made = make({"--repeats", "25", "--condition", "imperceptible", "--condition", "triangles:5%"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    // Training: a view each; two conditions of four views, 25 times.
+    EXPECT_THAT(made.out, HasSubstr("12 pairs, 204 trials"));
+    EXPECT_TRUE(fs::exists(path("s/ball-view4-original.png")));
+    const Outcome ran = run({"study", "run", "s", "--simulate", "default", "--subject", "nobody"});
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    const Json result = analysis({"s/answers-nobody.csv"});
+    ASSERT_EQ(result["conditions"].size(), 2u);
+    for (const Json& condition : result["conditions"]) {
+        EXPECT_EQ(condition["seen"]["of"], 100);
+        if (condition["condition"] == "imperceptible") {
+            EXPECT_LT(condition["seen"]["low"], 0.5);
+            EXPECT_GT(condition["chance"], 0.01);
+        } else {
+            EXPECT_GT(condition["seen"]["share"], 0.9);
+            EXPECT_LT(condition["chance"], 1e-6);
+        }
+    }
+    EXPECT_TRUE(result["careless"].empty());
+}
+
+TEST_F(StudyCommandTest, GoesOnWhereItWasLeft) {
+    ASSERT_EQ(make().status, 0);
+    ASSERT_EQ(run({"study", "run", "s", "--simulate", "median"}).status, 0);
+    const std::string whole = read_text(path("s/answers-unnamed.csv"));
+    std::size_t end = 0;
+    for (int line = 0; line < 5; ++line) end = whole.find('\n', end) + 1;
+    write_text(path("s/answers-unnamed.csv"), whole.substr(0, end));
+    ASSERT_EQ(run({"study", "run", "s", "--simulate", "median"}).status, 0);
+    EXPECT_EQ(read_text(path("s/answers-unnamed.csv")), whole);
+    const Outcome other =
+        run({"study", "run", "s", "--simulate", "median", "--subject", "bob", "--answers", "s/answers-unnamed.csv"});
+    EXPECT_EQ(other.status, 1);
+    EXPECT_THAT(other.err, HasSubstr("the column subject is 'unnamed'"));
+    EXPECT_EQ(read_text(path("s/answers-unnamed.csv")), whole);
+}
+
+TEST_F(StudyCommandTest, RefusesWhatItCannotDo) {
+    const Outcome unknown = make({"--condition", "twice"});
+    EXPECT_EQ(unknown.status, 1);
+    EXPECT_THAT(unknown.err, HasSubstr("'twice' is no condition"));
+    EXPECT_EQ(make({"--condition", "triangles:-5"}).status, 1);
+    EXPECT_EQ(make({"--levels", "--task", "which"}).status, 2);
+    const Outcome nowhere = run({"study", "run", "nowhere", "--simulate", "median"});
+    EXPECT_EQ(nowhere.status, 1);
+    EXPECT_THAT(nowhere.err, HasSubstr("nowhere"));
+    ASSERT_EQ(make().status, 0);
+    EXPECT_EQ(run({"study", "run", "s", "--simulate", "somebody"}).status, 1);
+    EXPECT_EQ(run({"study", "run", "s", "--simulate", "median", "--subject", "../x"}).status, 2);
+    const Outcome near = run({"study", "run", "s", "--simulate", "median", "--distance", "1"});
+    EXPECT_THAT(near.err, HasSubstr("made for 34.4 pixels a degree"));
+    fs::remove(path("s/ball-view2-1.png"));
+    fs::remove(path("s/answers-unnamed.csv"));
+    const Outcome gone = run({"study", "run", "s", "--simulate", "median"});
+    EXPECT_EQ(gone.status, 1);
+    EXPECT_THAT(gone.err, HasSubstr("ball-view2-1.png"));
+}
+
+} // namespace
