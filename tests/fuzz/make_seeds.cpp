@@ -1,13 +1,16 @@
-// Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow}/.
+// Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow,image,text}/.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <span>
 #include <stdexcept>
 #include <string>
 
+#include <calibration/calibration.h>
 #include <meshio/mesh_io.h>
+#include <perception/image.h>
 #include <vdtree/builder.h>
 #include <vdtree/tree_io.h>
 
@@ -127,16 +130,68 @@ void make_drives(const fs::path& folder) {
     }
 }
 
+void make_images(const fs::path& folder) {
+    unseen::perception::Image grey{5, 4, 1, std::vector<float>(20, 0.25f)},
+        colours{3, 2, 3, std::vector<float>(18, 0.5f)};
+    for (const char* ending : {".png", ".pfm", ".exr"}) {
+        expect(unseen::perception::write_image(folder / ("grey" + std::string(ending)), grey));
+        expect(unseen::perception::write_image(folder / ("colours" + std::string(ending)), colours));
+    }
+}
+
+// The first byte chooses the reader: see text_fuzz.cpp.
+void make_texts(const fs::path& folder) {
+    namespace calibration = unseen::calibration;
+    const fs::path data = UNSEEN_DATA, plain = folder / "plain";
+    const auto keep = [&](const std::string& name, char reader) { write_for_reader(folder / name, reader, plain); };
+    write_for_reader(folder / "display.json", '\0', data / "displays/headset-1832x1920.json");
+    const auto& standard = unseen::perception::CsfTable::standard();
+    calibration::CalibrationPlan plan;
+    plan.places = {{2, 0}, {4, 5}};
+    auto procedure = calibration::Procedure::create(plan, standard);
+    if (!procedure) throw std::runtime_error(procedure.error().message);
+    static_cast<void>(procedure->next());
+    procedure->choose(1);
+    expect(procedure->save(plain));
+    keep("procedure.json", '\4');
+    write(folder / "observer.json", "\2{\"format\": \"unseen observer\", \"version\": 1}");
+    write(folder / "csf.json", "\1{\"format\": \"unseen csf\", \"version\": 1}");
+    write(folder / "lights.json",
+          "\3{\"ambient\": 0.1, \"material\": {\"specular\": 0.04, \"shininess\": 40}, \"lights\": [{\"type\": "
+          "\"spot\", \"position\": [0, 3, 0], \"direction\": [0, -1, 0], \"inner_degrees\": 20, "
+          "\"outer_degrees\": 30, \"intensity\": 1, \"distance\": 3, \"shadow\": true}, {\"type\": \"point\", "
+          "\"position\": [1, 2, 3], \"intensity\": 0.5, \"distance\": 3, \"keyframes\": [{\"time_s\": 0, "
+          "\"position\": [1, 2, 3]}]}]}");
+    write(folder / "sensitivities.csv", "\5dataset,frequency_cpd,temporal_hz,eccentricity_deg,luminance_cdm2,area_deg2,"
+                                        "sensitivity\na,2,0,0,50,1,100\n");
+    calibration::Study study{.pixels_per_degree = 30};
+    study.pairs.push_back({"x", folder / "a.png", folder / "b.png", false, true});
+    expect(calibration::write_study(plain, study));
+    keep("study.json", '\6');
+    const auto trials = calibration::trials_of(study, "ann");
+    const calibration::StudyAnswer answer{trials.front(), calibration::StudyChoice::left, 1.5};
+    expect(calibration::write_answers(plain, study, "ann", std::span(&answer, 1)));
+    keep("answers.csv", '\7');
+    for (const auto& entry : fs::directory_iterator(data / "gaze"))
+        write_for_reader(folder / entry.path().filename(), '\10', entry.path());
+    write(folder / "path.csv",
+          "\11eye_x,eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\n0,0,5,0,0,0,3,4\n1,0,5,0,0,"
+          "0,3,4\n");
+    fs::remove(plain);
+}
+
 } // namespace
 
 int main(int count, char** arguments) try {
     if (count != 2) throw std::runtime_error("usage: make_fuzz_seeds FOLDER");
     const fs::path folder = arguments[1];
-    for (const char* target : {"mesh", "tree", "follow"}) fs::create_directories(folder / target);
+    for (const char* target : {"mesh", "tree", "follow", "image", "text"}) fs::create_directories(folder / target);
     make_meshes(folder / "mesh");
     make_vtk(folder / "mesh");
     make_trees(folder / "tree");
     make_drives(folder / "follow");
+    make_images(folder / "image");
+    make_texts(folder / "text");
 } catch (const std::exception& error) {
     std::fprintf(stderr, "make_fuzz_seeds: %s\n", error.what());
     return 1;

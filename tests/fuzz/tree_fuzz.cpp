@@ -8,38 +8,15 @@
 #include <string>
 #include <vector>
 
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <vdtree/tree_io.h>
 
 #include "kept_arrays.h"
+#include "memory_file.h"
 #include "restore.h"
 #include "tree_file.h"
 #include "tree_use.h"
 
 namespace {
-
-// A file that exists in memory only.
-class MemoryFile {
-public:
-    MemoryFile() : descriptor_(::memfd_create("tree", 0)) {
-        if (descriptor_ < 0) std::abort();
-    }
-    MemoryFile(const MemoryFile&) = delete;
-    MemoryFile& operator=(const MemoryFile&) = delete;
-    ~MemoryFile() { ::close(descriptor_); }
-
-    std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
-    void hold(const std::string& bytes) {
-        const auto size = static_cast<ssize_t>(bytes.size());
-        if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, bytes.data(), bytes.size(), 0) != size)
-            std::abort();
-    }
-
-private:
-    int descriptor_;
-};
 
 // What a mesh's file said beyond triangles, as far as it goes without writing files.
 void restore_document(const unseen::vdtree::VertexTree& tree) {
@@ -54,7 +31,7 @@ void restore_document(const unseen::vdtree::VertexTree& tree) {
 }
 
 void read_and_use(const std::string& bytes) {
-    static MemoryFile file;
+    static unseen::fuzz::MemoryFile file;
     file.hold(bytes);
     for (const bool mapped : {false, true}) {
         const auto tree = mapped ? unseen::vdtree::map_tree(file.path()) : unseen::vdtree::read_tree(file.path());
