@@ -254,7 +254,9 @@ Result<SelectionCorner> corner_from(std::span<const std::byte> bytes) {
     return corner;
 }
 
-Result<void> write_selections(const std::filesystem::path& file, const Selections& s) {
+namespace {
+
+ByteWriter head_of(const Selections& s) {
     ByteWriter out;
     for (const char c : selection_magic) out.put(c);
     out.put(selection_version);
@@ -270,6 +272,15 @@ Result<void> write_selections(const std::filesystem::path& file, const Selection
         out.put(static_cast<std::uint32_t>(levels.size()));
         for (const std::uint32_t count : levels) out.put(count);
     }
+    return out;
+}
+
+} // namespace
+
+std::uint64_t search_key(const Selections& selections) { return hash_of(head_of(selections).take()); }
+
+Result<void> write_selections(const std::filesystem::path& file, const Selections& s) {
+    ByteWriter out = head_of(s);
     out.put(static_cast<std::uint32_t>(s.corners.size()));
     for (const SelectionCorner& corner : s.corners) put(out, corner);
     out.put(static_cast<std::uint32_t>(s.cells.size()));

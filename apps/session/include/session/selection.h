@@ -91,6 +91,9 @@ struct Selections {
 // Differs, but for bad luck, where objects, their places, or the triangles of their levels differ.
 std::uint64_t scene_fingerprint(const Scene& scene, std::span<const std::vector<std::uint32_t>> triangles);
 
+// Of all that corners depend on but the place: what selections say but for their corners and cells.
+std::uint64_t search_key(const Selections& selections);
+
 // Whether the corners' selections differ by more than so many levels, in the mean over the objects that any of them has in
 // sight and that are not of the last level everywhere.
 bool corners_differ(std::span<const SelectionCorner* const> corners, double levels);
