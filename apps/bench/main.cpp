@@ -478,9 +478,10 @@ Command selection_command(CLI::App& app) {
         ->check(whole(static_cast<double>(MakeSceneOptions::least_triangles),
                       static_cast<double>(MakeSceneOptions::most_triangles)));
     verb->add_option("--triangles", o.budget, "The budget (default: 300000)")->type_name("N")->check(whole(1, 1e9));
-    verb->add_option("--frames", o.frames, "Of the flight (default: 100; the thesis has 1000)")
+    verb->add_option("--frames", o.frames, "Of the flight (default: 1000)")->type_name("N")->check(whole(2, 100000));
+    verb->add_option("--every", o.judged_every, "Frames of which one is drawn and judged (default: 10)")
         ->type_name("N")
-        ->check(whole(2, 100000));
+        ->check(whole(1, 100000));
     verb->add_option("--size", a->size, "Of the frames (default: 640 360; the thesis has 1920 1080)")
         ->type_name("W H")
         ->expected(2)
@@ -491,13 +492,13 @@ Command selection_command(CLI::App& app) {
     verb->add_flag("--quick", a->quick, "Few frames, one sample a pixel");
     add_report_options(*verb, a->report);
     verb->callback([a] {
-        if (a->quick) a->options.frames = 12, a->options.samples = 1, a->options.gap_cameras = 2;
+        if (a->quick) a->options.judged_every = 100, a->options.samples = 1, a->options.gap_cameras = 2;
         if (!a->size.empty()) a->options.width = a->size[0], a->options.height = a->size[1];
     });
     verb->footer(
         "Examples:\n  unseen-bench selection --quick\n"
         "  unseen-bench selection --mesh bunny.ply --mesh dragon.ply --mesh armadillo.ply --plots plots\n"
-        "  unseen-bench selection mine.glb --selection mine.sel --frames 1000 --size 1920 1080 --json flight.json");
+        "  unseen-bench selection mine.glb --selection mine.sel --every 1 --size 1920 1080 --json flight.json");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -68,12 +68,13 @@ std::vector<vdtree::View> flight(const session::Selections& selections, const Se
 struct FrameFigures {
     std::uint64_t triangles = 0, visible = 0;
     double ssim = 0;
-    int changes = 0;
 };
 
 struct MethodFigures {
     std::string name;
-    std::vector<FrameFigures> frames = {};
+    std::vector<FrameFigures> frames = {};                         // those that were judged
+    double triangles = 0, changes = 0;                             // of all frames, sums
+    std::uint64_t most_triangles = 0, most_changes = 0, count = 0; // of all frames
 
     template <class Value>
     std::array<double, 3> range(Value&& value) const { // largest, least, mean
@@ -203,25 +204,40 @@ public:
         auto renderer = session::SceneRenderer::create(context_, *scene_.session);
         if (!renderer) return renderer.error();
         const auto views = flight(selections_, options_);
-        for (const vdtree::View& view : views) {
-            if (auto begun = begin(view); !begun) return begun.error();
+        for (std::size_t number = 0; number < views.size(); ++number) {
+            const vdtree::View& view = views[number];
+            const bool is_judged = number % static_cast<std::size_t>(options_.judged_every) == 0;
+            if (is_judged)
+                if (auto begun = begin(view); !begun) return begun.error();
             for (std::size_t w = 0; w < ways.size(); ++w) {
                 const auto levels = ways[w].second(view);
                 if (!levels) return levels.error();
+                MethodFigures& method = methods[w];
+                const std::uint64_t triangles_now = scene_.triangles(*levels);
+                std::uint64_t changes = 0;
+                for (std::size_t i = 0; i < last[w].size(); ++i)
+                    changes += last[w][i] >= 0 && (*levels)[i] >= 0 && last[w][i] != (*levels)[i];
+                last[w] = *levels;
+                ++method.count;
+                method.triangles += static_cast<double>(triangles_now);
+                method.changes += static_cast<double>(changes);
+                method.most_triangles = std::max(method.most_triangles, triangles_now);
+                method.most_changes = std::max(method.most_changes, changes);
+                if (!is_judged) continue;
                 const auto frame = scene_.pictures->draw_frame(view, *levels, options_.samples);
                 if (!frame) return frame.error();
                 auto figures = judge(*frame);
                 if (!figures) return figures.error();
-                figures->triangles = scene_.triangles(*levels);
-                for (std::size_t i = 0; i < last[w].size(); ++i)
-                    figures->changes += last[w][i] >= 0 && (*levels)[i] >= 0 && last[w][i] != (*levels)[i];
-                last[w] = *levels;
-                methods[w].frames.push_back(*figures);
+                figures->triangles = triangles_now;
+                method.frames.push_back(*figures);
             }
-            for (std::size_t m = ways.size(); m < methods.size(); ++m) {
+            for (std::size_t m = ways.size(); is_judged && m < methods.size(); ++m) {
                 auto figures = of_tree(*renderer, view, m > ways.size());
                 if (!figures) return figures.error();
                 methods[m].frames.push_back(*figures);
+                ++methods[m].count;
+                methods[m].triangles += static_cast<double>(figures->triangles);
+                methods[m].most_triangles = std::max(methods[m].most_triangles, figures->triangles);
             }
         }
         return methods;
@@ -321,15 +337,14 @@ BenchTable table_of(const std::string& scene, const std::vector<MethodFigures>& 
                           "mean", "changes a frame", "most"});
     const auto count = [](double v) { return grouped(static_cast<std::uint64_t>(std::llround(v))); };
     for (const MethodFigures& m : methods) {
-        const auto triangles = m.range([](auto& f) { return static_cast<double>(f.triangles); });
         const auto ssim = m.range([](auto& f) { return f.ssim; });
         const auto visible = m.range([](auto& f) { return static_cast<double>(f.visible); });
-        const auto changes = m.range([](auto& f) { return static_cast<double>(f.changes); });
+        const auto frames = static_cast<double>(std::max<std::uint64_t>(m.count, 1));
         const bool is_tree = m.name.starts_with("the tree");
-        table.rows.push_back({m.name, count(triangles[2]), count(triangles[0]), rounded(ssim[0], 6),
+        table.rows.push_back({m.name, count(m.triangles / frames), grouped(m.most_triangles), rounded(ssim[0], 6),
                               rounded(ssim[1], 6), rounded(ssim[2], 6), count(visible[0]), count(visible[1]),
-                              count(visible[2]), is_tree ? "" : rounded(changes[2], 2),
-                              is_tree ? "" : count(changes[0])});
+                              count(visible[2]), is_tree ? "" : rounded(m.changes / frames, 2),
+                              is_tree ? "" : grouped(m.most_changes)});
     }
     return table;
 }
@@ -339,9 +354,12 @@ Json to_json(const std::vector<MethodFigures>& methods) {
     for (const MethodFigures& m : methods) {
         Json frames = Json::array();
         for (const FrameFigures& f : m.frames)
-            frames.push_back(
-                {{"triangles", f.triangles}, {"ssim", f.ssim}, {"visible_pixels", f.visible}, {"changes", f.changes}});
-        json.push_back({{"levels", m.name}, {"correlation", number_or_null(correlation(m))}, {"frames", frames}});
+            frames.push_back({{"triangles", f.triangles}, {"ssim", f.ssim}, {"visible_pixels", f.visible}});
+        json.push_back({{"levels", m.name},
+                        {"correlation", number_or_null(correlation(m))},
+                        {"changes", m.changes},
+                        {"most_changes", m.most_changes},
+                        {"frames", frames}});
     }
     return json;
 }
@@ -355,7 +373,7 @@ Result<void> write_plots(const std::string& folder, const std::string& scene,
     for (const bool is_ssim : {true, false}) {
         PanelPlot plot;
         plot.title = scene + (is_ssim ? ": what SSIM is below 1, thousandths" : ": visible pixels");
-        plot.x_label = "frame";
+        plot.x_label = "judged frame";
         for (std::size_t i = 0; i < shown.size(); ++i) {
             Panel& panel = plot.panels.emplace_back();
             panel.label = methods[shown[i]].name;

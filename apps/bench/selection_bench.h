@@ -16,7 +16,8 @@ struct SelectionBenchOptions {
     std::vector<std::string> statues;    // of the scenes that are made
     std::uint64_t scene_triangles = 0;   // of each of them; 0: as the kind has them
     std::uint64_t budget = 300'000;      // triangles
-    int frames = 100;
+    int frames = 1000;
+    int judged_every = 10;         // frames of which one is drawn and judged; levels follow all of them
     int width = 640, height = 360; // pixels
     int samples = 4;               // a pixel
     bool has_masked_tree = false;  // one more row, seconds a frame
