@@ -8,6 +8,7 @@
 #include <session/selection.h>
 #include <session_gpu/precompute_selections.h>
 
+#include "build_team.h"
 #include "interruption.h"
 #include "output_files.h"
 #include "process_team.h"
@@ -57,11 +58,14 @@ std::string counted(std::size_t count, const char* one, const char* many) {
     return grouped(count) + " " + (count == 1 ? one : many);
 }
 
-Result<int> precompute(SelectArguments& a) {
-    const auto joined = ProcessTeam::join();
-    if (!joined) return joined.error();
-    ProcessTeam* const team = joined->get();
-    const bool is_first = !team || team->rank() == 0;
+// What there has to be before anything is drawn.
+struct Ready {
+    JsonReport report;
+    render::Context context;
+    session::Session session;
+};
+
+Result<Ready> get_ready(const SelectArguments& a, bool is_first) {
     if (is_first)
         if (const auto ready = check_outputs(inputs_of(a.scene, a.view, a.display), {a.out, a.json}); !ready)
             return ready.error();
@@ -71,8 +75,28 @@ Result<int> precompute(SelectArguments& a) {
     if (!context) return context.error();
     auto session = open_session(a.scene, a.view, a.display);
     if (!session) return session.error();
+    return Ready{std::move(*report), std::move(*context), std::move(*session)};
+}
+
+Result<int> precompute(SelectArguments& a) {
+    const auto joined = ProcessTeam::join();
+    if (!joined) return joined.error();
+    ProcessTeam* const team = joined->get();
+    const bool is_first = !team || team->rank() == 0;
+    auto ready = get_ready(a, is_first);
+    if (team) {
+        const auto ok = agree(*team, ready ? Result<void>() : Result<void>(ready.error()), 0);
+        if (!ok) {
+            team->leave();
+            if (!is_first) return exit_failed; // the first one says why
+            return ok.error();
+        }
+    } else if (!ready) {
+        return ready.error();
+    }
+    auto& [report, context, session] = *ready;
     PrecomputeOptions options = a.options;
-    options.budget = a.budget.of(session->triangle_count());
+    options.budget = a.budget.of(session.triangle_count());
     options.eye_height = a.eye_height;
     if (!a.grid.empty()) {
         options.low = glm::dvec3(a.grid[0], 0, a.grid[1]);
@@ -93,19 +117,15 @@ Result<int> precompute(SelectArguments& a) {
                 bar(share, stage);
                 return !(is_interrupted = until_interrupted.is_interrupted());
             };
-        done = session::precompute_selections(*context, *session, a.out, options, team);
+        done = session::precompute_selections(context, session, a.out, options, team);
     }
-    if (!is_first) {
-        if (!done) return exit_failed; // the first one says why
-        team->leave();
-        return exit_done;
-    }
+    if (team) team->leave();
+    if (!is_first) return done ? exit_done : exit_failed; // the first one says why
     if (!done && is_interrupted) print_note("interrupted: the same command goes on from '" + a.out + ".part'.");
     if (!done) return done.error();
-    if (team) team->leave();
-    if (auto ok = report->prepare(to_json(*done)); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
-    if (report->is_on_stdout()) return exit_done;
+    if (auto ok = report.prepare(to_json(*done)); !ok) return ok.error();
+    if (auto ok = report.publish(); !ok) return ok.error();
+    if (report.is_on_stdout()) return exit_done;
     print_line("selected levels for " + counted(done->cameras, "camera", "cameras") + " at " +
                counted(done->corners, "corner", "corners") + " of " + counted(done->cells, "cell", "cells") + " in " +
                duration(1e3 * done->seconds) +

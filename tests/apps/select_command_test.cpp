@@ -174,6 +174,14 @@ TEST_F(SelectCommandTest, SeveralProcessesSelectTheSame) {
         EXPECT_TRUE(read_text(path("team.sel")) == read_text(path("alone.sel"))) << processes << " processes";
         fs::remove(path("team.sel"));
     }
+    // What is wrong for all is said once.
+    write_text(path("scene.glb"), "no scene");
+    const Outcome bad = run_shell(
+        "exec timeout -s KILL 120 '" UNSEEN_MPIRUN "' --allow-run-as-root --oversubscribe -np 2 " + text("team.sel"));
+    EXPECT_NE(bad.status, 0);
+    EXPECT_THAT(bad.err, HasSubstr("unseen: "));
+    EXPECT_EQ(bad.err.find("unseen: "), bad.err.rfind("unseen: ")) << bad.err;
+    EXPECT_FALSE(fs::exists(path("team.sel")));
 }
 #endif
 
