@@ -1,4 +1,4 @@
-// The four scenes of `unseen scene make`, for benchmarks.
+// Scenes of `unseen scene make`, for benchmarks.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,15 @@ public:
 
     // museum.glb, treasure.glb, house.glb and forest.glb, of about so many triangles each. Fails as make_scene() does.
     Result<std::vector<std::string>> make(std::uint64_t triangles) const;
+    // spheres.glb, bunnies.glb and models.glb, with these statues; 0 triangles: as the kinds have them.
+    Result<std::vector<std::string>> make_to_select_in(std::uint64_t triangles,
+                                                       const std::vector<std::string>& statues) const;
+
+    std::string file(const std::string& name) const { return (folder_ / name).string(); } // another one in the folder
 
 private:
+    Result<void> make_folder() const;
+
     std::filesystem::path folder_;
 };
 

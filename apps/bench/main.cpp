@@ -26,6 +26,7 @@
 #include "report.h"
 #include "requests_bench.h"
 #include "scenes_bench.h"
+#include "selection_bench.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -436,6 +437,73 @@ Command scenes_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct SelectionArguments {
+    SelectionBenchOptions options;
+    std::vector<int> size;
+    ReportArguments report;
+    bool quick = false;
+};
+
+Result<int> run(SelectionArguments& a) {
+    std::vector<std::string> inputs = a.options.scenes;
+    inputs.insert(inputs.end(), a.options.selections.begin(), a.options.selections.end());
+    inputs.insert(inputs.end(), a.options.statues.begin(), a.options.statues.end());
+    auto bench = BenchRun::open(inputs, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_selection(a.options);
+    if (!result) return result.error();
+    return bench->close({{"budget", a.options.budget},
+                         {"width", a.options.width},
+                         {"height", a.options.height},
+                         {"samples", a.options.samples},
+                         {"scenes", result->scenes}},
+                        result->tables);
+}
+
+Command selection_command(CLI::App& app) {
+    auto a = std::make_shared<SelectionArguments>();
+    SelectionBenchOptions& o = a->options;
+    CLI::App* verb = app.add_subcommand(
+        "selection", "What a flight shows of levels selected beforehand, of switching by area and distance, and of the "
+                     "tree's budget");
+    verb->add_option("SCENE", o.scenes, "Scenes (default: spheres, bunnies and models of 'unseen scene make')")
+        ->type_name("SCENE.glb");
+    verb->add_option("--selection", o.selections, "Of each scene, in their order (default: made here)")
+        ->type_name("FILE.sel")
+        ->allow_extra_args(false);
+    verb->add_option("--mesh", o.statues, "A statue of the default scenes; may be given again")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
+    verb->add_option("--scene-triangles", o.scene_triangles,
+                     "Of each of the default scenes (default: 1.1 to 2.8 million)")
+        ->type_name("N")
+        ->check(whole(static_cast<double>(MakeSceneOptions::least_triangles),
+                      static_cast<double>(MakeSceneOptions::most_triangles)));
+    verb->add_option("--triangles", o.budget, "The budget (default: 300000)")->type_name("N")->check(whole(1, 1e9));
+    verb->add_option("--frames", o.frames, "Of the flight (default: 1000)")->type_name("N")->check(whole(2, 100000));
+    verb->add_option("--every", o.judged_every, "Frames of which one is drawn and judged (default: 10)")
+        ->type_name("N")
+        ->check(whole(1, 100000));
+    verb->add_option("--size", a->size, "Of the frames (default: 640 360; the thesis has 1920 1080)")
+        ->type_name("W H")
+        ->expected(2)
+        ->check(whole(16, 8192));
+    verb->add_option("--samples", o.samples, "A pixel (default: 4)")->type_name("N")->check(whole(1, 256));
+    verb->add_option("--plots", o.plots, "Figures by frame, two plots a scene")->type_name("FOLDER");
+    verb->add_flag("--masked-tree", o.has_masked_tree, "The tree's budget with masking, too: seconds a frame");
+    verb->add_flag("--quick", a->quick, "Few frames, one sample a pixel");
+    add_report_options(*verb, a->report);
+    verb->callback([a] {
+        if (a->quick) a->options.judged_every = 100, a->options.samples = 1, a->options.gap_cameras = 2;
+        if (!a->size.empty()) a->options.width = a->size[0], a->options.height = a->size[1];
+    });
+    verb->footer(
+        "Examples:\n  unseen-bench selection --quick\n"
+        "  unseen-bench selection --mesh bunny.ply --mesh dragon.ply --mesh armadillo.ply --plots plots\n"
+        "  unseen-bench selection mine.glb --selection mine.sel --every 1 --size 1920 1080 --json flight.json");
+    return {verb, [a] { return run(*a); }};
+}
+
 struct AccuracyArguments {
     AccuracyBenchOptions options;
     std::string csv, html, plots;
@@ -521,8 +589,9 @@ constexpr const char* examples = R"(Examples:
 int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
-        return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
-                                    budget_command(app), requests_command(app),   fit_command(app),
-                                    people_command(app), scenes_command(app),     accuracy_command(app)};
+        return std::vector<Command>{engine_command(app),  perception_command(app), effects_command(app),
+                                    budget_command(app),  requests_command(app),   fit_command(app),
+                                    people_command(app),  scenes_command(app),     selection_command(app),
+                                    accuracy_command(app)};
     });
 }

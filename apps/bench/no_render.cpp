@@ -5,6 +5,7 @@
 #include "perception_bench.h"
 #include "requests_bench.h"
 #include "scenes_bench.h"
+#include "selection_bench.h"
 
 namespace unseen::app {
 namespace {
@@ -22,6 +23,7 @@ Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pi
 Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }
+Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions&) { return no_pictures(); }
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions&) { return no_pictures(); }
 std::string to_csv(const AccuracyBenchResult&) { return {}; }
 std::string to_html(const AccuracyBenchResult&) { return {}; }

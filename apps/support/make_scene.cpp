@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <system_error>
 
 #include <meshio/mesh_io.h>
+#include <vdtree/builder.h>
+#include <vdtree/cut.h>
 
 #include "scene_draft.h"
 #include "scene_parts.h"
@@ -24,6 +27,24 @@ constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj";
 // Lux and such are of no account for the picture: white that faces the sun is at 1, less the ambient light.
 constexpr double sun_lux = 1;
 
+// By a quadric hierarchy, as unobtrusively as so many triangles can be.
+Result<vdtree::Mesh> with_at_most(const vdtree::Mesh& mesh, std::uint64_t triangles) {
+    if (mesh.triangles.size() <= triangles) return mesh;
+    const auto tree = vdtree::build_tree(mesh.view());
+    if (!tree) return tree.error();
+    vdtree::Cut cut(*tree);
+    const std::span<const float> sizes = tree->displacement();
+    cut.adjust(
+        [&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> nodes, std::span<float> costs) {
+            for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = sizes[nodes[i]];
+        },
+        {.visibility = {}, .triangle_budget = static_cast<vdtree::Index>(triangles)});
+    vdtree::Mesh less = set_upright(vdtree::extract_mesh(cut));
+    less.colours.clear(), less.uvs.clear(), less.ranges.clear(), less.document.clear();
+    less.texture = {};
+    return less;
+}
+
 class Maker {
 public:
     explicit Maker(const MakeSceneOptions& options) : options_(options), chance_(options.seed) {}
@@ -33,7 +54,10 @@ public:
         const auto made = options_.kind == SceneKind::museum     ? museum()
                           : options_.kind == SceneKind::treasure ? treasure()
                           : options_.kind == SceneKind::house    ? house()
-                                                                 : forest();
+                          : options_.kind == SceneKind::forest   ? forest()
+                          : options_.kind == SceneKind::spheres  ? spheres()
+                          : options_.kind == SceneKind::bunnies  ? bunnies()
+                                                                 : models();
         if (!made) return made.error();
         return std::move(draft_);
     }
@@ -72,6 +96,75 @@ private:
         if (made.size() < most) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
         if (made.size() < most) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
         return made;
+    }
+
+    // As they are where they have no more than so many triangles, else simplified to that; and as many made ones as are
+    // missing.
+    Result<std::vector<std::size_t>> models_of(std::uint64_t triangles, std::size_t count) {
+        std::vector<std::size_t> made;
+        for (const Scanned& scanned : scanned_) {
+            if (made.size() == count) break;
+            auto mesh = with_at_most(scanned.mesh, triangles);
+            if (!mesh) return mesh.error();
+            made.push_back(draft_.add_mesh(scanned.name, std::move(*mesh), 0.7));
+        }
+        if (made.size() < count) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
+        if (made.size() < count) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
+        return made;
+    }
+
+    // Forty objects on a plain in the sun. `at`: where each stands.
+    void plain(const std::vector<std::size_t>& meshes, double size, const std::function<glm::dvec3(int)>& at,
+               double wide, double deep) {
+        for (int i = 0; i < crowd; ++i)
+            draft_.add(meshes[static_cast<std::size_t>(i) % meshes.size()], "object " + std::to_string(i),
+                       {.at = at(i), .turn_degrees = chance_.next(0, 360), .scale = glm::dvec3(size)});
+        const double side = std::max(wide, deep) + 40;
+        draft_.add(draft_.add_mesh("ground", ground(side, 60, 0.0, options_.seed), 0.35), "ground", {.at = {0, 0, 0}},
+                   true);
+        draft_.add_sun({0.4, 0.8, 0.5}, sun_lux);
+        draft_.set_light(0.8, 0.2);
+        draft_.set_camera({-wide / 2, 1.7, deep / 2}, {0, 1.2, 0}, 60);
+    }
+
+    // Each somewhere in its cell.
+    std::function<glm::dvec3(int)> in_cells(double cell, double stray) {
+        return [this, cell, stray](int i) {
+            return glm::dvec3((i % across - (across - 1) * 0.5) * cell + chance_.next(-stray, stray), 0,
+                              (i / across - (crowd / across - 1) * 0.5) * cell + chance_.next(-stray, stray));
+        };
+    }
+
+    Result<void> spheres() {
+        const std::size_t mesh = draft_.add_mesh("sphere", sphere(triangles(crowd * 28'560) / crowd), 0.6);
+        plain({mesh}, 1.8, in_cells(3, 0.3), across * 3, crowd / across * 3);
+        return {};
+    }
+
+    Result<void> bunnies() {
+        const auto meshes = models_of(triangles(crowd * 70'000) / crowd, 2);
+        if (!meshes) return meshes.error();
+        plain(*meshes, 1.8, in_cells(7, 2), across * 7, crowd / across * 7);
+        return {};
+    }
+
+    Result<void> models() {
+        const std::uint64_t each = triangles(crowd * 70'000) / crowd;
+        auto meshes = models_of(each, 4);
+        if (!meshes) return meshes.error();
+        meshes->push_back(draft_.add_mesh("sphere", sphere(each * 28'560 / 70'000), 0.6));
+        // The first half in a crowd to the left, the others wide apart to the right.
+        plain(
+            *meshes, 1.8,
+            [this](int i) {
+                const bool in_crowd = i < crowd / 2;
+                const int n = i % (crowd / 2);
+                const double cell = in_crowd ? 2.6 : 8;
+                return glm::dvec3((in_crowd ? -14 : 12) + (n % 5 - 2) * cell + chance_.next(-0.3, 0.3), 0,
+                                  (n / 5 - 1.5) * cell + chance_.next(-0.3, 0.3));
+            },
+            56, 32);
+        return {};
     }
 
     void wall(const std::string& name, glm::dvec3 size, glm::dvec3 foot, double cell = 0.25, double grey = 0.6) {
@@ -238,6 +331,7 @@ private:
         return {};
     }
 
+    static constexpr int crowd = 40, across = 8;
     struct Scanned {
         std::string name;
         vdtree::Mesh mesh;

@@ -16,6 +16,10 @@ enum class SceneKind {
     treasure, // a chamber with many statues, urns and rings
     house,    // a front with columns, statues and balcony bars, trees before it
     forest,   // statues among trees of thousands of leaves
+    // After those of Arlebrink and Linde (2018), forty objects each:
+    spheres, // spheres alone, close to each other
+    bunnies, // two of the statues, far from each other: bunnies and dragons where these are given
+    models,  // spheres and all statues, some in a crowd, some apart
 };
 
 // Which bars a museum has.
@@ -23,12 +27,13 @@ enum class MuseumBars { both, gate, window, none };
 
 struct MakeSceneOptions {
     SceneKind kind = SceneKind::museum;
-    std::uint64_t triangles = 0; // of all objects, about; 0: as the kind has them, 0.3 to 2 million
+    std::uint64_t triangles = 0; // of all objects, about; 0: as the kind has them, 0.3 to 2.8 million
     std::uint64_t seed = 1;      // of what is strewn about
     double bars_per_metre = 8;   // of museums, 1 to 100
     MuseumBars bars = MuseumBars::both;
     // Statues: meshes to take instead of the bunny of Debian's package glmark2-data, which is taken where it is
-    // installed, and left out where not.
+    // installed, and left out where not. Of the last three kinds: those with more triangles than an object may have are
+    // simplified; the other kinds leave them out.
     std::vector<std::filesystem::path> statues = {};
     Progress progress = {};
 

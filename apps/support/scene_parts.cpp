@@ -227,6 +227,18 @@ vdtree::Mesh bar(double height, double radius, int segments) {
     return lathe(profile, segments);
 }
 
+vdtree::Mesh sphere(std::uint64_t triangles) {
+    // As many segments as twice the rows, so that triangles at the equator are about square.
+    const int rows = std::max(4, static_cast<int>(std::lround(std::sqrt(static_cast<double>(triangles) / 4))));
+    std::vector<glm::dvec2> profile = {{0, 0}};
+    for (int i = 1; i < rows; ++i) {
+        const double angle = pi * i / rows;
+        profile.emplace_back(0.5 * std::sin(angle), 0.5 - 0.5 * std::cos(angle));
+    }
+    profile.emplace_back(0, 1);
+    return lathe(profile, 2 * rows);
+}
+
 vdtree::Mesh urn(std::uint64_t triangles) {
     const Fineness fine = fineness_for(triangles, 1.2);
     std::vector<glm::dvec2> profile;

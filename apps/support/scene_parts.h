@@ -33,6 +33,7 @@ vdtree::Mesh bar(double height, double radius, int segments);
 
 // Of about so many triangles each, closed, a metre high.
 vdtree::Mesh urn(std::uint64_t triangles);
+vdtree::Mesh sphere(std::uint64_t triangles);
 vdtree::Mesh knot(std::uint64_t triangles); // a knotted tube with ribs
 vdtree::Mesh column(std::uint64_t triangles);
 vdtree::Mesh ring(std::uint64_t triangles);

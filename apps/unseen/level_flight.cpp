@@ -11,6 +11,7 @@
 
 #include <perception/image.h>
 #include <render/target.h>
+#include <session/selection_follower.h>
 #include <session_gpu/frame_image.h>
 
 #include "camera_path.h"
@@ -33,11 +34,15 @@ using session::LevelFrame;
 using session::LevelMethod;
 using session::LevelTest;
 using session::LevelTimes;
+using session::SelectionFollower;
 
 constexpr int gap = 4; // pixels between panels
 
 const char* name_of(LevelMethod method) {
-    return method == LevelMethod::distance ? "distance" : method == LevelMethod::area ? "area" : "perceptual";
+    return method == LevelMethod::distance ? "distance"
+           : method == LevelMethod::area   ? "area"
+           : method == LevelMethod::given  ? "selection"
+                                           : "perceptual";
 }
 
 const char* name_of(LevelDecision decision) {
@@ -247,6 +252,8 @@ Json to_json(const session::Session& session, const LevelControl& control, const
     if (options.control.method == LevelMethod::perceptual) {
         json["maps"] = options.control.maps == session::MapRecipe::modern ? "modern" : "rpg99";
         json["layers"] = options.control.layers;
+    } else if (options.control.method == LevelMethod::given) {
+        json["selection"] = options.selection;
     } else {
         json["bias"] = options.control.bias;
     }
@@ -323,11 +330,31 @@ void print_summary(const LevelFlightOptions& options, const Records& records, co
                  {"control of levels", rounded(totals.mean.control_ms, 4)}});
 }
 
+// Of the file of selected levels, for the levels that are drawn.
+Result<SelectionFollower> follower_of(const session::Session& session, const LevelControl& control,
+                                      const LevelFlightOptions& options) {
+    auto selections = session::read_selections(options.selection);
+    if (!selections) return selections.error();
+    std::vector<std::vector<std::uint32_t>> triangles;
+    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) {
+        auto& counts = triangles.emplace_back();
+        for (int level = 0; level < control.chain(i).size(); ++level)
+            counts.push_back(control.chain(i).triangles(level));
+    }
+    const bool has_budget = options.what.budget.is_given();
+    auto follower = SelectionFollower::create(
+        std::move(*selections), session.scene(), triangles,
+        {.budget = has_budget ? std::uint64_t{options.what.budget.of(session.triangle_count())} : 0});
+    if (!follower) return Error{follower.error().code, "'" + options.selection + "': " + follower.error().message};
+    return follower;
+}
+
 } // namespace
 
 Result<void> draw_levels(const std::string& model, const ViewOptions& view_options, const DisplayOptions& display,
                          const LevelFlightOptions& options) {
     std::vector<std::string> inputs = inputs_of(model, view_options, display);
+    inputs.push_back(options.selection);
     inputs.push_back(options.path);
     if (const auto ready = check_outputs(inputs, {options.json, options.out}); !ready) return ready;
     std::optional<CameraPath> path;
@@ -363,7 +390,23 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
         view.up = pose.up;
         if (pose.gaze_px) session->set_gaze(session::Gaze{*pose.gaze_px});
     };
+    std::optional<SelectionFollower> follower;
+    if (options.control.method == LevelMethod::given) {
+        auto made = follower_of(*session, *control, options);
+        if (!made) return made.error();
+        follower = std::move(*made);
+    }
+    std::size_t over_budget = 0;
+    const auto select = [&]() -> Result<void> {
+        if (!follower) return {};
+        const auto chosen = follower->choose(view);
+        if (!chosen) return chosen.error();
+        control->set_levels(chosen->levels);
+        over_budget += !chosen->holds;
+        return {};
+    };
     if (!poses.empty()) aim(poses.front());
+    if (auto selected = select(); !selected) return selected;
     auto settled = control->settle(view);
     if (!settled) return settled.error();
     records.settling_frames = settled->number + 1;
@@ -376,6 +419,7 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             aim(poses[i]);
             session->set_time(static_cast<double>(i) / options.frames_a_second);
+            if (auto selected = select(); !selected) return selected;
             auto frame = control->draw(view);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
             records.add(std::move(*frame));
@@ -410,6 +454,9 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
     if (records.frames.size() < poses.size())
         print_note("interrupted after " + grouped(records.frames.size()) + " of " + grouped(poses.size()) + " frames.");
     print_summary(options, records, *session, levels);
+    if (over_budget > 0)
+        print_note("in " + grouped(over_budget) +
+                   " frames even the coarsest levels have more triangles than the budget.");
     if (poses.empty()) print_written({options.out, options.json});
     else print_written({options.json});
     if (!poses.empty() && !options.out.empty())

@@ -23,6 +23,8 @@ struct LevelFlightOptions {
     std::string path; // see camera_path.h; empty: one picture, of the view in which nothing changes any more
     std::string out;  // of pictures: with a path a name with one %d; empty: none
     std::string json;
+    std::string
+        selection; // of the method `given`: a file of selected levels, whose budget counts where `what` has none
     std::optional<LevelPicture> show;
     double frames_a_second = 60;
     WhatOptions what;

@@ -26,7 +26,7 @@ namespace {
 // seen.
 constexpr int samples_to_judge = 64;
 
-enum class Method { tree, perceptual, distance, area };
+enum class Method { tree, perceptual, distance, area, selection };
 
 // What --show draws instead of the picture.
 struct Shown {
@@ -70,9 +70,10 @@ Result<int> run_flight(RenderArguments& a) {
 }
 
 Result<int> run_levels(RenderArguments& a) {
-    a.levels.control.method = a.method == Method::distance ? session::LevelMethod::distance
-                              : a.method == Method::area   ? session::LevelMethod::area
-                                                           : session::LevelMethod::perceptual;
+    a.levels.control.method = a.method == Method::distance    ? session::LevelMethod::distance
+                              : a.method == Method::area      ? session::LevelMethod::area
+                              : a.method == Method::selection ? session::LevelMethod::given
+                                                              : session::LevelMethod::perceptual;
     a.levels.path = a.flight.path;
     a.levels.out = a.out;
     a.levels.json = a.json;
@@ -183,7 +184,8 @@ void check_levels(const RenderArguments& a) {
     if (a.show.map) refuse("--show cost, frequency, contrast and eccentricity are of cuts, and exclude --method.");
     if (a.show.levels && *a.show.levels != LevelPicture::levels && a.method != Method::perceptual)
         refuse("--show layers, combinations and maps need --method perceptual.");
-    if (a.what.request.goal.kind != Goal::Kind::imperceptible)
+    const bool has_budget = a.method == Method::selection && a.what.budget.is_given();
+    if (a.what.request.goal.kind != Goal::Kind::imperceptible && !has_budget)
         refuse("--full, --triangles and --pixels are of cuts, and exclude --method: give --bias to have as many "
                "triangles.");
     if (a.what.request.threshold != 1 || o.geomorph_seconds || o.judges_changes || !o.csv.empty() || !o.plot.empty())
@@ -250,10 +252,15 @@ void add_level_options(CLI::App& verb, RenderArguments& a) {
                                {{"tree", Method::tree},
                                 {"perceptual", Method::perceptual},
                                 {"distance", Method::distance},
-                                {"area", Method::area}},
+                                {"area", Method::area},
+                                {"selection", Method::selection}},
                                "tree (default): cuts. Or levels by what the rest of the picture masks (perceptual, "
-                               "after Drettakis and others 2007), by distance, or by the area of the bounding sphere. "
+                               "after Drettakis and others 2007), by distance, or by the area of the bounding sphere; "
+                               "or as 'unseen select' has "
+                               "found them, within its budget or --triangles (selection). "
                                "Without --path, the picture in which nothing changes any more");
+    group.add_option("--selection", a.levels.selection, "Of selection: what 'unseen select precompute' has written")
+        ->type_name("FILE.sel");
     auto& control = a.levels.control;
     group
         .add_option("--bias", control.bias,
@@ -337,15 +344,22 @@ Command render_command(CLI::App& app) {
         for (std::size_t i = 0; i < of_levels.size(); ++i) {
             const bool is_of_all = i == 1 || i + 1 == of_levels.size();
             const bool is_of_masking = i == 2 && a->what.masks;
+            const bool has_own = i == 1 && a->method == Method::selection; // levels
+
             const bool fits = is_of_masking ? true
                               : i == 0      ? a->method == Method::distance || a->method == Method::area
-                              : is_of_all   ? has_levels
+                              : is_of_all   ? has_levels && !has_own
                                             : a->method == Method::perceptual;
             if (!of_levels[i]->empty() && !fits)
-                refuse(of_levels[i]->get_name() + (i == 0      ? " needs --method distance or area."
+                refuse(of_levels[i]->get_name() + (has_own  ? " excludes --method selection: its levels are the file's."
+                                                   : i == 0 ? " needs --method distance or area."
                                                    : is_of_all ? " needs --method."
                                                                : " needs --method perceptual."));
         }
+        if (a->method == Method::selection && a->levels.selection.empty())
+            refuse("--method selection needs --selection FILE.sel: make one with 'unseen select precompute'.");
+        if (a->method != Method::selection && !a->levels.selection.empty())
+            refuse("--selection needs --method selection.");
         if (a->levels.control.fade_frames > 0 && a->flight.path.empty())
             refuse("--fade needs --path: a still picture does not change.");
         if (has_levels && !samples->empty()) refuse("--samples is of cuts: levels are drawn with one sample a pixel.");
@@ -380,7 +394,8 @@ Command render_command(CLI::App& app) {
         "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60\n"
         "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv\n"
         "  unseen render museum.glb --method perceptual --maps rpg99 -o levels.png --show levels\n"
-        "  unseen render house.glb --method area --bias 0.5 --path orbit:1:90 -o frames/%04d.png --json stats.json");
+        "  unseen render house.glb --method area --bias 0.5 --path orbit:1:90 -o frames/%04d.png --json stats.json\n"
+        "  unseen render spheres.glb --method selection --selection spheres.sel --path walk:3:120 --json -");
     return {verb, [a] { return run(*a); }};
 }
 

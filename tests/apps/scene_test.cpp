@@ -381,7 +381,7 @@ TEST_F(SceneTest, SaysWhichItWas) {
 }
 
 TEST_F(SceneTest, MakesScenesOfEachKind) {
-    for (const std::string kind : {"museum", "treasure", "house", "forest"}) {
+    for (const std::string kind : {"museum", "treasure", "house", "forest", "spheres", "bunnies", "models"}) {
         ASSERT_EQ(run({"scene", "make", kind, "-o", kind + ".glb", "--triangles", "30000"}).status, 0);
         ASSERT_EQ(run({"scene", "make", kind, "-o", "again.glb", "--triangles", "30000"}).status, 0);
         EXPECT_EQ(read_text(path(kind + ".glb")), read_text(path("again.glb"))) << "the same every time";
@@ -392,6 +392,15 @@ TEST_F(SceneTest, MakesScenesOfEachKind) {
         EXPECT_GT(scene["background_triangles"], 0);
     }
     EXPECT_EQ(run({"info", "forest.glb", "--json"}).json()["objects"], 1000);
+    for (const char* kind : {"spheres.glb", "bunnies.glb", "models.glb"})
+        EXPECT_EQ(run({"info", kind, "--json"}).json()["objects"], 40) << kind;
+    // Statues with more triangles than an object may have are simplified.
+    write_ball("ball.obj", 40, 60); // 4,680 triangles
+    const Outcome less = run(
+        {"scene", "make", "bunnies", "-o", "less.glb", "--mesh", "ball.obj", "--triangles", "40000", "--json", "-"});
+    ASSERT_EQ(less.status, 0) << less.err;
+    EXPECT_LE(less.json()["triangles"], 44'000);
+    EXPECT_GT(less.json()["triangles"], 30'000);
     ASSERT_EQ(run({"scene", "make", "forest", "-o", "other.glb", "--triangles", "30000", "--seed", "2"}).status, 0);
     EXPECT_NE(read_text(path("forest.glb")), read_text(path("other.glb")));
     const auto bars = [&](const std::vector<std::string>& words) {

@@ -75,6 +75,20 @@ WorldSphere world_sphere(const Object& object) {
             object.placement.scale * sphere.radius};
 }
 
+bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
+    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+    const glm::dvec3 to = sphere.centre - view.eye;
+    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360),
+                 half_right = half_up * view.width / view.height;
+    const double ahead = -glm::dot(to, frame.back);
+    if (ahead < -sphere.radius) return false;
+    // Beyond a side of the window: the distance from its plane through the eye.
+    const auto is_beyond = [&](double aside, double half) {
+        return (std::abs(aside) - half * ahead) / std::sqrt(1 + half * half) > sphere.radius;
+    };
+    return !is_beyond(glm::dot(to, frame.right), half_right) && !is_beyond(glm::dot(to, frame.up), half_up);
+}
+
 WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
     if (!cache.all) {
         const vdtree::VertexTree& tree = object.tree;

@@ -21,6 +21,7 @@
 #include <render/stage_times.h>
 #include <render/visibility.h>
 #include <session_gpu/gpu_judge.h>
+#include <session_gpu/level_pictures.h>
 
 namespace unseen::session {
 namespace {
@@ -47,20 +48,6 @@ Result<void> check(const LevelControlOptions& o) {
 // After a frame of another size failed for want of memory.
 Error no_picture() {
     return {ErrorCode::invalid_argument, "There is no picture: the last frame could not be drawn. Draw one first."};
-}
-
-bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
-    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
-    const glm::dvec3 to = sphere.centre - view.eye;
-    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360),
-                 half_right = half_up * view.width / view.height;
-    const double ahead = -glm::dot(to, frame.back);
-    if (ahead < -sphere.radius) return false;
-    // Beyond a side of the window: the distance from its plane through the eye.
-    const auto is_beyond = [&](double aside, double half) {
-        return (std::abs(aside) - half * ahead) / std::sqrt(1 + half * half) > sphere.radius;
-    };
-    return !is_beyond(glm::dot(to, frame.right), half_right) && !is_beyond(glm::dot(to, frame.up), half_up);
 }
 
 // A light that casts shadows, in the world.
@@ -220,7 +207,8 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
         const vdtree::VertexTree& tree = session.tree(i);
         auto levels = trees.find(&tree.data());
         if (levels == trees.end()) {
-            auto chain = level_chain(session, from, request, i, options.chain);
+            auto chain = options.method == LevelMethod::given ? selection_chain(session, i)
+                                                              : level_chain(session, from, request, i, options.chain);
             if (!chain) return chain.error();
             const auto uploaded = tree_of(tree);
             if (!uploaded) return uploaded.error();
@@ -485,6 +473,7 @@ void LevelControl::Impl::take_times(LevelFrame& frame) {
 int LevelControl::Impl::chosen_level(const Thing& thing, const vdtree::View& from) const {
     const LevelChain& chain = thing.levels->chain;
     int level = chain.size() - 1;
+    if (options.method == LevelMethod::given) return thing.level;
     if (options.method == LevelMethod::distance) {
         const double distance =
             std::max(glm::length(thing.sphere.centre - from.eye) - thing.sphere.radius, 0.0) / thing.placement.scale;
@@ -712,6 +701,15 @@ Result<LevelFrame> LevelControl::draw(const vdtree::View& view) { return impl_->
 void LevelControl::set_bias(double bias) {
     assert(bias > 0 && std::isfinite(bias));
     impl_->options.bias = bias;
+}
+
+void LevelControl::set_levels(std::span<const int> levels) {
+    Impl& own = *impl_;
+    assert(own.options.method == LevelMethod::given && levels.size() == own.things.size());
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+        const int last = own.things[i].levels->chain.size() - 1;
+        own.things[i].level = levels[i] < 0 ? last : std::min(levels[i], last);
+    }
 }
 
 bool LevelControl::is_settled() const noexcept {

@@ -21,6 +21,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <render/context.h>
@@ -36,6 +37,7 @@ enum class LevelMethod {
     perceptual, // what is seen of a better one, see above
     distance,   // the farthest-reaching level that nobody sees from where the eye is, LevelChain::unseen_from()
     area,       // the one with so many triangles for each pixel that the bounding sphere covers
+    given,      // set_levels(); of the chains of selection_chain(), and the options' chain does not count
 };
 enum class MapRecipe {
     modern, // perception::threshold_map_modern()
@@ -113,6 +115,9 @@ public:
 
     // LevelControlOptions::bias, from the next frame on; above 0 and finite.
     void set_bias(double bias);
+
+    // Of the method `given`, from the next frame on, by object; -1 and levels that an object lacks: its last one.
+    void set_levels(std::span<const int> levels);
 
     // Waits for the GPU, and lets what it has counted decide: for programs that write each frame down, and not for those
     // that show it. Only tests and times of what it returns are filled in.
