@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // Corners that a member does before all talk to each other again.
-constexpr std::size_t corners_at_a_time = 4;
+constexpr std::size_t corners_at_a_time = 12;
 constexpr double walker_eye = 1.7; // world units above the lowest object
 constexpr int default_cells = 10;  // along the longer side
 
