@@ -30,6 +30,9 @@
 #include <session/plan.h>
 #include <session/request.h>
 #include <session/scene.h>
+#include <session/selection.h>
+#include <session/selection_follower.h>
+#include <session/selection_search.h>
 #include <session/simplification.h>
 #include <session/tree_cache.h>
 #include <vdtree/distance_criterion.h>
