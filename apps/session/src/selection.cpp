@@ -11,6 +11,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include <session/level_chain.h>
+#include <session/session.h>
 #include <vdtree/internal/atomic_file.h>
 #include <vdtree/internal/errors.h>
 

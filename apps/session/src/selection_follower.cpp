@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <session/session.h>
 #include <vdtree/internal/errors.h>
 
 namespace unseen::session {

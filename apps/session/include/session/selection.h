@@ -14,8 +14,8 @@
 
 #include <glm/vec3.hpp>
 
+#include <session/scene.h>
 #include <session/selection_search.h>
-#include <session/session.h>
 
 namespace unseen::session {
 

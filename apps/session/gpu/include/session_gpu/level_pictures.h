@@ -7,7 +7,9 @@
 
 #include <render/context.h>
 #include <render/renderer.h>
+#include <session/level_chain.h>
 #include <session/selection.h>
+#include <session/session.h>
 
 namespace unseen::session {
 

@@ -11,6 +11,7 @@
 
 #include <render/context.h>
 #include <session/selection.h>
+#include <session/session.h>
 #include <vdtree/function_ref.h>
 #include <vdtree/team.h>
 
