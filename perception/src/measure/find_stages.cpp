@@ -610,13 +610,13 @@ private:
     tbb::enumerable_thread_specific<Surfaces> surfaces_;
 };
 
-} // namespace
-
 bool has_stages(const VertexTree& tree) {
     const float radius = tree.bounding_sphere().radius;
     const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
     return !is_translucent && radius > 0 && std::isfinite(side / (2 * radius));
 }
+
+} // namespace
 
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 

@@ -28,7 +28,4 @@ LitStages find_lit_stages(const vdtree::SoundTree& tree, const TexturedLight& te
                           std::span<const FoldTexture> textures, std::span<FoldError> errors,
                           MeasuringProgress& progress);
 
-// Whether these find any.
-bool has_stages(const vdtree::VertexTree& tree);
-
 } // namespace unseen::perception
