@@ -1,7 +1,7 @@
 # unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ...)
 #
 # One module of the house: a static library `unseen_<name>`, alias and export name `unseen::<name>`, whose public headers lie in
-# include/<name> and are installed to <include>/unseen/<name>. DEPENDS is what its headers need, PRIVATE_DEPENDS what
+# include/unseen/<name> and are installed alike. DEPENDS is what its headers need, PRIVATE_DEPENDS what
 # only its sources need.
 function(unseen_add_library name)
     cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
@@ -17,7 +17,7 @@ function(unseen_add_library name)
     if(UNSEEN_INSTALL)
         install(TARGETS ${target} EXPORT unseen_${name}_targets
             ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
-            FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/unseen COMPONENT ${name})
+            FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${name})
         install(EXPORT unseen_${name}_targets NAMESPACE unseen:: FILE unseen_${name}_targets.cmake
             DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen COMPONENT ${name})
     endif()

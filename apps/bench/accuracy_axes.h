@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <render/context.h>
-#include <session/session.h>
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
 
 #include "accuracy_bench.h"
 

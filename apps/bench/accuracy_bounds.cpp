@@ -14,9 +14,9 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/criteria.h>
-#include <vdtree/normal_mask.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "bench_tools.h"
 #include "build/bounding_sphere.h" // vdtree's own

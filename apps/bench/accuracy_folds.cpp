@@ -11,10 +11,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <session/level_chain.h>
-#include <session_gpu/as_seen.h>
-#include <session_gpu/tradeoff.h>
-#include <vdtree/builder.h>
+#include <unseen/session/level_chain.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/tradeoff.h>
+#include <unseen/vdtree/builder.h>
 
 #include "bench_tools.h"
 #include "peer_simplify.h"

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include <session_gpu/level_control.h>
+#include <unseen/session_gpu/level_control.h>
 
 #include "bench_tools.h"
 #include "level_cuts.h"

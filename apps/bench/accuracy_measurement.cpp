@@ -5,9 +5,9 @@
 #include <functional>
 #include <optional>
 
-#include <perception/fold_measurement.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_tools.h"
 #include "picture_judge.h"

@@ -10,14 +10,14 @@
 
 #include <glm/gtc/packing.hpp>
 
-#include <perception/csf.h>
-#include <perception/judge.h>
-#include <perception/judge_tables.h>
-#include <render/elevation.h>
-#include <render/visibility.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/gpu_judge.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/judge.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/render/elevation.h>
+#include <unseen/render/visibility.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
 #include "picture_judge.h"

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include <sample_mesh.h>
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "child_process.h"
 #include "terminal.h"

@@ -8,8 +8,8 @@
 
 #include <sched.h>
 
-#include <vdtree/cut.h>
-#include <vdtree/function_ref.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::app {
 

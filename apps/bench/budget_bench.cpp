@@ -7,11 +7,11 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
-#include <perception/judge.h>
-#include <render/renderer.h>
-#include <session_gpu/frame_image.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/vdtree/cut.h>
 
 #include "drawing.h"
 #include "model_file.h"

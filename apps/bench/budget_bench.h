@@ -8,7 +8,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "bench_table.h"
 #include "options.h"

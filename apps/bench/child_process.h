@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

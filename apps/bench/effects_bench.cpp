@@ -8,9 +8,9 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
-#include <session/model_file.h>
-#include <session/session.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/session/model_file.h>
+#include <unseen/session/session.h>
 
 #include "bench_tools.h"
 #include "model_file.h"

@@ -11,14 +11,14 @@
 #include <unordered_map>
 #include <utility>
 
-#include <meshio/mesh_io.h>
-#include <perception/criterion.h>
-#include <perception/fold_measurement.h>
 #include <sample_mesh.h>
 #include <subdivide.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "bench_tools.h"
 #include "child_process.h"

@@ -7,8 +7,8 @@
 #include <random>
 
 #include <hard_mesh.h>
-#include <perception/criterion.h>
-#include <render/context.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/render/context.h>
 
 #include "judged_model.h"
 #include "progress_bar.h"

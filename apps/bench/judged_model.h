@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
-#include <perception/image.h>
-#include <perception/judge.h>
-#include <render/renderer.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/image.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/renderer.h>
+#include <unseen/vdtree/cut.h>
 
 #include "session_options.h"
 

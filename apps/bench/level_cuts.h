@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include <session/session.h>
-#include <session_gpu/level_control.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/level_control.h>
 
 namespace unseen::app {
 

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <memory>
 
-#include <perception/csf.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/perception/csf.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "accuracy_bench.h"
 #include "bench_tools.h"

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::app {
 

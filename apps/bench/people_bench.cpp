@@ -4,8 +4,8 @@
 #include <functional>
 #include <optional>
 
-#include <calibration/people.h>
-#include <perception/person.h>
+#include <unseen/calibration/people.h>
+#include <unseen/perception/person.h>
 
 #include "terminal.h"
 

@@ -11,9 +11,9 @@
 #include <glm/geometric.hpp>
 
 #include <hard_mesh.h>
-#include <perception/criterion.h>
-#include <render/context.h>
 #include <turning_light.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/render/context.h>
 #include <visibility_map.h>
 
 #include "bench_tools.h"

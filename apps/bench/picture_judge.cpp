@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include <session_gpu/frame_image.h>
+#include <unseen/session_gpu/frame_image.h>
 
 namespace unseen::app {
 

@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include <perception/judge.h>
-#include <session/session.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::app {
 

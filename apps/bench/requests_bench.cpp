@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include <render/context.h>
-#include <session/session.h>
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
 
 #include "contact_sheet.h"
 #include "session_options.h"

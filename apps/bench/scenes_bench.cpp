@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include <session/session.h>
-#include <session_gpu/as_seen.h>
-#include <session_gpu/level_control.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/level_control.h>
 
 #include "bench_tools.h"
 #include "level_cuts.h"

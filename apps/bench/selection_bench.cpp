@@ -13,15 +13,15 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <perception/judge.h>
-#include <session/selection_follower.h>
-#include <session/session.h>
-#include <session_gpu/as_seen.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/gpu_judge.h>
-#include <session_gpu/level_pictures.h>
-#include <session_gpu/precompute_selections.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session/selection_follower.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
 #include "made_scenes.h"

@@ -13,11 +13,11 @@
 #include <string_view>
 #include <utility>
 
-#include <calibration/procedure.h>
-#include <calibration/simulated_observer.h>
-#include <perception/csf.h>
-#include <perception/display.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/calibration/procedure.h>
+#include <unseen/calibration/simulated_observer.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/display.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
 #include "log_log_plot.h"

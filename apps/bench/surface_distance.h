@@ -5,7 +5,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::app {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

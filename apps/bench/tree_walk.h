@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <optional>
 
-#include <session/session.h>
-#include <session_gpu/moving_occlusion.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::app {
 

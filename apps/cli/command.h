@@ -5,7 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

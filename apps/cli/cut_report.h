@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include <session/session.h>
+#include <unseen/session/session.h>
 
 #include "options.h"
 #include "report.h"

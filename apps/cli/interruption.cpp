@@ -7,8 +7,8 @@
 
 #include <unistd.h>
 
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/internal/mapped_names.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/mapped_names.h>
 
 #include "command.h"
 

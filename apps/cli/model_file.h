@@ -3,10 +3,10 @@
 
 #include <filesystem>
 
-#include <meshio/mesh_io.h>
-#include <session/scene.h>
-#include <vdtree/builder.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/session/scene.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "options.h"
 

@@ -9,9 +9,9 @@
 #include <limits>
 #include <memory>
 
-#include <perception/criterion.h>
-#include <perception/motion.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/motion.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "option_names.h"
 #include "terminal.h"

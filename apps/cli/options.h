@@ -12,11 +12,11 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <meshio/mesh_io.h>
-#include <perception/units.h>
-#include <session/gaze_player.h>
-#include <session/model_file.h>
-#include <session/request.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/perception/units.h>
+#include <unseen/session/gaze_player.h>
+#include <unseen/session/model_file.h>
+#include <unseen/session/request.h>
 
 namespace unseen::app {
 

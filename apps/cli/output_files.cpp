@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <iterator>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "report.h"
 #include "terminal.h"

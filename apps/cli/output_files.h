@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 #include "options.h"
 

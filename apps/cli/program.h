@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/function_ref.h>
+#include <unseen/vdtree/function_ref.h>
 
 #include "command.h"
 

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <string>
 
-#include <vdtree/function_ref.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::app {
 

@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/result.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/result.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::app {
 

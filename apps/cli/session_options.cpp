@@ -1,6 +1,6 @@
 #include "session_options.h"
 
-#include <calibration/display_profile.h>
+#include <unseen/calibration/display_profile.h>
 
 #include "model_file.h"
 #include "option_names.h"

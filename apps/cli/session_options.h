@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include <session/session.h>
+#include <unseen/session/session.h>
 
 #include "options.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include <vdtree/internal/number_format.h> // IWYU pragma: export
+#include <unseen/vdtree/internal/number_format.h> // IWYU pragma: export
 
 namespace unseen::app {
 

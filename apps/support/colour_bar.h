@@ -6,7 +6,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace unseen::app {
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <functional>
 
-#include <render/renderer.h>
-#include <session_gpu/frame_image.h>
-#include <vdtree/internal/number_format.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "drawing.h"
 #include "fold_map.h"

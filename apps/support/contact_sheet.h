@@ -8,11 +8,11 @@
 
 #include <glm/vec2.hpp>
 
-#include <perception/image.h>
-#include <perception/judge.h>
-#include <render/context.h>
-#include <session/session.h>
-#include <vdtree/function_ref.h>
+#include <unseen/perception/image.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::app {
 

@@ -3,9 +3,9 @@
 #include <cstdlib>
 #include <system_error>
 
-#include <meshio/mesh_io.h>
-#include <perception/image.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "sample_mesh.h"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include <render/context.h>
-#include <session/session.h>
-#include <vdtree/function_ref.h>
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/function_ref.h>
 
 #include "contact_sheet.h"
 

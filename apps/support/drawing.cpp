@@ -10,7 +10,7 @@
 #include <cairo-svg.h>
 #include <cairo.h>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 namespace unseen::app {
 namespace {

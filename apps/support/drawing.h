@@ -13,7 +13,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 struct _cairo;
 struct _cairo_surface;

@@ -9,9 +9,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
-#include <vdtree/internal/number_format.h>
-#include <vdtree/normal_mask.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include "colour_bar.h"
 

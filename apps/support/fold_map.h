@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include <perception/image.h>
-#include <session/session.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/image.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/cut.h>
 
 namespace unseen::app {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 namespace unseen::app {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "plot_style.h"
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <system_error>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "scene_draft.h"
 #include "scene_parts.h"

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <vector>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/result.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include <vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "plot_style.h"
 

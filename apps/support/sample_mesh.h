@@ -1,7 +1,7 @@
 // A mesh for where none is at hand.
 #pragma once
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::app {
 

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 namespace unseen::app {
 namespace {

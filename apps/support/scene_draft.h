@@ -9,8 +9,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/mesh.h>
-#include <vdtree/result.h>
+#include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

@@ -9,7 +9,7 @@
 #include <glm/gtc/type_precision.hpp>
 #include <glm/vec2.hpp>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

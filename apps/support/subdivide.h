@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <optional>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::app {
 

@@ -1,8 +1,8 @@
 // A light that goes around a model, for figures of what moving lights cost.
 #pragma once
 
-#include <vdtree/lighting.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::app {
 

@@ -1,7 +1,7 @@
 // What a judge saw, as a picture for people.
 #pragma once
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "colour_bar.h"
 

@@ -13,9 +13,9 @@
 #include <malloc.h>
 #endif
 
-#include <perception/fold_measurement.h>
-#include <perception/lit_folds.h>
-#include <session/model_file.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/lit_folds.h>
+#include <unseen/session/model_file.h>
 
 #include "build_team.h"
 #include "memory_plan.h"

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include <vdtree/builder.h>
-#include <vdtree/team.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/team.h>
 
 namespace unseen::app {
 

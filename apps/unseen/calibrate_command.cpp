@@ -8,12 +8,12 @@
 #include <memory>
 #include <optional>
 
-#include <calibration/display_fit.h>
-#include <calibration/display_profile.h>
-#include <calibration/observer_profile.h>
-#include <calibration/procedure.h>
-#include <calibration/simulated_observer.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/calibration/display_fit.h>
+#include <unseen/calibration/display_profile.h>
+#include <unseen/calibration/observer_profile.h>
+#include <unseen/calibration/procedure.h>
+#include <unseen/calibration/simulated_observer.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "calibration_window.h"
 #include "options.h"

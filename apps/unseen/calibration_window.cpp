@@ -11,9 +11,9 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
-#include <calibration/display_fit.h>
-#include <perception/image.h>
-#include <render/test_pattern.h>
+#include <unseen/calibration/display_fit.h>
+#include <unseen/perception/image.h>
+#include <unseen/render/test_pattern.h>
 
 #include "terminal.h"
 

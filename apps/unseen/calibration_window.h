@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include <calibration/procedure.h>
-#include <perception/display.h>
-#include <vdtree/result.h>
+#include <unseen/calibration/procedure.h>
+#include <unseen/perception/display.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

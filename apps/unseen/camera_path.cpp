@@ -8,9 +8,9 @@
 #include <string_view>
 
 #include <glm/geometric.hpp>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 #include "terminal.h"
 

@@ -10,8 +10,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/result.h>
-#include <vdtree/view.h>
+#include <unseen/vdtree/result.h>
+#include <unseen/vdtree/view.h>
 
 namespace unseen::app {
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include <perception/image.h>
-#include <perception/judge.h>
+#include <unseen/perception/image.h>
+#include <unseen/perception/judge.h>
 
 #include "gpu_comparison.h"
 #include "output_files.h"

@@ -9,14 +9,14 @@
 #include <optional>
 #include <sstream>
 
-#include <calibration/observer_profile.h>
-#include <perception/csf.h>
-#include <perception/image.h>
-#include <perception/motion.h>
-#include <session/observer.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/calibration/observer_profile.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/image.h>
+#include <unseen/perception/motion.h>
+#include <unseen/session/observer.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 #include "log_log_plot.h"
 #include "options.h"

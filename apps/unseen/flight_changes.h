@@ -3,11 +3,11 @@
 
 #include <optional>
 
-#include <perception/change.h>
-#include <perception/image.h>
-#include <render/renderer.h>
-#include <session/follower.h>
-#include <session/session.h>
+#include <unseen/perception/change.h>
+#include <unseen/perception/image.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session/follower.h>
+#include <unseen/session/session.h>
 
 namespace unseen::app {
 

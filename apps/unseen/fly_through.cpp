@@ -8,12 +8,12 @@
 #include <optional>
 
 #include <panel_plot.h>
-#include <perception/image.h>
-#include <session/follower.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/moving_occlusion.h>
-#include <session_gpu/scene_renderer.h>
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/perception/image.h>
+#include <unseen/session/follower.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "camera_path.h"
 #include "cut_report.h"

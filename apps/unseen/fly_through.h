@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 #include "options.h"
 

@@ -1,7 +1,7 @@
 #include "gpu_comparison.h"
 
-#include <render/context.h>
-#include <session_gpu/gpu_judge.h>
+#include <unseen/render/context.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 namespace unseen::app {
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 namespace unseen::app {
 

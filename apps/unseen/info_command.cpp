@@ -4,9 +4,9 @@
 #include <map>
 #include <memory>
 
-#include <meshio/examine.h>
-#include <meshio/mesh_io.h>
-#include <meshio/scene_file.h>
+#include <unseen/meshio/examine.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/scene_file.h>
 
 #include "model_file.h"
 #include "options.h"

@@ -9,10 +9,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <perception/image.h>
-#include <render/target.h>
-#include <session/selection_follower.h>
-#include <session_gpu/frame_image.h>
+#include <unseen/perception/image.h>
+#include <unseen/render/target.h>
+#include <unseen/session/selection_follower.h>
+#include <unseen/session_gpu/frame_image.h>
 
 #include "camera_path.h"
 #include "colour_bar.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <session_gpu/level_control.h>
+#include <unseen/session_gpu/level_control.h>
 
 #include "options.h"
 

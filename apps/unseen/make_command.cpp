@@ -2,8 +2,8 @@
 #include <functional>
 #include <memory>
 
-#include <meshio/mesh_io.h>
 #include <subdivide.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include "model_file.h"
 #include "options.h"

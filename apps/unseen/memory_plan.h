@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 namespace unseen::app {
 

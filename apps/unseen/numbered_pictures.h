@@ -7,7 +7,7 @@
 #include <string>
 #include <system_error>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace unseen::app {
 

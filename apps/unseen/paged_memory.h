@@ -10,7 +10,7 @@
 #include <new>
 #include <string>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

@@ -2,10 +2,10 @@
 #include <iterator>
 #include <memory>
 
-#include <perception/image.h>
-#include <render/renderer.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/image.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "cut_report.h"
 #include "fly_through.h"

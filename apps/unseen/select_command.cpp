@@ -5,8 +5,8 @@
 #include <map>
 #include <memory>
 
-#include <session/selection.h>
-#include <session_gpu/precompute_selections.h>
+#include <unseen/session/selection.h>
+#include <unseen/session_gpu/precompute_selections.h>
 
 #include "build_team.h"
 #include "interruption.h"

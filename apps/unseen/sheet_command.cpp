@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "contact_sheet.h"
 #include "cut_report.h"

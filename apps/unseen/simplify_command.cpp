@@ -4,8 +4,8 @@
 #include <limits>
 #include <memory>
 
-#include <meshio/mesh_io.h>
-#include <meshio/scene_file.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/scene_file.h>
 
 #include "cut_report.h"
 #include "output_files.h"

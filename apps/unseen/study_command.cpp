@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <memory>
 
-#include <calibration/picture_observer.h>
-#include <calibration/study.h>
-#include <session_gpu/study_pictures.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/calibration/picture_observer.h>
+#include <unseen/calibration/study.h>
+#include <unseen/session_gpu/study_pictures.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "options.h"
 #include "output_files.h"

@@ -6,10 +6,10 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
-#include <perception/image.h>
-#include <render/overlay.h>
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/perception/image.h>
+#include <unseen/render/overlay.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "screen_text.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <calibration/study.h>
-#include <vdtree/result.h>
+#include <unseen/calibration/study.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::app {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <memory>
 
-#include <session_gpu/tradeoff.h>
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/session_gpu/tradeoff.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "cut_report.h"
 #include "output_files.h"

@@ -14,10 +14,10 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
 
-#include <perception/image.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/moving_occlusion.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/image.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "session_options.h"
 #include "terminal.h"

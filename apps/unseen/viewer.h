@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include <render/context.h>
-#include <render/renderer.h>
-#include <session/session.h>
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session/session.h>
 
 #include "options.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <session/gaze_player.h>
-#include <session/session.h>
+#include <unseen/session/gaze_player.h>
+#include <unseen/session/session.h>
 
 #include "screen_text.h"
 

@@ -1,7 +1,7 @@
 #include "visibility.h"
 
-#include <session_gpu/as_seen.h>
-#include <session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/moving_occlusion.h>
 
 namespace unseen::app {
 

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include <session/session.h>
+#include <unseen/session/session.h>
 
 #include "options.h"
 

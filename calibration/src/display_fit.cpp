@@ -1,8 +1,8 @@
 // Fits of a display's transfer function, and photometers' tables.
-#include <calibration/display_fit.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/calibration/display_fit.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 #include <charconv>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Display profiles: every key is read with its range, then the whole is validated as any display is.
-#include <calibration/display_profile.h>
+#include <unseen/calibration/display_profile.h>
 
 #include <cmath>
 #include <limits>

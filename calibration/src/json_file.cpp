@@ -8,9 +8,9 @@
 #include <fstream>
 #include <set>
 
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::calibration {
 namespace {

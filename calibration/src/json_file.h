@@ -11,7 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::calibration {
 

@@ -1,5 +1,5 @@
 // Reads files of lights, and moves the lights.
-#include <calibration/light_rig.h>
+#include <unseen/calibration/light_rig.h>
 
 #include <algorithm>
 #include <cmath>

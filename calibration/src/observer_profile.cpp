@@ -1,5 +1,5 @@
 // Observer profiles: a contrast sensitivity table with one line of text per column over frequency.
-#include <calibration/observer_profile.h>
+#include <unseen/calibration/observer_profile.h>
 
 #include <initializer_list>
 #include <span>

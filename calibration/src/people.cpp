@@ -1,13 +1,13 @@
-#include <calibration/people.h>
+#include <unseen/calibration/people.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::calibration {
 namespace {

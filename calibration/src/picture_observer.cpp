@@ -1,11 +1,11 @@
-#include <calibration/picture_observer.h>
+#include <unseen/calibration/picture_observer.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include <perception/judge.h>
-#include <vdtree/internal/random.h>
+#include <unseen/perception/judge.h>
+#include <unseen/vdtree/internal/random.h>
 
 namespace unseen::calibration {
 namespace {

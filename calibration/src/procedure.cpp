@@ -1,5 +1,5 @@
 // The procedure: trials from beliefs, beliefs from answers.
-#include <calibration/procedure.h>
+#include <unseen/calibration/procedure.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,8 +11,8 @@
 #include <numeric>
 #include <utility>
 
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/random.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/random.h>
 
 #include "json_file.h"
 

@@ -1,5 +1,5 @@
 // QUEST+: a posterior on a grid, and what stimuli's answers are expected to tell of the threshold.
-#include <calibration/quest.h>
+#include <unseen/calibration/quest.h>
 
 #include <algorithm>
 #include <cassert>
@@ -7,7 +7,7 @@
 #include <limits>
 #include <string>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "json_file.h"
 

@@ -1,5 +1,5 @@
 // A Gaussian process over log sensitivity: covariances, and posteriors by Cholesky's factorisation.
-#include <calibration/sensitivity_field.h>
+#include <unseen/calibration/sensitivity_field.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,14 +1,14 @@
 // The simulated observer: thresholds from a table, chance from the seed and the trial.
-#include <calibration/simulated_observer.h>
+#include <unseen/calibration/simulated_observer.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 
-#include <calibration/observer_profile.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/random.h>
+#include <unseen/calibration/observer_profile.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/random.h>
 
 #include "json_file.h"
 

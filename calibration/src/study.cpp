@@ -1,15 +1,15 @@
-#include <calibration/study.h>
+#include <unseen/calibration/study.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/random.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/random.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 #include "json_file.h"
 

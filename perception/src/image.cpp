@@ -1,6 +1,6 @@
 // Luminance images and their files: PNG by libpng, EXR by OpenEXR, PFM by hand. A file is read into memory whole; what
 // its header claims is checked against its length before anything is allocated for it, and pixels grow as they decode.
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include <algorithm>
 #include <array>
@@ -29,10 +29,10 @@
 #include <ImfOutputFile.h>
 #include <png.h>
 
-#include <vdtree/colour.h>
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {

@@ -1,11 +1,11 @@
-// The surface's vertices, in the unit ball around the model. LIT: under lights, by the formula of <vdtree/lighting.h>.
+// The surface's vertices, in the unit ball around the model. LIT: under lights, by the formula of <unseen/vdtree/lighting.h>.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 vertex_shade; // linear RGB; relative luminance in a
 
 layout(location = 0) uniform mat4 clip_from_unit;
 
 #ifdef LIT
-layout(location = 2) in ivec2 packed_normal; // octahedral, as in <vdtree/packed.h>
+layout(location = 2) in ivec2 packed_normal; // octahedral, as in <unseen/vdtree/packed.h>
 layout(location = 3) in float albedo;
 
 const int none = -32768;

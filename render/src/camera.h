@@ -5,8 +5,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/vertex_tree.h>
-#include <vdtree/view.h>
+#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/view.h>
 
 namespace unseen::render {
 

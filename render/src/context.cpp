@@ -1,5 +1,5 @@
 // Contexts, whatever the window system: takes the platform's and turns its debug output into errors.
-#include <render/context.h>
+#include <unseen/render/context.h>
 
 #include "context_impl.h"
 #include "gl.h"

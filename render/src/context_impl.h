@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include <render/context.h>
+#include <unseen/render/context.h>
 
 #include "error_log.h"
 #include "programs.h"

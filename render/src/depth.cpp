@@ -1,10 +1,10 @@
 // Reversed depth is near / distance, so the farthest is the least.
-#include <render/depth.h>
+#include <unseen/render/depth.h>
 
 #include <algorithm>
 #include <limits>
 
-#include <render/sample_sum.h>
+#include <unseen/render/sample_sum.h>
 
 #include "sample_count.h"
 

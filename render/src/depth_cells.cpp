@@ -1,13 +1,13 @@
 // Each draw of depth is reduced to cells, of which the extremes of all draws are kept.
-#include <render/depth_cells.h>
+#include <unseen/render/depth_cells.h>
 
 #include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include <render/sample_sum.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/sample_sum.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "sample_count.h"

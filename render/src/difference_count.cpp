@@ -1,10 +1,10 @@
 // The surface is drawn again where its depth is, and what looks like the picture is dropped. Nothing is written.
-#include <render/difference_count.h>
+#include <unseen/render/difference_count.h>
 
 #include <deque>
 #include <string>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "luminance_texture.h"

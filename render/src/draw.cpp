@@ -1,4 +1,4 @@
-#include <render/draw.h>
+#include <unseen/render/draw.h>
 
 #include "surface_pass.h"
 

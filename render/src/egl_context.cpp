@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>

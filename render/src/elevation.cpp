@@ -1,13 +1,13 @@
 // As perception's rpg99_map() computes it on the CPU in doubles, which is the reference: levels are of two floats.
-#include <render/elevation.h>
+#include <unseen/render/elevation.h>
 
 #include <cmath>
 #include <string>
 #include <utility>
 
 #include <glm/vec4.hpp>
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "gpu_plane.h"

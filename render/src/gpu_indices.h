@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "gl.h"
 #include "gl_object.h"

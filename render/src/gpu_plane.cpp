@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 

@@ -7,7 +7,7 @@
 
 #include <glm/vec2.hpp>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 #include "gl_object.h"
 #include "program.h"

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <string>
 
-#include <vdtree/colour.h>
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/lighting.h>
 
 #include "gl.h"
 

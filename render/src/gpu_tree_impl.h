@@ -9,7 +9,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/gpu_tree.h>
+#include <unseen/render/gpu_tree.h>
 
 #include "camera.h"
 #include "context_impl.h"

@@ -1,12 +1,12 @@
 // Layers are slices of array textures, so that one pass reads any number of them.
-#include <render/layers.h>
+#include <unseen/render/layers.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "shaders.h"

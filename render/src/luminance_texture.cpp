@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 

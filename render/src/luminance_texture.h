@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include <render/visibility.h>
+#include <unseen/render/visibility.h>
 
 namespace unseen::render {
 

@@ -1,10 +1,10 @@
 // The N-rooks pattern: the permutation of the columns decides everything.
-#include <render/sample_sum.h>
+#include <unseen/render/sample_sum.h>
 
 #include <numeric>
 #include <utility>
 
-#include <vdtree/internal/split_mix64.h>
+#include <unseen/vdtree/internal/split_mix64.h>
 
 namespace unseen::render {
 

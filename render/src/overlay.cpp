@@ -1,10 +1,10 @@
 // A texture of the image, and a pass over the pixels that it covers.
-#include <render/overlay.h>
+#include <unseen/render/overlay.h>
 
 #include <algorithm>
 #include <string>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "shaders.h"

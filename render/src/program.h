@@ -8,7 +8,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 #include "gl_object.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 #include "shaders.h"
 

@@ -1,5 +1,5 @@
 // One tree and one cut on the GPU, drawn as a scene of one item.
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 #include <chrono>
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::render {
 

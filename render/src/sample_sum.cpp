@@ -1,5 +1,5 @@
 // Adds up samples in float, and divides the sum in double.
-#include <render/sample_sum.h>
+#include <unseen/render/sample_sum.h>
 
 #include <string>
 

@@ -11,7 +11,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 #include "surface_pass.h"

@@ -9,7 +9,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/shadows.h>
+#include <unseen/render/shadows.h>
 
 #include "context_impl.h"
 #include "gl_object.h"

@@ -5,8 +5,8 @@
 #include <limits>
 #include <string>
 
-#include <vdtree/colour.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 

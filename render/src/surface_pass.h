@@ -9,7 +9,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/draw.h>
+#include <unseen/render/draw.h>
 
 #include "camera.h"
 #include "gpu_tree_impl.h"

@@ -6,7 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 #include "gl_object.h"
 

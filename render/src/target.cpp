@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include <render/target.h>
+#include <unseen/render/target.h>
 
 #include "context_impl.h"
 #include "gl_object.h"

@@ -1,5 +1,5 @@
 // Checks what is asked for, and hands it to the shader.
-#include <render/test_pattern.h>
+#include <unseen/render/test_pattern.h>
 
 #include <array>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "context_impl.h"
 #include "gl.h"

@@ -4,7 +4,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <vdtree/packed.h>
+#include <unseen/vdtree/packed.h>
 
 namespace unseen::render {
 

@@ -1,6 +1,6 @@
 // The judge's passes. Step by step they do what perception's judge does on the CPU (judge_modern.cpp there, which is the
 // reference); shaders/planes.glsl says how numbers lie in textures.
-#include <render/visibility.h>
+#include <unseen/render/visibility.h>
 
 #include <algorithm>
 #include <bit>
@@ -9,8 +9,8 @@
 #include <string>
 #include <utility>
 
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "context_impl.h"
 #include "gl.h"

@@ -1,5 +1,5 @@
 // What a picture hides folds, and nobody sees it: by drawings of scenes whose parts lie behind others.
-#include <session_gpu/as_seen.h>
+#include <unseen/session_gpu/as_seen.h>
 
 #include <cmath>
 #include <limits>
@@ -8,9 +8,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <perception/judge.h>
-#include <render/depth.h>
-#include <render/renderer.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/depth.h>
+#include <unseen/render/renderer.h>
 
 #include "built.h"
 #include "measured.h"

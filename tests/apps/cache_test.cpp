@@ -1,8 +1,8 @@
 // Trees of meshes are built and measured once, and kept for the next time.
 #include "run_command.h"
 
-#include <session/session.h>
-#include <vdtree/tree_io.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/tree_io.h>
 
 namespace {
 

@@ -1,7 +1,7 @@
 // unseen calibrate: a simulated observer from beginning to end, profiles for --csf, displays, and what is refused.
 #include "run_command.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

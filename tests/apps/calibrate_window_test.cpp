@@ -2,7 +2,7 @@
 // profile.
 #include "window_test.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

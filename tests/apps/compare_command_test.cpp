@@ -1,7 +1,7 @@
 // unseen compare: counts, maps, and the judges.
 #include "run_command.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

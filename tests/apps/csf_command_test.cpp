@@ -1,7 +1,7 @@
 // unseen csf: one number, rows of numbers, the table, and the plot.
 #include "run_command.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

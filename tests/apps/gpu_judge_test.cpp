@@ -1,6 +1,6 @@
 // The judge on the GPU says what the one on the CPU says: of gratings, noise and rendered pictures, looked at and looked
 // beside, of all shapes and luminances; and refuses what that one refuses.
-#include <session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 
 #include <gmock/gmock.h>
 
-#include <perception/judge_tables.h>
-#include <render/renderer.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/render/renderer.h>
 
 #include "built.h"
 #include "gl_test.h"

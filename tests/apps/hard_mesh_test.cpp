@@ -13,12 +13,12 @@
 
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <perception/fold_measurement.h>
-#include <perception/lit_folds.h>
-#include <render/context.h>
-#include <render/renderer.h>
-#include <session/observer.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/lit_folds.h>
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session/observer.h>
 
 #include "measured.h"
 #include "oracle.h"

@@ -5,9 +5,9 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
-#include <vdtree/builder.h>
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "shapes.h"
 #include "temp_folder.h"

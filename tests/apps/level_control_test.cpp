@@ -1,5 +1,5 @@
 // Levels of detail by what the rest of a picture masks: in scenes made for it. For museums see museum_test.cpp.
-#include <session_gpu/level_control.h>
+#include <unseen/session_gpu/level_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@
 
 #include <gmock/gmock.h>
 
-#include <calibration/light_rig.h>
-#include <perception/judge.h>
-#include <render/renderer.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/calibration/light_rig.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "gl_test.h"
 #include "measured.h"

@@ -1,5 +1,5 @@
 // Pictures of objects alone, put together, against pictures of the whole scene; and selections for cameras of a scene.
-#include <session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/precompute_selections.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 
 #include <gmock/gmock.h>
 
-#include <session/selection_follower.h>
-#include <session_gpu/level_pictures.h>
+#include <unseen/session/selection_follower.h>
+#include <unseen/session_gpu/level_pictures.h>
 
 #include "gl_test.h"
 #include "measured.h"

@@ -1,6 +1,6 @@
 // What a scene masks: the GPU's elevations against sums by hand, fold tests that masking only relaxes, and pictures of
 // bars before and behind a model.
-#include <session_gpu/as_seen.h>
+#include <unseen/session_gpu/as_seen.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,14 +9,14 @@
 #include <utility>
 #include <vector>
 
-#include <calibration/light_rig.h>
 #include <gmock/gmock.h>
-#include <perception/judge.h>
-#include <perception/judge_tables.h>
-#include <perception/masking.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/gpu_judge.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/calibration/light_rig.h>
+#include <unseen/perception/judge.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/masking.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "built.h"
 #include "gl_test.h"

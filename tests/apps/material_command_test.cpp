@@ -2,7 +2,7 @@
 // coordinates, colours.
 #include "run_command.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "gltf_scene.h"
 #include "obj_file.h"

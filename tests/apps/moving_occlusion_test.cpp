@@ -1,5 +1,5 @@
 // What frames before tell a moving view to be hidden: pictures of what is left, and what that takes.
-#include <session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/moving_occlusion.h>
 
 #include <cmath>
 #include <limits>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <perception/judge.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/trial.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/trial.h>
 
 #include "built.h"
 #include "gl_test.h"

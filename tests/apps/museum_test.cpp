@@ -10,11 +10,11 @@
 #include <gtest/gtest.h>
 
 #include <make_scene.h>
-#include <perception/judge.h>
-#include <session_gpu/as_seen.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/level_control.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/level_control.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "gl_test.h"
 #include "temp_folder.h"

@@ -2,7 +2,7 @@
 // row is there, and measured.
 #include "run_bench.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

@@ -3,7 +3,7 @@
 
 #include <numeric>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

@@ -21,7 +21,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 extern char** environ;
 

@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 
-#include <perception/fold_measurement.h>
-#include <session/session.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/session/session.h>
 
 #include "mesh_files.h"
 #include "shapes.h"

@@ -1,5 +1,5 @@
 // Levels selected within a budget: the search against all choices and against whole pictures, its file, and following.
-#include <session/selection_follower.h>
+#include <unseen/session/selection_follower.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include <gmock/gmock.h>
 
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include "built.h"
 #include "shapes.h"

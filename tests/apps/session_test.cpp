@@ -8,10 +8,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <perception/fold_measurement.h>
-#include <session/follower.h>
-#include <session/session.h>
-#include <vdtree/builder.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/session/follower.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
 

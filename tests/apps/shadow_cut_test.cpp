@@ -6,9 +6,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/judge.h>
-#include <session/session.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "built.h"
 #include "gl_test.h"

@@ -1,7 +1,7 @@
 // unseen study run under X, driven by synthetic keys.
 #include "window_test.h"
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

@@ -13,7 +13,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "colour_bar.h"
 #include "drawing.h"

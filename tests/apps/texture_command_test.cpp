@@ -7,7 +7,7 @@
 
 #include <jpeglib.h>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "tree_file.h"
 

@@ -9,10 +9,10 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <perception/judge_tables.h>
-#include <render/elevation.h>
-#include <render/target.h>
-#include <session_gpu/gpu_judge.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/render/elevation.h>
+#include <unseen/render/target.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 #include "gl_test.h"
 #include "luminance_images.h"

@@ -4,7 +4,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 namespace {
 

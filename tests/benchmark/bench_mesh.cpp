@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <numbers>
 
-#include <meshio/mesh_io.h>
-#include <perception/display.h>
-#include <vdtree/builder.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/perception/display.h>
+#include <unseen/vdtree/builder.h>
 
 #include "sample_mesh.h"
 #include "subdivide.h"

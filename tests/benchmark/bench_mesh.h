@@ -1,9 +1,9 @@
 // The mesh that the benchmarks share: the file in UNSEEN_BENCH_MESH, or a bumpy sphere of 200,000 triangles.
 #pragma once
 
-#include <vdtree/mesh.h>
-#include <vdtree/vertex_tree.h>
-#include <vdtree/view.h>
+#include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/view.h>
 
 namespace unseen::bench {
 

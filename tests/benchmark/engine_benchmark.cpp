@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
-#include <perception/criterion.h>
-#include <perception/fold_measurement.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
 

@@ -5,7 +5,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include <session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 namespace unseen::bench {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <memory>
 
-#include <perception/criterion.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
 #include "turning_light.h"

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
 

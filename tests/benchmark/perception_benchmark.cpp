@@ -4,9 +4,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include <perception/criterion.h>
-#include <perception/judge.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/judge.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
 

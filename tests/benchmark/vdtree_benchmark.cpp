@@ -4,9 +4,9 @@
 #include <benchmark/benchmark.h>
 #include <glm/geometric.hpp>
 
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
 

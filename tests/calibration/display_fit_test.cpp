@@ -1,5 +1,5 @@
 // Fits of displays: matches by eye, and photometers' tables.
-#include <calibration/display_fit.h>
+#include <unseen/calibration/display_fit.h>
 
 #include <cmath>
 

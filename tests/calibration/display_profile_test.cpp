@@ -1,5 +1,5 @@
 // Display profiles: what is read and written, and that bad files get one clear sentence.
-#include <calibration/display_profile.h>
+#include <unseen/calibration/display_profile.h>
 
 #include <limits>
 

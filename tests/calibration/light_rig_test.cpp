@@ -1,11 +1,11 @@
 // Files of lights: what they say, where the lights are in time, and what is wrong with bad ones.
-#include <calibration/light_rig.h>
+#include <unseen/calibration/light_rig.h>
 
 #include <cmath>
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "profile_files.h"
 #include "shapes.h"

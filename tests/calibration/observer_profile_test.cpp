@@ -1,5 +1,5 @@
 // Sensitivity tables as JSON: exact round trips, and that bad files get one clear sentence.
-#include <calibration/observer_profile.h>
+#include <unseen/calibration/observer_profile.h>
 
 #include <limits>
 

@@ -1,6 +1,6 @@
 // QUEST+: the psychometric function and posteriors against reference figures, and the choice of stimuli against its
 // definition.
-#include <calibration/quest.h>
+#include <unseen/calibration/quest.h>
 
 #include <cmath>
 #include <limits>

@@ -1,5 +1,5 @@
 // Studies: orders and sides, files, what answers come to, and an observer who answers as a known probability says.
-#include <calibration/study.h>
+#include <unseen/calibration/study.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <calibration/picture_observer.h>
-#include <perception/judge.h>
+#include <unseen/calibration/picture_observer.h>
+#include <unseen/perception/judge.h>
 
 #include "temp_folder.h"
 

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const auto read = unseen::perception::decode_image(std::vector<unsigned char>(data, data + size), "fuzz");

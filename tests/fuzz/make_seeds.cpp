@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <string>
 
-#include <calibration/calibration.h>
-#include <meshio/mesh_io.h>
-#include <perception/image.h>
-#include <vdtree/builder.h>
-#include <vdtree/tree_io.h>
+#include <unseen/calibration/calibration.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -3,8 +3,8 @@
 // main() that runs the files named on the command line.
 #include "mesh_readers.h"
 
-#include <meshio/examine.h>
-#include <meshio/scene_file.h>
+#include <unseen/meshio/examine.h>
+#include <unseen/meshio/scene_file.h>
 
 #include <cstddef>
 #include <cstdint>

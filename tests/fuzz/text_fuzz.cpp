@@ -7,8 +7,8 @@
 #include <span>
 #include <string_view>
 
-#include <calibration/calibration.h>
-#include <perception/gaze.h>
+#include <unseen/calibration/calibration.h>
+#include <unseen/perception/gaze.h>
 
 #include "camera_path.h"
 #include "memory_file.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "kept_arrays.h"
 #include "memory_file.h"

@@ -1,6 +1,6 @@
 // Colour as a source of contrast: isoluminant patterns that luminance alone would fold.
-#include <perception/chroma.h>
-#include <perception/criterion.h>
+#include <unseen/perception/chroma.h>
+#include <unseen/perception/criterion.h>
 
 #include <cmath>
 
@@ -8,9 +8,9 @@
 #include <glm/mat3x3.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 namespace unseen::perception {
 namespace {

@@ -1,5 +1,5 @@
 // The fold test of Luebke and Hallen in its safe form: known gratings, monotony, and the holes of the literal rule.
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "extra_meshes.h"
 #include "luebke_hallen_oracle.h"

@@ -1,7 +1,7 @@
 // The classical models and castleCSF's chromatic branches: golden values, what eccentricity and motion add to models
 // that know neither, and the places where formulas lose their digits or their finiteness.
-#include <perception/csf.h>
-#include <perception/motion.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/motion.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // castleCSF and stelaCSF against the published programs, and at the edges of their domain.
-#include <perception/csf.h>
+#include <unseen/perception/csf.h>
 
 #include <array>
 #include <cmath>

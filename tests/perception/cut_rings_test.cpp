@@ -1,5 +1,5 @@
 // The rings of all cuts: whatever is folded, no triangle leaves the bounds of the largest of its nodes.
-#include <perception/cut_rings.h>
+#include <unseen/perception/cut_rings.h>
 
 #include <cmath>
 #include <random>
@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -6,10 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <perception/chroma.h>
-#include <perception/cut_rings.h>
-#include <perception/fold_measurement.h>
-#include <vdtree/tree_io.h>
+#include <unseen/perception/chroma.h>
+#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "shapes.h"

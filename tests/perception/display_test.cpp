@@ -1,6 +1,6 @@
 // The display model: geometry, photometry, transfer functions and what it refuses.
-#include <perception/display.h>
-#include <vdtree/colour.h>
+#include <unseen/perception/display.h>
+#include <unseen/vdtree/colour.h>
 
 #include <cmath>
 #include <limits>

@@ -1,5 +1,5 @@
 // The fold test by errors, where nodes differ in more ways than its table has rows.
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 
 #include <gtest/gtest.h>
 
-#include <perception/person.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/person.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "fold/error_distances.h"

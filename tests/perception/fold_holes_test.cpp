@@ -1,6 +1,6 @@
 // The holes of the rule as it is usually read: for each, a small exact scene in which the literal rule folds what a
 // judge then sees, while luebke_hallen_safe_distances() keeps it.
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include <algorithm>
 #include <array>
@@ -12,9 +12,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/judge.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/judge.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "sound.h"
 

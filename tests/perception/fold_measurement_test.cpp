@@ -1,5 +1,5 @@
 // What folds get wrong: nothing where nothing can be wrong, more up the tree, and the same for any number of threads.
-#include <perception/fold_measurement.h>
+#include <unseen/perception/fold_measurement.h>
 
 #include <algorithm>
 #include <array>
@@ -14,12 +14,12 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
-#include <vdtree/view.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
+#include <unseen/vdtree/view.h>
 
 #include "fold/fold_errors.h"
 #include "measure/fold_picture.h"

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "fold/fold_errors.h"
 #include "measure/pyramid.h"

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include <perception/gaze.h>
+#include <unseen/perception/gaze.h>
 
 namespace unseen::perception {
 namespace {

@@ -1,5 +1,5 @@
 // Gazes: traces and their errors, the statistics of simulated ones, and what a tracker makes of them.
-#include <perception/gaze.h>
+#include <unseen/perception/gaze.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Image files: what is written is read again, every variant of the formats that we promise is understood, and nothing
 // that a file can contain crashes a reader or makes it allocate out of proportion.
-#include <perception/image.h>
-#include <vdtree/colour.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/colour.h>
 
 #include <algorithm>
 #include <array>

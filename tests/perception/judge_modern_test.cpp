@@ -1,7 +1,7 @@
 // The modern judge is not blind and not nervous: single gratings, a disc and an offset become visible where the
 // contrast sensitivity function says so; what is identical, masked by the reference or far from the gaze does not. Here
 // it judges for the median person, who is castleCSF. People: tests/calibration/people_test.cpp.
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include <algorithm>
 #include <cmath>

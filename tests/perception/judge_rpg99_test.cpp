@@ -1,5 +1,5 @@
 // The rpg99 judge: known values, the behaviour of the program it reproduces, and numbers at which that program fails.
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include <algorithm>
 #include <cmath>

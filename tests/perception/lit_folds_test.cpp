@@ -1,5 +1,5 @@
 // What folds change under lights, against what is measured of a tree that these light.
-#include <perception/lit_folds.h>
+#include <unseen/perception/lit_folds.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +14,9 @@
 #include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <perception/criterion.h>
-#include <perception/fold_measurement.h>
-#include <vdtree/tree_io.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "measure/fold_record.h"

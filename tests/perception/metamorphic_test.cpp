@@ -10,9 +10,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "measured.h"

@@ -1,5 +1,5 @@
 // Spatiovelocity sensitivity against golden values, and the geometry of motion on the retina.
-#include <perception/motion.h>
+#include <unseen/perception/motion.h>
 
 #include <cmath>
 #include <fstream>

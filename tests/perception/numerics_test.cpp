@@ -9,11 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <perception/csf.h>
-#include <perception/display.h>
-#include <perception/judge.h>
-#include <perception/motion.h>
-#include <vdtree/internal/contrast_classes.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/display.h>
+#include <unseen/perception/judge.h>
+#include <unseen/perception/motion.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
 
 #include "fold/fold_classes.h"
 #include "judge/fast_math.h"

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <perception/csf.h>
-#include <perception/display.h>
-#include <perception/judge.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/display.h>
+#include <unseen/perception/judge.h>
 
 #include "any_number.h"
 #include "fold/fold_classes.h"

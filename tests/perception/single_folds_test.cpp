@@ -14,10 +14,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/cut_rings.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/normal_mask.h>
+#include <unseen/perception/cut_rings.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include "shapes.h"
 #include "sound.h"

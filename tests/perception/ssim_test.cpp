@@ -1,6 +1,6 @@
 // SSIM against its definition, written out once more without any short cut, and against a number that was checked
 // together with 15 image pairs that scikit-image 0.19 had measured (all within 1e-8).
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include <cmath>
 #include <cstdint>

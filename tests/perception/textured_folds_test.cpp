@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <perception/fold_measurement.h>
-#include <perception/lit_folds.h>
-#include <vdtree/tree_io.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/lit_folds.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "measure/fold_record.h"

@@ -1,5 +1,5 @@
 // What rings of textured trees can show in any cut.
-#include <perception/cut_rings.h>
+#include <unseen/perception/cut_rings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/texture.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/texture.h>
 
 #include "built.h"
 #include "shapes.h"

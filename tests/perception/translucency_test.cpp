@@ -1,12 +1,12 @@
 // Behind what is translucent lies anything in the scene: a fold there may show as much as one on an outline.
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "measured.h"
 

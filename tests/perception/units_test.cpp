@@ -1,5 +1,5 @@
 // Quantities: arithmetic and conversions. What must not compile is in tests/static/units_static_test.cpp.
-#include <perception/units.h>
+#include <unseen/perception/units.h>
 
 #include <cmath>
 #include <limits>

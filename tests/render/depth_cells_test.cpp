@@ -1,5 +1,5 @@
 // Cells of depth against the depth of each pixel, sample by sample.
-#include <render/depth_cells.h>
+#include <unseen/render/depth_cells.h>
 
 #include "gl_test.h"
 #include "scenes.h"
@@ -9,9 +9,9 @@
 #include <limits>
 #include <vector>
 
-#include <render/sample_sum.h>
-#include <render/target.h>
-#include <vdtree/cut.h>
+#include <unseen/render/sample_sum.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/cut.h>
 
 namespace {
 

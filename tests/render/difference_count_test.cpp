@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include <render/difference_count.h>
-#include <render/stage_times.h>
+#include <unseen/render/difference_count.h>
+#include <unseen/render/stage_times.h>
 
 namespace {
 

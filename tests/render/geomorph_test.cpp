@@ -9,7 +9,7 @@
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
 
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include <render/context.h>
+#include <unseen/render/context.h>
 
 namespace unseen::render::testing {
 

@@ -8,8 +8,8 @@
 
 #include <gmock/gmock.h>
 
-#include <render/layers.h>
-#include <render/shadows.h>
+#include <unseen/render/layers.h>
+#include <unseen/render/shadows.h>
 
 namespace {
 

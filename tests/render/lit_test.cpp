@@ -7,11 +7,11 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <perception/display.h>
-#include <perception/judge.h>
-#include <render/context.h>
-#include <render/renderer.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/display.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
 
 #include "built.h"
 #include "oracle.h"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <perception/criterion.h>
-#include <vdtree/cut.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "gl_test.h"

@@ -1,5 +1,5 @@
 // The sample pattern, which needs no GL.
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // A machine without any OpenGL driver, which the EGL dispatcher's search path can pretend.
-#include <render/context.h>
+#include <unseen/render/context.h>
 
 #include <cstdlib>
 

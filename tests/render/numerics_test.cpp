@@ -8,9 +8,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <render/draw.h>
-#include <render/shadows.h>
-#include <render/visibility.h>
+#include <unseen/render/draw.h>
+#include <unseen/render/shadows.h>
+#include <unseen/render/visibility.h>
 
 #include "gl_test.h"
 #include "one_band.h"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <render/context.h>
-#include <render/visibility.h>
+#include <unseen/render/context.h>
+#include <unseen/render/visibility.h>
 
 namespace unseen::render::testing {
 

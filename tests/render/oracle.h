@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include <perception/criterion.h>
-#include <perception/display.h>
-#include <perception/judge.h>
-#include <render/renderer.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/display.h>
+#include <unseen/perception/judge.h>
+#include <unseen/render/renderer.h>
 
 namespace unseen::oracle {
 

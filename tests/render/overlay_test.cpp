@@ -9,8 +9,8 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <render/overlay.h>
-#include <render/renderer.h>
+#include <unseen/render/overlay.h>
+#include <unseen/render/renderer.h>
 
 namespace {
 

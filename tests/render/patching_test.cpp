@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 namespace {
 

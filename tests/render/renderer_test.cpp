@@ -12,7 +12,7 @@
 
 #include <gmock/gmock.h>
 
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -11,7 +11,7 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <render/renderer.h>
+#include <unseen/render/renderer.h>
 
 namespace {
 

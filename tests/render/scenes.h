@@ -10,10 +10,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/mesh.h>
-#include <vdtree/view.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/view.h>
 
 namespace unseen::render::testing {
 

@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <render/draw.h>
-#include <render/shadows.h>
+#include <unseen/render/draw.h>
+#include <unseen/render/shadows.h>
 
 #include "context_impl.h"
 #include "gl_test.h"

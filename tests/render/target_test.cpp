@@ -9,7 +9,7 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <render/target.h>
+#include <unseen/render/target.h>
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include <render/test_pattern.h>
+#include <unseen/render/test_pattern.h>
 
 namespace {
 

@@ -8,9 +8,9 @@
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
 
-#include <render/context.h>
-#include <render/renderer.h>
-#include <vdtree/geomorph.h>
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
+#include <unseen/vdtree/geomorph.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -11,8 +11,8 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <render/target.h>
-#include <render/visibility.h>
+#include <unseen/render/target.h>
+#include <unseen/render/visibility.h>
 
 #include "gpu_plane.h"
 #include "one_band.h"

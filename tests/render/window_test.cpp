@@ -16,8 +16,8 @@
 #include <GLFW/glfw3.h>
 #include <gmock/gmock.h>
 
-#include <render/context.h>
-#include <render/renderer.h>
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <type_traits>
 #include <utility>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/function_ref.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::vdtree {
 namespace {

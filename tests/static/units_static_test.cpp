@@ -3,7 +3,7 @@
 #include <concepts>
 #include <type_traits>
 
-#include <perception/units.h>
+#include <unseen/perception/units.h>
 
 namespace unseen::perception {
 namespace {

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include <vdtree/builder.h>
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::support {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <vector>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "build/surface.h"
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::support {
 

@@ -5,7 +5,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::support {
 

@@ -14,8 +14,8 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "follow_tools.h"
 #include "shapes.h"

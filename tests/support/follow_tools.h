@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "cut/kernel/fold_tester.h"
 #include "sound.h"

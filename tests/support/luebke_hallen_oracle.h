@@ -10,10 +10,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
-#include <perception/person.h>
-#include <vdtree/cut.h>
-#include <vdtree/normal_mask.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/person.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/normal_mask.h>
 
 namespace unseen::support {
 

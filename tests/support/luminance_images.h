@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "shapes.h"
 

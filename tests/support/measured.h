@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include <perception/fold_measurement.h>
-#include <vdtree/conserve_light.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/conserve_light.h>
 
 #include "built.h"
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::support {
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include <vdtree/mesh.h>
-#include <vdtree/texture.h>
+#include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/texture.h>
 
 #include "shapes.h"
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/cut.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "shapes.h"
 #include "sound.h"

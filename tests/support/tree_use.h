@@ -4,13 +4,13 @@
 
 #include <vector>
 
-#include <vdtree/conserve_light.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/geomorph.h>
-#include <vdtree/lighting.h>
-#include <vdtree/occluders.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/geomorph.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/occluders.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::support {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "user_file.h"
 

@@ -1,5 +1,5 @@
 // A recording of an eye tracker, as its program exports it, played over a flight.
-#include <perception/image.h>
+#include <unseen/perception/image.h>
 
 #include "user_file.h"
 

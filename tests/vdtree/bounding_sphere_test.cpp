@@ -12,7 +12,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "exact.h"
 #include "exact_sphere.h"

@@ -1,6 +1,6 @@
 // How well the clusterers do: what survives longest, and how far simplified surfaces stray, against OpenMesh's
 // quadric decimation.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <array>
@@ -20,7 +20,7 @@
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #endif
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "shapes.h"
 #include "triangle_distance.h"

@@ -1,5 +1,5 @@
 // Built trees: that they are what they should be, by brute force, for every awkward mesh and both clusterers.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,7 +19,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "exact.h"
 #include "shapes.h"
@@ -36,7 +36,7 @@ using testing::HasSubstr;
 constexpr double direction_rounding = 1e-7;
 // Luminance goes through a few float operations.
 constexpr float luminance_rounding = 1.0f / 65535; // one step of a stored luminance
-constexpr float packed_normal_error = 6.6e-5f;     // length; see <vdtree/packed.h>
+constexpr float packed_normal_error = 6.6e-5f;     // length; see <unseen/vdtree/packed.h>
 
 struct Case {
     std::string shape;

@@ -1,6 +1,6 @@
 // The clusterers by themselves, on meshes of several parts and on hard ones: hierarchies that are whole, that do not
 // depend on threads, in time that grows with the mesh, and that keep what the attributes show.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <atomic>
@@ -19,7 +19,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <vdtree/team.h>
+#include <unseen/vdtree/team.h>
 
 #include "build/help_cluster.h"
 #include "build/quadric_contraction.h"

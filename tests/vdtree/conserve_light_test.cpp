@@ -1,5 +1,5 @@
 // Proxies that conserve light: what curved surfaces radiate, and bounds that hold.
-#include <vdtree/conserve_light.h>
+#include <unseen/vdtree/conserve_light.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/distance_criterion.h>
-#include <vdtree/view.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/view.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -1,5 +1,5 @@
 // The geometric criteria and the frustum test, against brute force, up the tree, and under similarity transforms.
-#include <vdtree/criteria.h>
+#include <unseen/vdtree/criteria.h>
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,8 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "shapes.h"
 #include "sound.h"

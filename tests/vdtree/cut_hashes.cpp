@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
 
 using namespace unseen::vdtree;
 

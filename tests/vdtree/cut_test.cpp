@@ -1,5 +1,5 @@
 // Cuts: what must hold after anything that can be done to them, and that adjust() gives what it promises.
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
 #include "sound.h"
@@ -500,7 +500,7 @@ TEST(Cuts, ShareOneTreeBetweenThreads) {
     EXPECT_EQ(states[1], states[3]);
 }
 
-constexpr float packed_normal_error = 6.6e-5f; // length; see <vdtree/packed.h>
+constexpr float packed_normal_error = 6.6e-5f; // length; see <unseen/vdtree/packed.h>
 
 TEST(ExtractMesh, GivesTheVerticesInUseInDoublePrecision) {
     const Mesh mesh =

@@ -11,8 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <vdtree/lighting.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "shapes.h"

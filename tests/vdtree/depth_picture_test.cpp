@@ -1,5 +1,5 @@
 // What a picture's depths hide, against points between others, looked up one by one.
-#include <vdtree/depth_picture.h>
+#include <unseen/vdtree/depth_picture.h>
 
 #include <cmath>
 #include <limits>
@@ -10,7 +10,7 @@
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "shapes.h"

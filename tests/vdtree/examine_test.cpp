@@ -1,5 +1,5 @@
 // Meshes of which everything is known, and what the examination says of them.
-#include <meshio/examine.h>
+#include <unseen/meshio/examine.h>
 
 #include "shapes.h"
 

@@ -1,6 +1,6 @@
 // Every real mesh in the folder UNSEEN_EXTRA_MESHES is built with both clusterers, verified, cut and unfolded. Prints
 // a table.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <cctype>
 #include <chrono>
@@ -11,10 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "exact.h"
 #include "extra_meshes.h"

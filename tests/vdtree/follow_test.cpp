@@ -1,5 +1,5 @@
 // Cuts that follow a viewpoint: whatever the way, they are what the criterion asks for, and the index buffer is theirs.
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "cut/index_buffer.h"
 #include "cut/kernel/fold_tester.h"

@@ -1,5 +1,5 @@
 // Geomorphs: what is drawn moves continuously, is a valid cut at any time, and comes to rest at the followed cut.
-#include <vdtree/geomorph.h>
+#include <unseen/vdtree/geomorph.h>
 
 #include <cmath>
 #include <cstring>
@@ -13,7 +13,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
 #include "sound.h"

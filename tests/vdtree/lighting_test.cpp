@@ -1,6 +1,6 @@
 // Lights: shading of known cases, bounds against brute force, how fast they may change, and cuts that follow lights
 // that move.
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 #include <algorithm>
 #include <array>
@@ -11,9 +11,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
 
 #include "cut/kernel/lit_kernel.h"
 #include "shapes.h"

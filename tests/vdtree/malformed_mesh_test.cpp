@@ -1,5 +1,5 @@
 // Files that lie, end early or were damaged: one clear sentence, no crash, no allocation out of proportion.
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include "mesh_files.h"
 #include "mesh_readers.h"

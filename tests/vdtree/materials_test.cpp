@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include "mesh_files.h"
 #include "temp_folder.h"

@@ -1,7 +1,7 @@
 // Every format and feature of the mesh readers on files small enough to check by eye, and what the writers give back.
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "mesh_files.h"
 #include "mesh_readers.h"

@@ -11,11 +11,11 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/footprint.h>
-#include <vdtree/normal_mask.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/footprint.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include "build/bounding_sphere.h"
 #include "build/quadric.h"

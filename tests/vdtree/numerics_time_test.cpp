@@ -13,10 +13,10 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/geomorph.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/geomorph.h>
 
 #include "built.h"
 #include "cut/budget.h"

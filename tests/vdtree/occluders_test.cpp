@@ -1,5 +1,5 @@
 // Spheres inside of solids, and what they hide.
-#include <vdtree/occluders.h>
+#include <unseen/vdtree/occluders.h>
 
 #include <cmath>
 #include <limits>
@@ -9,9 +9,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/distance_criterion.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/distance_criterion.h>
 
 #include "built.h"
 #include "shapes.h"

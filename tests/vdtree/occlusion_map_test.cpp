@@ -1,5 +1,5 @@
 // What a picture hides from eyes near it, against lines of sight from such eyes.
-#include <vdtree/occlusion_map.h>
+#include <unseen/vdtree/occlusion_map.h>
 
 #include <cmath>
 #include <limits>
@@ -9,8 +9,8 @@
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
-#include <vdtree/cut.h>
-#include <vdtree/depth_picture.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/depth_picture.h>
 
 #include "built.h"
 #include "shapes.h"

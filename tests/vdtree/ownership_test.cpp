@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "shapes.h"
 

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/packed.h>
+#include <unseen/vdtree/packed.h>
 
 #include "shapes.h"
 #include "tree/mask_pool.h"

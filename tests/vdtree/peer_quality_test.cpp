@@ -1,6 +1,6 @@
 // How far simplified surfaces stray, against meshoptimizer at equal triangle count: the bumpy sphere, loose leaves,
 // and, from the folder UNSEEN_EXTRA_MESHES, the Stanford dragon and bunny.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@
 #include <meshoptimizer.h>
 #endif
 
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include "clustering_tools.h"
 #include "extra_meshes.h"

@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/criteria.h>
-#include <vdtree/cut.h>
-#include <vdtree/normal_mask.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include "any_number.h"
 #include "build/bounding_sphere.h"

@@ -1,5 +1,5 @@
 // glTF files as scenes: what is read of nodes, meshes, cameras and lights, and what is refused.
-#include <meshio/scene_file.h>
+#include <unseen/meshio/scene_file.h>
 
 #include "mesh_files.h"
 #include "temp_folder.h"
@@ -14,7 +14,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 namespace {
 

@@ -4,10 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "gltf_scene.h"
 #include "temp_folder.h"

@@ -1,5 +1,5 @@
 // Textures: what pyramids say of them against every texel, and what trees with textures promise.
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +8,10 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/conserve_light.h>
-#include <vdtree/cut.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
 #include "shapes.h"

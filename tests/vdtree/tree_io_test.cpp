@@ -1,5 +1,5 @@
 // Tree files: what is written is read again; what is damaged, cut short or lying is refused.
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include <algorithm>
 #include <csignal>
@@ -21,8 +21,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "files/byte_order.h"

@@ -1,5 +1,5 @@
 // Values of vertices: read from PLY, kept with a tree, restored in cuts, written again.
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "kept_arrays.h"
 #include "mesh_files.h"

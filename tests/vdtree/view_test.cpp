@@ -1,5 +1,5 @@
 // Views: the camera's frame, framing a sphere, and what is no view.
-#include <vdtree/view.h>
+#include <unseen/vdtree/view.h>
 
 #include <cmath>
 #include <functional>

@@ -1,5 +1,5 @@
 // VTK's two formats of polygons, in every encoding; what VTK itself wrote is in tests/data/vtk.
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 #include <cmath>
 #include <cstring>

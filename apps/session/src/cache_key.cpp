@@ -16,8 +16,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <perception/fold_measurement.h>
-#include <perception/lit_folds.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/lit_folds.h>
 
 namespace unseen::session {
 namespace {

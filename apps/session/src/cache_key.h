@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <session/model_file.h>
+#include <unseen/session/model_file.h>
 
 namespace unseen::session {
 

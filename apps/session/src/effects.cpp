@@ -1,4 +1,4 @@
-#include <perception/chroma.h>
+#include <unseen/perception/chroma.h>
 
 #include "effects.h"
 
@@ -7,9 +7,9 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/motion.h>
+#include <unseen/perception/motion.h>
 
-#include <vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 namespace unseen::session {
 namespace {

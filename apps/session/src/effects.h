@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include <vdtree/cut.h>
-#include <vdtree/geomorph.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/geomorph.h>
 
 #include "fold_test.h"
 

@@ -1,12 +1,12 @@
-#include <perception/fold_measurement.h>
+#include <unseen/perception/fold_measurement.h>
 
 #include "fold_test.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include <perception/motion.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/perception/motion.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include <glm/geometric.hpp>
 

@@ -1,4 +1,4 @@
-#include <session/follower.h>
+#include <unseen/session/follower.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
-#include <session/gaze_player.h>
+#include <unseen/session/gaze_player.h>
 
-#include <vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include <string>
 #include <utility>

@@ -1,8 +1,8 @@
-#include <session/hidden_nodes.h>
+#include <unseen/session/hidden_nodes.h>
 
 #include <algorithm>
 
-#include <session/session.h>
+#include <unseen/session/session.h>
 
 namespace unseen::session {
 

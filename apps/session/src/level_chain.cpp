@@ -1,12 +1,12 @@
-#include <session/level_chain.h>
+#include <unseen/session/level_chain.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
-#include <session/session.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include <perception/lit_folds.h>
-#include <session/model_file.h>
-#include <session/scene.h>
-#include <session/tree_cache.h>
+#include <unseen/perception/lit_folds.h>
+#include <unseen/session/model_file.h>
+#include <unseen/session/scene.h>
+#include <unseen/session/tree_cache.h>
 
 namespace unseen::session {
 

@@ -1,16 +1,16 @@
-#include <session/model_file.h>
+#include <unseen/session/model_file.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string_view>
 
-#include <perception/fold_measurement.h>
-#include <vdtree/baked_light.h>
-#include <vdtree/builder.h>
-#include <vdtree/conserve_light.h>
-#include <vdtree/internal/number_format.h>
-#include <vdtree/tree_io.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/baked_light.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "cache_key.h"
 #include "loaded_tree.h"

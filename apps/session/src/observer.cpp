@@ -1,4 +1,4 @@
-#include <session/observer.h>
+#include <unseen/session/observer.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <calibration/observer_profile.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/calibration/observer_profile.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::session {
 namespace {

@@ -1,9 +1,9 @@
-#include <session/request.h>
+#include <unseen/session/request.h>
 
 #include <cmath>
 
-#include <perception/criterion.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -1,9 +1,9 @@
-#include <session/scene.h>
+#include <unseen/session/scene.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "loaded_tree.h"
 #include "scene_from_file.h"

@@ -10,10 +10,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/fold_measurement.h>
-#include <vdtree/builder.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "cache_key.h"
 #include "loaded_tree.h"

@@ -1,7 +1,7 @@
 // Scenes from glTF files.
 #pragma once
 
-#include <session/scene.h>
+#include <unseen/session/scene.h>
 
 namespace unseen::session {
 

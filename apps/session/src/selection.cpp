@@ -1,4 +1,4 @@
-#include <session/selection.h>
+#include <unseen/session/selection.h>
 
 #include <algorithm>
 #include <bit>
@@ -11,10 +11,10 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <session/level_chain.h>
-#include <session/session.h>
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/session/level_chain.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -1,4 +1,4 @@
-#include <session/selection_follower.h>
+#include <unseen/session/selection_follower.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <session/session.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -1,4 +1,4 @@
-#include <session/selection_search.h>
+#include <unseen/session/selection_search.h>
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <limits>
 #include <queue>
 
-#include <perception/judge.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/perception/judge.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -1,4 +1,4 @@
-#include <session/session.h>
+#include <unseen/session/session.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +8,13 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/fold_measurement.h>
-#include <perception/gaze.h>
-#include <perception/motion.h>
-#include <session/follower.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/occluders.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/gaze.h>
+#include <unseen/perception/motion.h>
+#include <unseen/session/follower.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/occluders.h>
 
 #include "loaded_tree.h"
 #include "session_state.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include <perception/gaze.h>
+#include <unseen/perception/gaze.h>
 
 #include "effects.h"
 #include "fold_test.h"

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include <session/scene.h>
-#include <vdtree/distance_criterion.h>
-#include <vdtree/lighting.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/session/scene.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "shadow_reach.h"
 

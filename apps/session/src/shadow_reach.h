@@ -10,12 +10,12 @@
 #include <span>
 #include <vector>
 
-#include <perception/shadow_edges.h>
-#include <session/scene.h>
-#include <session/session.h>
-#include <vdtree/distance_criterion.h>
-#include <vdtree/lighting.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/perception/shadow_edges.h>
+#include <unseen/session/scene.h>
+#include <unseen/session/session.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::session {
 

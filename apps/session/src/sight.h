@@ -6,12 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include <perception/criterion.h>
-#include <perception/cut_rings.h>
-#include <perception/lit_folds.h>
-#include <session/observer.h>
-#include <session/scene.h>
-#include <session/session.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/lit_folds.h>
+#include <unseen/session/observer.h>
+#include <unseen/session/scene.h>
+#include <unseen/session/session.h>
 
 #include "shadow_reach.h"
 

@@ -6,7 +6,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 
-#include <vdtree/view.h>
+#include <unseen/vdtree/view.h>
 
 namespace unseen::session {
 

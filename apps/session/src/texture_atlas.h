@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 namespace unseen::session {
 

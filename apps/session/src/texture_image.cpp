@@ -17,8 +17,8 @@
 #include <jerror.h>
 #include <jpeglib.h>
 
-#include <perception/image.h>
-#include <vdtree/colour.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/colour.h>
 
 namespace unseen::session {
 namespace {

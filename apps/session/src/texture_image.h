@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 namespace unseen::session {
 

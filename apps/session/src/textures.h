@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include <session/model_file.h>
+#include <unseen/session/model_file.h>
 
 namespace unseen::session {
 

@@ -1,4 +1,4 @@
-#include <session/tree_cache.h>
+#include <unseen/session/tree_cache.h>
 
 #include <algorithm>
 #include <charconv>
@@ -7,9 +7,9 @@
 #include <string_view>
 #include <system_error>
 
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/tree_io.h>
 
 namespace unseen::session {
 namespace {

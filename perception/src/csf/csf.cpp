@@ -1,6 +1,6 @@
 // The one interface to the closed forms: names, domain, and what gives eccentricity and motion to models that know
 // neither.
-#include <perception/csf.h>
+#include <unseen/perception/csf.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include <perception/motion.h>
+#include <unseen/perception/motion.h>
 
 #include "csf/csf_model.h"
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include <perception/csf.h>
+#include <unseen/perception/csf.h>
 
 namespace unseen::perception {
 

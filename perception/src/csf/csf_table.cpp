@@ -8,11 +8,11 @@
 #include <initializer_list>
 #include <limits>
 
-#include <perception/csf.h>
-#include <perception/motion.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/motion.h>
 
 #include "csf/csf_model.h"
-#include <vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 

@@ -10,7 +10,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/shadow_edges.h>
+#include <unseen/perception/shadow_edges.h>
 
 #include "fold/error_distances.h"
 #include "fold/fold_screen.h"

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include "fold/band_elevation.h"
 #include "fold/fold_errors.h"

@@ -10,9 +10,9 @@
 
 #include <glm/common.hpp>
 
-#include <perception/chroma.h>
-#include <perception/display.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/perception/chroma.h>
+#include <unseen/perception/display.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/luminance_classes.h"
 

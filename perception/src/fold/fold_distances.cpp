@@ -11,7 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
+#include <unseen/perception/criterion.h>
 
 #include "fold/fold_classes.h"
 #include "fold/fold_screen.h"

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <numbers>
 
-#include <perception/criterion.h>
-#include <perception/person.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/perception/person.h>
 
 namespace unseen::perception {
 

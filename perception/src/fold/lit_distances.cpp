@@ -7,8 +7,8 @@
 #include <memory>
 #include <span>
 
-#include <perception/criterion.h>
-#include <vdtree/internal/contrast_classes.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
 
 #include "fold/fold_screen.h"
 #include "fold/largest_extents.h"

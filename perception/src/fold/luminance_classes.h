@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include <perception/display.h>
+#include <unseen/perception/display.h>
 
 namespace unseen::perception {
 

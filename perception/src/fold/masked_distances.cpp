@@ -9,7 +9,7 @@
 #include <map>
 #include <vector>
 
-#include <perception/masking.h>
+#include <unseen/perception/masking.h>
 
 #include "fold/band_elevation.h"
 #include "fold/error_distances.h"

@@ -4,7 +4,7 @@
 #include <limits>
 #include <string>
 
-#include <perception/masking.h>
+#include <unseen/perception/masking.h>
 
 namespace unseen::perception {
 namespace {

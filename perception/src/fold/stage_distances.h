@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include <perception/criterion.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/band_elevation.h"
 #include "fold/fold_screen.h"

@@ -7,8 +7,8 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/criterion.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/perception/criterion.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 

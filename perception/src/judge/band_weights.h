@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
-#include <perception/csf.h>
-#include <perception/image.h>
-#include <perception/judge.h>
-#include <perception/judge_tables.h>
-#include <vdtree/result.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/image.h>
+#include <unseen/perception/judge.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/vdtree/result.h>
 
 #include "judge/plane.h"
 

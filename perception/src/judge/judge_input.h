@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
-#include <perception/image.h>
-#include <vdtree/result.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
 

@@ -3,7 +3,7 @@
 // how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of area
 // (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The bands
 // are pooled.
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include <algorithm>
 #include <cmath>

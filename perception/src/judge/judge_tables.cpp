@@ -1,4 +1,4 @@
-#include <perception/judge_tables.h>
+#include <unseen/perception/judge_tables.h>
 
 #include <cmath>
 

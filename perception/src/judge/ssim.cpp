@@ -1,5 +1,5 @@
 // Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004) as scikit-image computes it with Gaussian weights.
-#include <perception/judge.h>
+#include <unseen/perception/judge.h>
 
 #include <array>
 #include <cmath>

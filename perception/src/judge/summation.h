@@ -9,7 +9,7 @@
 #include <array>
 #include <vector>
 
-#include <perception/judge_tables.h>
+#include <unseen/perception/judge_tables.h>
 
 #include "judge/plane.h"
 

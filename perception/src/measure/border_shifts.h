@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/leaf_triangles.h"
 #include "measure/open_border.h"

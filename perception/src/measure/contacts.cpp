@@ -12,7 +12,7 @@
 #include <tbb/parallel_for.h>
 
 #include "measure/leaf_triangles.h"
-#include <vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/scaled_geometry.h>
 
 namespace unseen::perception {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/measuring_progress.h"
 

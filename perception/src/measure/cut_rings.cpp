@@ -1,6 +1,6 @@
 // Bounds the rings of all cuts: from every triangle corner up the tree, and along each edge up the tree on both sides
 // at once.
-#include <perception/cut_rings.h>
+#include <unseen/perception/cut_rings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +12,11 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
-#include <vdtree/internal/packed_range.h>
-#include <vdtree/internal/texture_bounds.h>
-#include <vdtree/internal/texture_fit.h>
-#include <vdtree/internal/tree_parts.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/packed_range.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_fit.h>
+#include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "measure/contacts.h"
 #include "measure/ring_chroma.h"

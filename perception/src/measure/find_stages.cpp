@@ -17,8 +17,8 @@
 #include "measure/lit_stages.h"
 #include "measure/luminance_bias.h"
 #include "measure/pyramid.h"
-#include <vdtree/internal/simd.h>
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/internal/simd.h>
+#include <unseen/vdtree/lighting.h>
 
 namespace unseen::perception {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/fold_errors.h"
 #include "measure/fold_stages.h"

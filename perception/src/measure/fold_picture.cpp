@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 #include "measure/pyramid.h"
 #include "pyramid_kernel.h"

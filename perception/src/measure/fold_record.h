@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include <vdtree/normal_mask.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include "measure/fold_stages.h"
 #include "measure/measurement.h"

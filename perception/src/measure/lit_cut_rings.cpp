@@ -1,10 +1,10 @@
 // The vertices of all cuts' rings, one by one: bound_cut_rings() has their luminances' ranges, which lights change.
-#include <perception/cut_rings.h>
+#include <unseen/perception/cut_rings.h>
 
 #include <vector>
 
-#include <vdtree/internal/tree_parts.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "measure/ring_neighbours.h"
 

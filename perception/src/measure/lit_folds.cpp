@@ -1,5 +1,5 @@
 // Luminances in the pictures are (2 + a n_k) / 4: what measures them takes them for positive.
-#include <perception/lit_folds.h>
+#include <unseen/perception/lit_folds.h>
 
 #include <algorithm>
 #include <array>
@@ -15,8 +15,8 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
-#include <perception/fold_measurement.h>
-#include <vdtree/internal/spot_share.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/internal/spot_share.h>
 
 #include "measure/fold_record.h"
 #include "measure/lit_stages.h"

@@ -11,7 +11,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/fold_sequence.h>
+#include <unseen/vdtree/internal/fold_sequence.h>
 
 namespace unseen::perception {
 

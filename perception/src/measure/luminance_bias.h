@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <span>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/fold_errors.h"
 #include "measure/textured_light.h"

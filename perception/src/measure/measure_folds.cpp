@@ -1,5 +1,5 @@
 // Compares every fold with the surface before it, by points and by small pictures, from the leaves up.
-#include <perception/fold_measurement.h>
+#include <unseen/perception/fold_measurement.h>
 
 #include <algorithm>
 #include <array>
@@ -15,12 +15,12 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include <vdtree/colour.h>
-#include <vdtree/internal/scaled_geometry.h>
-#include <vdtree/internal/simd.h>
-#include <vdtree/internal/texture_bounds.h>
-#include <vdtree/internal/tree_parts.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "fold/fold_errors.h"
 #include "measure/border_shifts.h"

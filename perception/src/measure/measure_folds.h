@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/result.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/result.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/fold_record.h"
 #include "measure/lit_stages.h"

@@ -5,7 +5,7 @@
 #include <atomic>
 #include <thread>
 
-#include <vdtree/function_ref.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::perception {
 

@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/leaf_triangles.h"
 

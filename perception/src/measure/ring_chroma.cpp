@@ -8,9 +8,9 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <vdtree/colour.h>
-#include <vdtree/internal/tree_parts.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::perception {
 

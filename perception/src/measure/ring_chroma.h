@@ -4,7 +4,7 @@
 #include <glm/common.hpp>
 #include <glm/vec4.hpp>
 
-#include <perception/chroma.h>
+#include <unseen/perception/chroma.h>
 
 namespace unseen::perception {
 

@@ -1,7 +1,7 @@
 // What decides which proxies a ring can have in a cut.
 #pragma once
 
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::perception {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/textured_light.h"
 

@@ -5,7 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include <vdtree/colour.h>
+#include <unseen/vdtree/colour.h>
 
 #include "measure/fold_stages.h"
 

@@ -9,7 +9,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 namespace unseen::perception {
 

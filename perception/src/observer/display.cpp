@@ -1,12 +1,12 @@
 // The display model: photometry (black level, transfer function) and viewing geometry of a flat screen.
-#include <perception/display.h>
+#include <unseen/perception/display.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include <vdtree/colour.h>
-#include <vdtree/internal/number_text.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 namespace {

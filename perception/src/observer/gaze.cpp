@@ -1,5 +1,5 @@
 // Gazes: traces, simulated ones, and what a tracker makes of them.
-#include <perception/gaze.h>
+#include <unseen/perception/gaze.h>
 
 #include <algorithm>
 #include <cassert>
@@ -10,9 +10,9 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/random.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/random.h>
 
 namespace unseen::perception {
 namespace {

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include <perception/gaze.h>
-#include <vdtree/internal/atomic_file.h>
-#include <vdtree/internal/number_text.h>
-#include <vdtree/internal/text_file.h>
+#include <unseen/perception/gaze.h>
+#include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/number_text.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {

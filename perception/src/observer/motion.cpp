@@ -4,7 +4,7 @@
 // S. Daly, "Engineering observations from spatiovelocity and spatiotemporal visual models", SPIE 3299, 1998.
 // J. Laird, M. Rosen, J. Pelz, E. Montag, S. Daly, "Spatio-velocity CSF as a function of retinal velocity using
 // unstabilized stimuli", SPIE 6057, 2006.
-#include <perception/motion.h>
+#include <unseen/perception/motion.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <perception/person.h>
+#include <unseen/perception/person.h>
 
 #include <cassert>
 #include <string>

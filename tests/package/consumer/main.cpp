@@ -1,17 +1,17 @@
 // What a first program with Unseen looks like: a tetrahedron, folded as far as nobody can see it.
 #include <cstdio>
 
-#include <calibration/calibration.h>
-#include <perception/perception.h>
-#include <vdtree/vdtree.h>
+#include <unseen/calibration/calibration.h>
+#include <unseen/perception/perception.h>
+#include <unseen/vdtree/vdtree.h>
 #ifdef WITH_RENDER
-#include <render/render.h>
+#include <unseen/render/render.h>
 #endif
 #ifdef WITH_SESSION
-#include <session/session.h>
+#include <unseen/session/session.h>
 #endif
 #if defined(WITH_RENDER) && defined(WITH_SESSION)
-#include <session_gpu/session_gpu.h>
+#include <unseen/session_gpu/session_gpu.h>
 #endif
 
 int main() {

@@ -1,5 +1,5 @@
 // Examines a mesh: first its vertices, then its triangles, then the edges between the places of its vertices.
-#include <meshio/examine.h>
+#include <unseen/meshio/examine.h>
 
 #include "weld.h"
 

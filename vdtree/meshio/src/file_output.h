@@ -11,7 +11,7 @@
 #include <string_view>
 #include <utility>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 namespace unseen::meshio {
 

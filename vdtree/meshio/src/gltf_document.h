@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
 namespace unseen::meshio::gltf {
 

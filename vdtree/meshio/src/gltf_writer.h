@@ -12,7 +12,7 @@
 #include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::meshio {
 

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include <meshio/mesh_io.h>
-#include <meshio/vertex_array.h>
-#include <vdtree/cut.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/vertex_array.h>
+#include <unseen/vdtree/cut.h>
 
 namespace unseen::meshio {
 

@@ -10,7 +10,7 @@
 #include <glm/mat3x3.hpp>
 #include <nlohmann/json.hpp>
 
-#include <vdtree/colour.h>
+#include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
 #include "gltf_data.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <meshio/source_document.h>
+#include <unseen/meshio/source_document.h>
 
 namespace unseen::meshio {
 

@@ -1,7 +1,7 @@
 // Finds out what a file is, has it read, and does what all formats share.
-#include <meshio/mesh_io.h>
+#include <unseen/meshio/mesh_io.h>
 
-#include <meshio/examine.h>
+#include <unseen/meshio/examine.h>
 
 #include "file_output.h"
 #include "mesh_readers.h"

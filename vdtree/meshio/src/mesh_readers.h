@@ -11,9 +11,9 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <meshio/mesh_io.h>
-#include <vdtree/colour.h>
-#include <vdtree/internal/finite.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/finite.h>
 
 namespace unseen::meshio {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <meshio/mesh_io.h>
-#include <meshio/vertex_array.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/vertex_array.h>
 
 #include "file_output.h"
 

@@ -3,7 +3,7 @@
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 #include "text_scanner.h"
-#include <vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/finite.h>
 
 #include <algorithm>
 #include <array>

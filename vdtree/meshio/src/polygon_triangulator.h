@@ -8,7 +8,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::meshio {
 

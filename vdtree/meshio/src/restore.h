@@ -7,8 +7,8 @@
 
 #include <glm/vec3.hpp>
 
-#include <meshio/source_document.h>
-#include <vdtree/cut.h>
+#include <unseen/meshio/source_document.h>
+#include <unseen/vdtree/cut.h>
 
 namespace unseen::meshio {
 

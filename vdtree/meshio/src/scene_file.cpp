@@ -1,4 +1,4 @@
-#include <meshio/scene_file.h>
+#include <unseen/meshio/scene_file.h>
 
 #include <algorithm>
 #include <cctype>
@@ -11,7 +11,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/colour.h>
+#include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
 #include "gltf_data.h"

@@ -1,4 +1,4 @@
-#include <meshio/source_document.h>
+#include <unseen/meshio/source_document.h>
 
 #include <algorithm>
 #include <array>

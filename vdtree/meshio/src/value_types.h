@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <meshio/vertex_array.h>
+#include <unseen/meshio/vertex_array.h>
 
 #include "text_scanner.h"
 

@@ -1,4 +1,4 @@
-#include <meshio/vertex_array.h>
+#include <unseen/meshio/vertex_array.h>
 
 #include <cmath>
 #include <limits>

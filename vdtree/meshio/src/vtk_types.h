@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-#include <meshio/vertex_array.h>
+#include <unseen/meshio/vertex_array.h>
 
 namespace unseen::meshio {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <vdtree/colour.h>
+#include <unseen/vdtree/colour.h>
 
 #include "kept_arrays.h"
 #include "mesh_readers.h"

@@ -11,7 +11,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::meshio {
 

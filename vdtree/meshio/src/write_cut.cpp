@@ -10,9 +10,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include <meshio/mesh_io.h>
-#include <meshio/scene_file.h>
-#include <vdtree/colour.h>
+#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/scene_file.h>
+#include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
 #include "gltf_data.h"

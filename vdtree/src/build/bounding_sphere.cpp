@@ -14,7 +14,7 @@
 #include <immintrin.h>
 #endif
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

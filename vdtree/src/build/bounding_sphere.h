@@ -9,8 +9,8 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 

@@ -1,5 +1,5 @@
 // From a mesh and a clustering to a vertex tree: order the nodes, find where triangles vanish, bound every fold.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <atomic>
@@ -23,10 +23,10 @@
 #include "build/place_proxies.h"
 #include "build/surface.h"
 #include "tree/mask_pool.h"
-#include <vdtree/internal/number_format.h>
-#include <vdtree/internal/texture_bounds.h>
-#include <vdtree/internal/texture_fit.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_fit.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -3,7 +3,7 @@
 // A vertex's path down the tree is its Morton code, so sorted codes are the tree: two neighbours part at the first
 // digit in which they differ. The codes are first dealt into buckets by their leading digits; each bucket is sorted and
 // made a subtree by itself, in parallel, and the subtrees are joined by the digits that tell the buckets apart.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <bit>

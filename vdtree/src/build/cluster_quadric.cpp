@@ -7,7 +7,7 @@
 // its best partner, and pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the
 // hierarchy differs little from strictly greedy order, but the work is linear a round, cache-friendly, and the tree is
 // balanced.
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
-#include <vdtree/team.h>
+#include <unseen/vdtree/team.h>
 
 #include "build/help_cluster.h"
 #include "build/progress_counter.h"

@@ -1,7 +1,7 @@
 // What the other members of a team do while member 0 clusters.
 #pragma once
 
-#include <vdtree/builder.h>
+#include <unseen/vdtree/builder.h>
 
 namespace unseen::vdtree {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/internal/tree_shape.h>
+#include <unseen/vdtree/internal/tree_shape.h>
 
 namespace unseen::vdtree {
 

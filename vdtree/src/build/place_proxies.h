@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 

@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {
 

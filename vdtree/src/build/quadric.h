@@ -16,9 +16,9 @@
 #include <algorithm>
 #include <cstddef>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

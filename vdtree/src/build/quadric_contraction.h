@@ -16,8 +16,8 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/function_ref.h>
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {
 

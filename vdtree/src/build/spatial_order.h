@@ -10,7 +10,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include <vdtree/mesh.h>
-#include <vdtree/team.h>
+#include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/team.h>
 
 namespace unseen::vdtree {
 

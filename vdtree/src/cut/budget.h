@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/function_ref.h>
+#include <unseen/vdtree/function_ref.h>
 
 #include "cut/cost_source.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/kernel/fold_kernel.h"
 

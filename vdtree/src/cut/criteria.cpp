@@ -1,4 +1,4 @@
-#include <vdtree/criteria.h>
+#include <unseen/vdtree/criteria.h>
 
 #include <cmath>
 #include <numbers>

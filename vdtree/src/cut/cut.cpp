@@ -1,4 +1,4 @@
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "cut/decide_tree.h"
 #include "cut/state.h"
 #include "tree/unchecked_links.h"
-#include <vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
 

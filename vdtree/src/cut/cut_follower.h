@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "cut/decide_tree.h"
 #include "cut/kernel/fold_tester.h"

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/kernel/prefetch.h"
 #include "tree/unchecked_links.h"

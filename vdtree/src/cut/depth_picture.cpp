@@ -1,5 +1,5 @@
 // Boxes on the screen against the farthest depths there: a pyramid of maxima, of which a question takes a few texels.
-#include <vdtree/depth_picture.h>
+#include <unseen/vdtree/depth_picture.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::vdtree {
 namespace {

@@ -1,4 +1,4 @@
-#include <vdtree/distance_criterion.h>
+#include <unseen/vdtree/distance_criterion.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,9 +10,9 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/criteria.h>
-#include <vdtree/internal/contrast_classes.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "cut/kernel/fold_kernel.h"
 #include "tree/unchecked_links.h"

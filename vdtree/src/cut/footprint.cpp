@@ -1,4 +1,4 @@
-#include <vdtree/footprint.h>
+#include <unseen/vdtree/footprint.h>
 
 #include <algorithm>
 #include <cmath>

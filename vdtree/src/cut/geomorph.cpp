@@ -1,4 +1,4 @@
-#include <vdtree/geomorph.h>
+#include <unseen/vdtree/geomorph.h>
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include <glm/common.hpp>
 

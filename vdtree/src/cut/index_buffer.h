@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 namespace unseen::vdtree {
 

@@ -1,7 +1,7 @@
 // A grid over the mesh: the cells that the surface touches, the others parted into connected rooms, each of which lies
 // inside or outside as a whole. Then every inner cell's distance from the nearest cell that is not, and the largest
 // spheres that lie apart.
-#include <vdtree/occluders.h>
+#include <unseen/vdtree/occluders.h>
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 // the image of the one, as O has it, is X's own image but for f (w_x - t w_z) / z, where t is the tangent of X's direction
 // and z the distance along the axis. Up to the least distance of the surface around the line is in front of the surface, and
 // X is behind it.
-#include <vdtree/occlusion_map.h>
+#include <unseen/vdtree/occlusion_map.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::vdtree {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <vdtree/cut.h>
+#include <unseen/vdtree/cut.h>
 
 #include "cut/deadlines.h"
 #include "cut/kernel/fold_tester.h"

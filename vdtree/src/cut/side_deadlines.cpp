@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

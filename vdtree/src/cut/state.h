@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/cut.h>
-#include <vdtree/function_ref.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "tree/unchecked_links.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 

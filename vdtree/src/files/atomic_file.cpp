@@ -1,5 +1,5 @@
 // Temporary file and rename, with POSIX calls because their errors say why.
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include <algorithm>
 #include <array>

@@ -14,7 +14,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <vdtree/internal/mapped_names.h>
+#include <unseen/vdtree/internal/mapped_names.h>
 
 namespace unseen::vdtree {
 

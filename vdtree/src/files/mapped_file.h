@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include <vdtree/result.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::vdtree {
 

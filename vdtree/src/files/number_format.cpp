@@ -1,4 +1,4 @@
-#include <vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include <algorithm>
 #include <array>

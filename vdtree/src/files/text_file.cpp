@@ -1,4 +1,4 @@
-#include <vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/text_file.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // The file format .vdt: a header, a table of sections, the checksums of their pages, and the sections themselves.
 // docs/file-format.md describes it byte by byte.
-#include <vdtree/tree_io.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include <algorithm>
 #include <array>
@@ -14,13 +14,13 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "files/byte_order.h"
 #include "files/mapped_file.h"
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -1,4 +1,4 @@
-#include <vdtree/baked_light.h>
+#include <unseen/vdtree/baked_light.h>
 
 #include <algorithm>
 #include <bitset>
@@ -9,7 +9,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 namespace unseen::vdtree {
 

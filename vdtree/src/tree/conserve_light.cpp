@@ -1,4 +1,4 @@
-#include <vdtree/conserve_light.h>
+#include <unseen/vdtree/conserve_light.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/fold_sequence.h>
-#include <vdtree/internal/packed_range.h>
-#include <vdtree/internal/scaled_geometry.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/fold_sequence.h>
+#include <unseen/vdtree/internal/packed_range.h>
+#include <unseen/vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

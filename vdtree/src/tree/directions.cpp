@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -11,7 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/normal_mask.h>
+#include <unseen/vdtree/normal_mask.h>
 
 namespace unseen::vdtree {
 

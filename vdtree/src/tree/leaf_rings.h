@@ -7,7 +7,7 @@
 
 #include "build/parallel_array.h"
 #include "build/surface.h"
-#include <vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 

@@ -1,5 +1,5 @@
 // What the vertices of rings have in normals and albedos.
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
 
 namespace unseen::vdtree {
 

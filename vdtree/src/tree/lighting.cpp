@@ -1,4 +1,4 @@
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include "tree/unchecked_links.h"
 #include "tree/unit_vector.h"
-#include <vdtree/internal/spot_share.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/spot_share.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/normal_mask.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "tree/directions.h"
 

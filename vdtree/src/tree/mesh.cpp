@@ -1,9 +1,9 @@
 // Checks and repairs of triangle soups.
-#include <vdtree/mesh.h>
+#include <unseen/vdtree/mesh.h>
 
 #include <algorithm>
 
-#include <vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
 

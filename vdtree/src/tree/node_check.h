@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -1,4 +1,4 @@
-#include <vdtree/normal_mask.h>
+#include <unseen/vdtree/normal_mask.h>
 
 #include <algorithm>
 #include <bit>

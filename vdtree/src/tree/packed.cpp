@@ -1,4 +1,4 @@
-#include <vdtree/packed.h>
+#include <unseen/vdtree/packed.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/scaled_geometry.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Pyramids of the least, the largest and the mean luminance of textures.
-#include <vdtree/texture.h>
+#include <unseen/vdtree/texture.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <string>
 
 #include <tbb/parallel_for.h>
-#include <vdtree/colour.h>
+#include <unseen/vdtree/colour.h>
 
 namespace unseen::vdtree {
 

@@ -1,5 +1,5 @@
-#include <vdtree/colour.h>
-#include <vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <vdtree/internal/texture_fit.h>
+#include <unseen/vdtree/internal/texture_fit.h>
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
-#include <vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
 
 namespace unseen::vdtree {
 

@@ -1,4 +1,4 @@
-#include <vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/tree_parts.h>
 
 #include <algorithm>
 #include <iterator>

@@ -2,7 +2,7 @@
 // it follows that node's links, and so need not look at the whole tree. Everything else takes a SoundTree.
 #pragma once
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 

@@ -7,8 +7,8 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/texture_bounds.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -1,5 +1,5 @@
-#include <vdtree/colour.h>
-#include <vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
-#include <vdtree/internal/packed_range.h>
-#include <vdtree/internal/texture_bounds.h>
-#include <vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/packed_range.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 

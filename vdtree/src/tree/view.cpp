@@ -1,4 +1,4 @@
-#include <vdtree/view.h>
+#include <unseen/vdtree/view.h>
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <string>
 
 #include "tree/unit_vector.h"
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
 

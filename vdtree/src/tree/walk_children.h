@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/kernel/prefetch.h"
 #include "tree/unchecked_links.h"

@@ -1,13 +1,13 @@
 // Decides what a view calls for, draws that, and simplifies by it.
-#include <session_gpu/as_seen.h>
+#include <unseen/session_gpu/as_seen.h>
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include <perception/motion.h>
-#include <render/depth.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/motion.h>
+#include <unseen/render/depth.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "scene_masks.h"
 

@@ -1,4 +1,4 @@
-#include <session_gpu/frame_image.h>
+#include <unseen/session_gpu/frame_image.h>
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include <session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 #include <algorithm>
 #include <string>

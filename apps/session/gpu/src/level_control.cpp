@@ -1,4 +1,4 @@
-#include <session_gpu/level_control.h>
+#include <unseen/session_gpu/level_control.h>
 
 #include <algorithm>
 #include <cassert>
@@ -13,15 +13,15 @@
 
 #include <glm/geometric.hpp>
 
-#include <perception/judge_tables.h>
-#include <render/difference_count.h>
-#include <render/elevation.h>
-#include <render/gpu_tree.h>
-#include <render/shadows.h>
-#include <render/stage_times.h>
-#include <render/visibility.h>
-#include <session_gpu/gpu_judge.h>
-#include <session_gpu/level_pictures.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/render/difference_count.h>
+#include <unseen/render/elevation.h>
+#include <unseen/render/gpu_tree.h>
+#include <unseen/render/shadows.h>
+#include <unseen/render/stage_times.h>
+#include <unseen/render/visibility.h>
+#include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/level_pictures.h>
 
 namespace unseen::session {
 namespace {

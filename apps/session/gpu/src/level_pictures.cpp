@@ -1,4 +1,4 @@
-#include <session_gpu/level_pictures.h>
+#include <unseen/session_gpu/level_pictures.h>
 
 #include <algorithm>
 #include <chrono>
@@ -7,11 +7,11 @@
 #include <string>
 #include <utility>
 
-#include <render/draw.h>
-#include <render/gpu_tree.h>
-#include <render/sample_sum.h>
-#include <render/target.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/render/draw.h>
+#include <unseen/render/gpu_tree.h>
+#include <unseen/render/sample_sum.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

@@ -1,4 +1,4 @@
-#include <session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/moving_occlusion.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,10 +10,10 @@
 
 #include <glm/geometric.hpp>
 
-#include <render/depth_cells.h>
-#include <session_gpu/trial.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
+#include <unseen/render/depth_cells.h>
+#include <unseen/session_gpu/trial.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 namespace unseen::session {
 namespace {

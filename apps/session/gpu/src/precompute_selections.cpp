@@ -1,4 +1,4 @@
-#include <session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/precompute_selections.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,8 +10,8 @@
 #include <thread>
 #include <utility>
 
-#include <session_gpu/level_pictures.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

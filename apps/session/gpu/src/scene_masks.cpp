@@ -4,9 +4,9 @@
 #include <optional>
 #include <utility>
 
-#include <perception/judge_tables.h>
-#include <render/sample_sum.h>
-#include <session_gpu/gpu_judge.h>
+#include <unseen/perception/judge_tables.h>
+#include <unseen/render/sample_sum.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 namespace unseen::session {
 namespace {

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include <perception/masking.h>
-#include <render/layers.h>
-#include <session/session.h>
-#include <session_gpu/scene_renderer.h>
+#include <unseen/perception/masking.h>
+#include <unseen/render/layers.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::session {
 

@@ -1,4 +1,4 @@
-#include <session_gpu/scene_renderer.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include <algorithm>
 #include <chrono>

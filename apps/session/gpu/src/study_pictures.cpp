@@ -1,10 +1,10 @@
-#include <session_gpu/study_pictures.h>
+#include <unseen/session_gpu/study_pictures.h>
 
 #include <algorithm>
 
-#include <session_gpu/frame_image.h>
-#include <session_gpu/scene_renderer.h>
-#include <vdtree/internal/errors.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {

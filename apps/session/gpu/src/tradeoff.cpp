@@ -1,4 +1,4 @@
-#include <session_gpu/tradeoff.h>
+#include <unseen/session_gpu/tradeoff.h>
 
 #include <algorithm>
 #include <chrono>
@@ -6,12 +6,12 @@
 #include <limits>
 #include <utility>
 
-#include <perception/judge.h>
-#include <session_gpu/as_seen.h>
-#include <session_gpu/frame_image.h>
-#include <session_gpu/scene_renderer.h>
-#include <vdtree/internal/errors.h>
-#include <vdtree/internal/number_format.h>
+#include <unseen/perception/judge.h>
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
 
 #include "median.h"
 

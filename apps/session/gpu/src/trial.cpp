@@ -1,4 +1,4 @@
-#include <session_gpu/trial.h>
+#include <unseen/session_gpu/trial.h>
 
 #include <algorithm>
 

@@ -10,7 +10,7 @@
 
 #include "cut/kernel/deadline_kernel.h"
 #include "cut/kernel/prefetch.h"
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

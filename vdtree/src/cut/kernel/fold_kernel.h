@@ -11,9 +11,9 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/distance_criterion.h>
-#include <vdtree/normal_mask.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 

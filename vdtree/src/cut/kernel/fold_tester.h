@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/distance_criterion.h>
-#include <vdtree/vertex_tree.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/cost_source.h"
 #include "cut/kernel/fold_kernel.h"

@@ -5,7 +5,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

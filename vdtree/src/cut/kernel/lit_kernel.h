@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include <vdtree/lighting.h>
+#include <unseen/vdtree/lighting.h>
 
 #include "cut/kernel/fold_kernel.h"
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/distance_criterion.h>
-#include <vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
 
 #include "cut/kernel/fold_kernel.h"
 #include "cut/kernel/lit_kernel.h"

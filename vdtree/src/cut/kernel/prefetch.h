@@ -1,7 +1,7 @@
 // Brings memory nearer that is going to be read soon.
 #pragma once
 
-#include <vdtree/internal/simd.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -1,0 +1,20 @@
+// session_gpu: where a session meets OpenGL. The header to include first.
+//
+// A SceneRenderer draws all objects of a session with what stands around them. simplify_as_seen() folds what lies behind
+// what a picture shows, and what the scene masks; a MovingOcclusion what earlier frames of a moving view hide. A GpuJudge
+// is perception::Judge on the GPU. A LevelControl chooses among few levels of detail by what the rest of a picture masks;
+// precompute_selections() selects levels for cameras all over a scene. measure_tradeoff() tells what accuracy costs in one
+// view. draw_study_pairs() makes the pictures of a study.
+#pragma once
+
+#include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/level_control.h>
+#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/session_gpu/moving_occlusion.h>
+#include <unseen/session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/session_gpu/study_pictures.h>
+#include <unseen/session_gpu/tradeoff.h>
+#include <unseen/session_gpu/trial.h>

@@ -1,0 +1,49 @@
+// Draws the pictures of a study: pairs of an original and what is to be told from it.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <unseen/calibration/study.h>
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
+#include <unseen/session_gpu/level_control.h>
+
+namespace unseen::session {
+
+struct StudyCondition {
+    std::string name;
+    Request request; // its purpose counts as picture
+    bool is_training = false;
+};
+
+struct StudyPicturesOptions {
+    std::filesystem::path folder;              // where pictures go; it must be there
+    std::string prefix;                        // of the files' names
+    int views = 5;                             // 1 to 360, around the target
+    double degrees = 72;                       // from a view to the next one
+    int samples = 64;                          // a pixel, 1 to 256
+    bool pairs_original = false;               // with itself, once a view: for StudyTask::differ
+    std::function<void(double)> progress = {}; // hears what share is done
+};
+
+// Pairs of the full model and of what each condition makes of it, a view each. Pictures are PNG, as the session's
+// display shows them. Fails as Session::simplify(), drawing and writing files do; what is written stays then. Cost: so
+// many pictures for each view and condition.
+Result<std::vector<calibration::StudyPair>> draw_study_pairs(Session& session, const render::Context& context,
+                                                             const vdtree::View& view,
+                                                             const std::vector<StudyCondition>& conditions,
+                                                             const StudyPicturesOptions& options);
+
+// The same of discrete levels, as in the study of Drettakis and others (2007): each level against the best one, for
+// StudyTask::differ. What is predicted is what LevelControl decides in the view: it keeps one level; a finer one it calls
+// better than need be, so nobody should see a difference ("level 1, decrease"); that one should do ("maintain"); a
+// coarser one should show ("increase"). Fails on scenes of several objects, and as LevelControl does.
+Result<std::vector<calibration::StudyPair>> draw_level_pairs(Session& session, const render::Context& context,
+                                                             const vdtree::View& view,
+                                                             const LevelControlOptions& levels,
+                                                             const StudyPicturesOptions& options);
+
+} // namespace unseen::session

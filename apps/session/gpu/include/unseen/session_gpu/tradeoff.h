@@ -1,0 +1,58 @@
+// What accuracy costs in one view: ways to simplify, what each takes, and what shows of it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <unseen/render/context.h>
+#include <unseen/session/session.h>
+
+namespace unseen::session {
+
+inline constexpr int least_judged_samples = 8;
+
+struct TradeoffOptions {
+    double seconds = 45; // of wall-clock time for all points, about; those that do not fit are left out. Above 0
+    // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but least_judged_samples or
+    // more. Fewer show steps of samples, so V is larger than it is of a finer picture.
+    int samples = 64;
+    std::function<void(double)> progress = {}; // hears what share of the points is done
+};
+
+// One way, and what came of it. The judges are the session's observer's, on the CPU.
+struct TradeoffPoint {
+    std::string name;
+    Request request;
+    bool is_of_view = false; // goes by what this view's picture shows, and holds for no other
+    vdtree::Index triangles = 0;
+    double make_ms = 0; // from nothing, errors of folds measured before
+    double follow_ms =
+        0;              // a frame of an eye that moves around the scene by a tenth of a degree; median. NaN: of stills
+    double draw_ms = 0; // a frame with one sample a pixel; median
+    std::uint64_t visible_pixels = 0,
+                  second_visible_pixels = 0; // against the full model, by the judge and the second one
+    double v = 0, second_v = 0;              // the largest difference, in thresholds
+    double ssim = 1;                         // of code values
+    double shift = 0;         // world units: how far a vertex of the full model is from what stands for it, at most
+    bool is_on_front = false; // no other point has fewer triangles and a smaller V
+    bool is_recommended = false;
+};
+
+struct Tradeoff {
+    std::vector<TradeoffPoint> points;      // the full model first
+    std::vector<std::string> left_out = {}; // names of points there was no time for
+    int samples = 0;                        // of the pictures that were judged
+    double measuring_s = 0;                 // of the errors of folds, before all points; next to 0 where they are kept
+};
+
+// Measures points in the order of what they tell: the full model, the default test at several thresholds, the others,
+// budgets. Recommended is, of the points that hold for moving views and show nothing to either judge, the one whose
+// frames take the least time; the full model where no other shows nothing. Fails as Session::simplify() and drawing do; a
+// fold test that does not know the scene is left out. Cost: a simplification and some hundred drawings a point.
+Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& context, const vdtree::View& view,
+                                  const TradeoffOptions& options = {});
+
+} // namespace unseen::session

@@ -1,0 +1,88 @@
+// What is believed about an observer's contrast sensitivity everywhere, from answers at some frequencies and
+// eccentricities.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <unseen/perception/csf.h>
+
+namespace unseen::calibration {
+
+// A static grating patch at an eccentricity.
+struct GratingPlace {
+    double frequency_cpd = 0, eccentricity_deg = 0;
+    double area_deg2 = 0; // pi sigma^2; 0: of 1.5 cycles radius, as CsfTable has them
+    bool is_wide() const { return area_deg2 > 0; }
+    double sigma_deg() const; // of the patch's envelope
+    bool operator==(const GratingPlace&) const = default;
+};
+// How many times as well it is seen as a patch of 1.5 cycles there, by somebody who sums so (perception/csf.h).
+double summation_gain(const GratingPlace& place, double own = 1);
+
+// A Gaussian process over log10 sensitivity: an expected table, plus a deviation d(f, e) of mean 0 and covariance
+//   gain^2 + tilt^2 u u' + cutoff^2 f f' + decline^2 e e' + fall^2 (f e)(f' e') + loss^2 s s'
+//   + local(s) local(s') exp(-du^2 / 2 lu^2 - dv^2 / 2 lv^2) + area^2 t t'
+// with u octaves from 3 cpd, v = log2(1 + e / 2 deg), and s what the expected observer has lost here, log10 units below
+// the sensitivity to 3 cpd in the fovea. The first six terms are a shape with six parameters: how sensitive the
+// observer is, how steep over frequency, how fine, how fast it falls aside, and how much of every loss is there; the
+// last lets every place differ from it, the more, the more is lost. So what is measured in one place tells about the
+// others, and what does not fit the shape still comes through.
+//
+// Wide patches are expected to be seen better by castle's law of area, and differ from that in one number: how the
+// observer sums over area, log10 of `own` in perception::summation_gain(), of which a patch shows the share t.
+//
+// Answers come in as likelihoods by place, and are combined by expectation propagation (Minka 2001) with one Gaussian
+// factor for each place. Cost of set_own(): places^2, of a prediction places^3.
+class SensitivityField {
+public:
+    struct Belief {
+        double mean = 0, deviation = 0; // log10 sensitivity
+    };
+
+    // `expected` gives the mean at `luminance`.
+    SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected,
+                     perception::Luminance luminance);
+
+    std::size_t size() const noexcept { return sites_.size(); }
+    double expected(std::size_t i) const noexcept { return expected_[i]; } // log10 sensitivity
+
+    // What the other places say about this one: the belief without this place's own answers.
+    Belief without_own(std::size_t i) const;
+    Belief belief(std::size_t i) const;
+    // The deviation from the expected table anywhere, and its parts: the shape, and what is local.
+    Belief deviation(const GratingPlace& at) const;
+    Belief local_deviation(std::size_t i) const;
+    Belief log10_summation() const; // of `own`: how the observer sums over area
+    // By how much the beliefs of all places move where that of place i does by one.
+    std::vector<double> pulled_by(std::size_t i) const;
+
+    // A place's own answers as a Gaussian factor that makes this belief of the one without them: moments of the product
+    // of without_own() and the answers' likelihood. Then all beliefs are computed anew.
+    void set_own(std::size_t i, const Belief& with_own);
+
+    // A place, and what the expected observer has lost there.
+    struct Site {
+        GratingPlace place;
+        double loss = 0;
+        double share = 0; // of the summation over area that it shows
+    };
+
+private:
+    double log10_expected(const GratingPlace& at) const;
+    Site site(const GratingPlace& at) const;
+    void update();
+    void change_factor(std::size_t i, double more_precision, double more_shift);
+
+    perception::CsfTable table_;
+    perception::Luminance luminance_;
+    std::vector<Site> sites_;
+    std::vector<double> expected_;
+    std::vector<double> prior_;             // covariance of the deviations, square
+    std::vector<double> precision_;         // of the places' own factors
+    std::vector<double> shift_;             // precision times mean of the deviation
+    std::vector<double> covariance_, mean_; // posterior, of the deviations
+    int changes_ = 0;                       // since all was computed
+};
+
+} // namespace unseen::calibration

@@ -1,0 +1,77 @@
+// Draws items into a target.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+
+#include <unseen/render/gpu_tree.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/view.h>
+
+namespace unseen::render {
+
+class Shadows; // see shadows.h
+
+constexpr float default_background = 0.19597990f; // relative luminance; 20 cd/m2 on the default display
+
+enum class Shading {
+    smooth, // luminance by vertex, linearly interpolated (lit or pre-lit, as the tree's luminance is)
+    flat,   // one luminance a triangle: the mean of its corners
+};
+
+// One object of a scene.
+struct Item {
+    GpuCut cut;
+    vdtree::Similarity placement = {};
+    Shading shading = Shading::smooth;
+    bool wireframe = false; // the triangles' edges over the shaded surface, hidden lines removed
+    // In the tree's frame; none: the luminance of vertices is the tree's. Not for cuts with vertices that glide.
+    std::optional<vdtree::Lighting> lighting = {};
+    // For fading from one cut to another: each pixel of a pattern of 4x4 has a value of its own in 0..1, and only those
+    // from x to below y are drawn. Items with {0, a} and {a, 1} share the pixels. Depth alone is drawn everywhere.
+    glm::vec2 stipple = {0, 1};
+};
+
+struct Camera {
+    vdtree::View view;                  // its window is as large as the target
+    glm::dvec2 point = glm::dvec2(0.5); // of each pixel, from its top left, that is drawn
+    std::optional<double> near_plane =
+        {}; // distance, world units; none: just before the items. One for draws that share depth.
+    // Of the lights that cast some, as of their last update; null: none are drawn. They outlive the draw.
+    const Shadows* shadows = nullptr;
+    // The attachment that how much of each casting light comes to a pixel is drawn to, in the same pass: 0 to 1, the
+    // first light in r, and so on; 1 of what is not lit, of lights that there are not, and where no item is. It is of
+    // ColourFormat::shares8 or in floats, and not the attachment of the colours. None: it is not drawn.
+    std::optional<int> shadow_mask = {};
+};
+
+// What a draw begins with.
+struct Clear {
+    std::optional<glm::vec4> colour = glm::vec4(default_background); // linear RGB, luminance; none: kept
+    bool depth = true;
+};
+
+// Depth that a draw has left in a texture: near / distance along the view's axis, 0 for the background, first row on top.
+struct DrawnDepth {
+    unsigned texture = 0;      // GL name; stays its owner's
+    int width = 0, height = 0; // pixels
+    int left = 0, top = 0, right = 0,
+        bottom = 0;        // the part that was drawn to, the last ones excluded; the rest is background
+    double near_plane = 0; // world units
+};
+
+// Draws the items in their order; what is nearer hides what is farther, across items. Items share the target's context.
+// Programs are compiled when they are first needed. `attachment`: the colour that is drawn to, others are kept; without
+// any, only depth is drawn. Fails on an invalid view, placement or light, and on a GL error.
+Result<void> draw(std::span<const Item> items, const Camera& camera, Target& target, const Clear& clear = {},
+                  int attachment = 0);
+
+// The near plane that draw() chooses. It cuts off nothing but what is nearer to the eye than 1e-4 of the size of an
+// item around the eye.
+Result<double> near_plane(std::span<const Item> items, const vdtree::View& view);
+
+} // namespace unseen::render

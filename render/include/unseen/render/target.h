@@ -1,0 +1,80 @@
+// What is drawn into, and how it is read back.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <glm/vec4.hpp>
+
+#include <unseen/render/context.h>
+#include <unseen/vdtree/result.h>
+
+namespace unseen::render {
+
+enum class ColourFormat {
+    rgba32f, // linear RGB and relative luminance in a; 16 bytes a pixel
+    rgba16f, // the same in half floats
+    srgb8,   // for displays: encoded as sRGB, a is 1
+    shares8, // four numbers from 0 to 1, in steps of a 255th: for masks of shadows
+};
+
+// 32-bit float depth is 1 at the near plane and 0 at infinity.
+struct TargetOptions {
+    std::vector<ColourFormat> colours = {ColourFormat::rgba32f}; // the attachments; none: depth only
+    bool depth = true;
+    int samples = 0; // a pixel, by the hardware; 0: exact pixels. Others are resolved before they are read.
+    const char* label = "";
+};
+
+// A framebuffer of others, which stays theirs and must outlive the target.
+struct ForeignFramebuffer {
+    unsigned id = 0;            // 0: the window's
+    bool is_for_display = true; // colours are encoded as sRGB, by the framebuffer or by the shaders; a is 1
+    bool top_row_first = false; // the order of rows in memory
+};
+
+// Move-only. Owns its attachments and a handle to its context.
+class Target {
+public:
+    // Fails on a size below 1x1, on more than this GL can draw to, and when memory runs out.
+    static Result<Target> create(const Context& context, int width, int height, const TargetOptions& options = {});
+
+    // The window's back buffer, or another framebuffer. Makes nothing. Fails where it cannot be drawn to.
+    static Result<Target> foreign(const Context& context, int width, int height,
+                                  const ForeignFramebuffer& framebuffer = {});
+
+    Target(Target&&) noexcept;
+    Target& operator=(Target&&) noexcept;
+    ~Target();
+
+    int width() const noexcept;
+    int height() const noexcept;
+
+    // GL names, for drawing of your own. 0 where there is none, or where it has samples.
+    unsigned id() const noexcept;
+    unsigned colour_texture(int attachment = 0) const noexcept;
+    unsigned depth_texture() const noexcept;
+
+    struct Impl; // the library's own
+    Impl& impl() const noexcept { return *impl_; }
+
+private:
+    explicit Target(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+// The means of the hardware's samples, of all attachments. Both targets are of one size and format; `to` has no
+// samples.
+Result<void> resolve(const Target& from, Target& to);
+
+// Row-major from the top left. They wait for the GPU. They fail on targets with samples, and where there is no such
+// attachment.
+Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment = 0);
+Result<std::vector<float>> read_luminance(const Target& target, int attachment = 0); // not of targets for displays
+Result<std::vector<float>> read_colour(const Target& target, int attachment = 0);    // three values a pixel
+Result<std::vector<float>> read_depth(const Target& target);
+
+// The largest window that this GL can draw to, in pixels a side. Needs a current context.
+int largest_target_side();
+
+} // namespace unseen::render

@@ -1,0 +1,61 @@
+// The mesh while it is folded one node after the other: which triangles are drawn around which nodes.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include <glm/geometric.hpp>
+
+#include <unseen/vdtree/vertex_tree.h>
+
+namespace unseen::vdtree {
+
+class FoldSequence {
+public:
+    explicit FoldSequence(const SoundTree& tree)
+        : tree_(tree), positions_(tree.positions()), corners_(tree.triangles().begin(), tree.triangles().end()),
+          around_(tree.node_count()) {
+        for (Index t = 0; t < corners_.size(); ++t)
+            for (NodeId& corner : corners_[t]) around_[corner += tree.interior_count()].push_back(t);
+    }
+
+    // Folds a node whose interior children have been folded. Calls leave(corners) for each triangle that is drawn
+    // around the children; what it becomes is in ring() afterwards. Cost: the triangles around the node.
+    template <class F>
+    void fold(NodeId node, F&& leave) {
+        std::vector<Index>& ring = around_[node];
+        tree_.for_each_child(node, [&](NodeId child) {
+            for (const Index t : around_[child]) {
+                Triangle& at = corners_[t];
+                const bool is_new = at[0] != node && at[1] != node && at[2] != node; // else another child's, too
+                if (is_new && are_distinct(at)) leave(at);
+                for (NodeId& corner : at)
+                    if (corner == child) corner = node;
+            }
+            ring.insert(ring.end(), around_[child].begin(), around_[child].end());
+            std::vector<Index>().swap(around_[child]);
+        });
+        std::sort(ring.begin(), ring.end());
+        ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+        std::erase_if(ring, [&](Index t) { return !are_distinct(corners_[t]); });
+    }
+
+    // The triangles that are drawn around a node which has been folded, and the nodes at their corners.
+    std::span<const Index> ring(NodeId node) const { return around_[node]; }
+    const Triangle& corners(Index triangle) const { return corners_[triangle]; }
+
+    glm::vec3 vector_area(const Triangle& t) const {
+        return 0.5f * glm::cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
+    }
+
+private:
+    static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
+
+    const SoundTree& tree_;
+    std::span<const glm::vec3> positions_;
+    std::vector<Triangle> corners_;          // nodes that are shown
+    std::vector<std::vector<Index>> around_; // by node that is shown
+};
+
+} // namespace unseen::vdtree

@@ -1,0 +1,32 @@
+// What a node's ring shows of the texture, in any state of the ring, and where a fold that moves no vertex moves the
+// texture.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
+
+namespace unseen::vdtree {
+
+// By interior node: the box of the texture coordinates of the ring's corners and of the subtree's proxies. All that
+// triangles around the node show, unfolded or folded, in whatever part, lies within it. Cost: one pass over triangles
+// and nodes; parallel. Likewise the next.
+std::vector<UvBox> bound_footprints(const TreeGeometry& geometry, const TreeParts& parts);
+
+// By interior node: the texture's luminance over the footprint. Grows up the tree.
+std::vector<PackedRange> bound_ring_texture(const TreeGeometry& geometry, const TreeParts& parts);
+
+// By interior node: whether its leaves and the proxies of its subtree differ in texture coordinates: then folds move
+// the texture even where no vertex moves.
+std::vector<std::uint8_t> find_texture_moves(const TreeGeometry& geometry, const TreeParts& parts);
+
+// Of luminances and a texture that is multiplied with them; rounded outward.
+PackedRange product(PackedRange luminance, PackedRange texture);
+
+// The least and the largest channel of a vertex's colour as it is drawn, scaled to its luminance: a texture of the
+// luminance T comes out between these times T. Rounded outward.
+PackedRange channel_range(const glm::vec4& colour, Unorm16 luminance);
+
+} // namespace unseen::vdtree

@@ -1,0 +1,105 @@
+// The nodes of a tree while it is being built: how they are numbered and when the clusterer made them.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <unseen/vdtree/builder.h>
+
+namespace unseen::vdtree {
+
+// How the nodes hang together; numbered as in <unseen/vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
+struct TreeLinks {
+    std::span<const NodeId> parents;   // by node
+    std::span<const Index> first_leaf; // by interior node, and so on
+    std::span<const Index> leaf_end;
+    std::span<const NodeId> subtree_end;
+
+    NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
+    Index leaves() const { return static_cast<Index>(parents.size() - first_leaf.size()); }
+    NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }
+
+    // Calls on_child for each interior child, and on_leaf for each leaf that is a child itself, in depth-first order.
+    template <class Child, class Leaf>
+    void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
+        NodeId child = node + 1;
+        const NodeId child_end = subtree_end[node];
+        const Index end = leaf_end[node];
+        for (Index leaf = first_leaf[node]; leaf < end;) {
+            if (child < child_end && first_leaf[child] == leaf) {
+                on_child(child);
+                leaf = leaf_end[child];
+                child = subtree_end[child];
+            } else {
+                on_leaf(leaf++);
+            }
+        }
+    }
+};
+
+// Of a tree's arrays.
+template <class Arrays>
+TreeLinks links_of(const Arrays& tree) {
+    return {tree.parents, tree.first_leaf, tree.leaf_end, tree.subtree_end};
+}
+
+// The same while the tree is being built.
+struct TreeShape {
+    std::vector<NodeId> parents;
+    std::vector<Index> first_leaf;
+    std::vector<Index> leaf_end;
+    std::vector<NodeId> subtree_end;
+    std::vector<Index>
+        made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
+
+    TreeLinks links() const { return links_of(*this); }
+    NodeId interior() const { return links().interior(); }
+    Index leaves() const { return links().leaves(); }
+    NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }
+    template <class Child, class Leaf>
+    void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
+        links().for_each_child(node, on_child, on_leaf);
+    }
+};
+
+// Shortcuts up the tree, so that looking for an ancestor costs the logarithm of the depth however deep the tree is.
+// After Myers, "An applicative random-access stack", 1983.
+class Ancestors {
+public:
+    explicit Ancestors(const TreeShape& shape);
+
+    // The lowest of `node` and its ancestors that `found` accepts; with a node, it must accept all that are above.
+    // Calls `found` only with interior nodes; there must be one that it accepts.
+    template <class Found>
+    NodeId lowest(NodeId node, Found&& found) const {
+        // Most are near: walk before jumping.
+        for (int step = 0; step < steps_before_jumping; ++step) {
+            if (found(node)) return node;
+            node = shape_.parents[node];
+        }
+        while (!found(node)) {
+            const NodeId far = jump_[node];
+            node = far != no_node && !found(far) ? far : shape_.parents[node];
+        }
+        return node;
+    }
+
+    // The highest of `node` and its ancestors that was made at `time` or before; `node` is one.
+    NodeId highest_made_by(NodeId node, Index time) const {
+        for (;;) {
+            const NodeId far = node < jump_.size() ? jump_[node] : no_node;
+            const NodeId up = shape_.parents[node];
+            if (far != no_node && shape_.made[far] <= time) node = far;
+            else if (up != no_node && shape_.made[up] <= time) node = up;
+            else return node;
+        }
+    }
+
+private:
+    static constexpr int steps_before_jumping = 16;
+
+    const TreeShape& shape_;
+    std::vector<NodeId> jump_; // by interior node: an ancestor
+};
+
+} // namespace unseen::vdtree

@@ -1,0 +1,121 @@
+// The arrays of a vertex tree, as the builder fills them and the file stores them. See <unseen/vdtree/vertex_tree.h>.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <unseen/vdtree/vertex_tree.h>
+
+#include <unseen/vdtree/internal/array.h>
+
+namespace unseen::vdtree {
+
+template <class T>
+using Vector = std::vector<T>;
+
+struct TextureFacts {
+    std::uint32_t width, height;
+    Wrap wrap_u, wrap_v;
+};
+static_assert(sizeof(TextureFacts) == 16);
+
+// `Storage`: Vector while they are filled, Array when they are done.
+template <template <class> class Storage>
+struct GeometryArrays {
+    // By node: interior nodes, then leaves.
+    Storage<NodeId> parents;
+    Storage<glm::vec3> positions;
+    Storage<PackedNormal> normals;
+    Storage<glm::vec4> colours;
+    Storage<glm::vec2> uvs;
+
+    // By interior node.
+    Storage<Index> first_leaf, leaf_end;
+    Storage<NodeId> subtree_end;
+    Storage<Index> first_triangle; // one longer
+    Storage<NodeBounds> bounds;
+    Storage<Sphere> support_spheres;
+    Storage<std::uint32_t> mask_at; // into mask_records
+    Storage<float> displacement;
+
+    Storage<std::uint8_t> mask_records; // see mask_pool.h
+
+    // By triangle.
+    Storage<Triangle> triangles;
+    Storage<Index> source_triangles; // empty without ranges
+
+    Storage<Index> source_vertices; // by leaf
+    Storage<std::byte> document;    // MeshView::document
+
+    // Of textured trees only.
+    Storage<TextureFacts> texture; // one
+    Storage<Texel> texels;
+    Storage<PackedRange> ring_texture; // by interior node
+};
+
+struct GeometryFacts {
+    std::vector<MeshRange> ranges;
+    glm::dvec3 origin = glm::dvec3(0);
+    Sphere bounding_sphere;
+    std::uint64_t dropped_triangles = 0;
+    Closedness closedness = Closedness::open;
+};
+
+// What another light leaves as it is.
+struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
+    std::shared_ptr<const void> mapping; // the memory that arrays view
+
+    // Empty where there is none.
+    TextureView texture_view() const {
+        if (texture.empty()) return {};
+        return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v, texels};
+    }
+};
+
+template <template <class> class Storage>
+struct LuminanceArrays {
+    Storage<Unorm16> luminance;         // by node
+    Storage<PackedRange> support_range; // by interior node, and so on
+    Storage<PackedRange> ring_range;
+    Storage<Unorm16> adaptation;
+};
+
+// What depends on the light.
+struct TreeLuminance : LuminanceArrays<Array> {
+    Light light;
+    bool prelit = false;
+    bool textured = false; // by the geometry's texture, if it has one
+    LuminanceRange range;
+};
+
+// Which nodes of a mapped file have been looked at. For any number of threads.
+class NodeChecks;
+
+struct VertexTree::Data {
+    std::shared_ptr<const TreeGeometry> geometry;
+    std::shared_ptr<const TreeLuminance> light;
+    std::shared_ptr<NodeChecks> checks; // of mapped files, over these two; none: everything has been checked, or built
+    std::vector<Attribute> attributes;
+};
+
+// Whether an attribute can be one of a tree with so many nodes: empty, or what is wrong, as a sentence.
+std::string fault_in_attribute(const AttributeInfo& attribute, std::size_t interior_count, std::size_t node_count);
+
+// In memory of its own, whatever the given arrays view.
+TreeLuminance copy_of(const TreeLuminance& light);
+
+class TreeParts;
+
+// Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles.
+// `given`: luminances in the light's place, of proxies, too; null: none.
+// Cost: one pass over triangles and nodes; parallel.
+TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit,
+                               bool textured, const FunctionRef<float(NodeId)>* given);
+
+// Relative luminance of one vertex; a texture's is to be multiplied with it.
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit,
+                       bool textured = false);
+
+} // namespace unseen::vdtree
