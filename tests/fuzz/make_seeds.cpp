@@ -1,4 +1,4 @@
-// Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow,image,text}/.
+// Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow,image,text,selection}/.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -11,6 +11,7 @@
 #include <unseen/calibration/calibration.h>
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/perception/image.h>
+#include <unseen/session/selection.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -180,18 +181,51 @@ void make_texts(const fs::path& folder) {
     fs::remove(plain);
 }
 
+// The first byte chooses the reader: see selection_fuzz.cpp.
+void make_selections(const fs::path& folder) {
+    namespace session = unseen::session;
+    session::Selections selections;
+    selections.budget = 1000;
+    selections.triangles = {{900, 300, 100}, {80}};
+    const auto corner_at = [&](const session::LatticePoint& place) {
+        session::SelectionCorner corner{place, {}};
+        corner.cameras.resize(static_cast<std::size_t>(selections.directions()));
+        corner.cameras.front().objects = {{0, 1, {0.5f, 2}}, {1, 0, {}}};
+        return corner;
+    };
+    const fs::path plain = folder / "plain", journal_file = folder / "journal_plain";
+    auto journal = session::SelectionJournal::open(journal_file, 0x3131313131313131);
+    if (!journal) throw std::runtime_error(journal.error().message);
+    for (const session::LatticePoint& place : {session::LatticePoint{0, 0, 0}, session::LatticePoint{0, 0, 1},
+                                               session::LatticePoint{1, 0, 0}, session::LatticePoint{1, 0, 1}}) {
+        selections.corners.push_back(corner_at(place));
+        expect(journal->add(selections.corners.back()));
+    }
+    selections.cells = {{{0, 0, 0}, 1}};
+    expect(session::write_selections(plain, selections));
+    write_for_reader(folder / "small.sel", '\0', plain);
+    write_for_reader(folder / "sealed.sel", '\1', plain);
+    const auto message = session::to_bytes(selections.corners.front());
+    write(folder / "message", '\2' + std::string(reinterpret_cast<const char*>(message.data()), message.size()));
+    write_for_reader(folder / "journal", '\3', journal_file);
+    fs::remove(plain);
+    fs::remove(journal_file);
+}
+
 } // namespace
 
 int main(int count, char** arguments) try {
     if (count != 2) throw std::runtime_error("usage: make_fuzz_seeds FOLDER");
     const fs::path folder = arguments[1];
-    for (const char* target : {"mesh", "tree", "follow", "image", "text"}) fs::create_directories(folder / target);
+    for (const char* target : {"mesh", "tree", "follow", "image", "text", "selection"})
+        fs::create_directories(folder / target);
     make_meshes(folder / "mesh");
     make_vtk(folder / "mesh");
     make_trees(folder / "tree");
     make_drives(folder / "follow");
     make_images(folder / "image");
     make_texts(folder / "text");
+    make_selections(folder / "selection");
 } catch (const std::exception& error) {
     std::fprintf(stderr, "make_fuzz_seeds: %s\n", error.what());
     return 1;
