@@ -1,38 +1,20 @@
 #include <unseen/session/selection_search.h>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <queue>
 
 #include <unseen/perception/judge.h>
+#include <unseen/perception/ssim_window.h>
 #include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {
 
 // SSIM as perception::ssim() has it.
-constexpr int window_radius = 5, window_size = 2 * window_radius + 1; // pixels
-constexpr double window_sigma = 1.5;                                  // pixels
-constexpr double data_range = 255;                                    // 8-bit codes
-constexpr double c1 = (0.01 * data_range) * (0.01 * data_range);
-constexpr double c2 = (0.03 * data_range) * (0.03 * data_range);
-
-const std::array<double, window_size>& gaussian_window() {
-    static const std::array<double, window_size> window = [] {
-        std::array<double, window_size> w{};
-        double sum = 0;
-        for (int i = 0; i < window_size; ++i) {
-            const double x = (i - window_radius) / window_sigma;
-            sum += w[static_cast<std::size_t>(i)] = std::exp(-0.5 * x * x);
-        }
-        for (double& v : w) v /= sum;
-        return w;
-    }();
-    return window;
-}
+constexpr int window_size = perception::ssim_window::size; // pixels
 
 std::size_t place_in(int width, int x, int y) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -41,7 +23,7 @@ std::size_t place_in(int width, int x, int y) {
 // The sum over each window of `value(x, y)` with the window's weights, for the windows whose top left is in `places`.
 template <class Value>
 void filter(const PixelRect& places, std::vector<double>& columns, std::vector<double>& sums, Value&& value) {
-    const auto& window = gaussian_window();
+    const auto& window = perception::ssim_window::weights();
     const auto wide = static_cast<std::size_t>(places.width() + window_size - 1);
     const auto out = static_cast<std::size_t>(places.width());
     columns.assign(wide, 0);
@@ -197,11 +179,8 @@ void PictureLoss::count(std::span<const float> picture, const PixelRect& places,
     for (int y = places.top; y < places.bottom; ++y)
         for (int x = places.left; x < places.right; ++x, ++out) {
             const std::size_t at = place_in(columns_, x, y);
-            const double a = reference_mean_[at], b = mean[out];
-            const double variance_a = reference_square_[at] - a * a, variance_b = square[out] - b * b;
-            const double covariance = product[out] - a * b;
-            losses[out] = 1 - ((2 * a * b + c1) * (2 * covariance + c2)) /
-                                  ((a * a + b * b + c1) * (variance_a + variance_b + c2));
+            losses[out] = 1 - perception::ssim_window::similarity(
+                                  {reference_mean_[at], mean[out], reference_square_[at], square[out], product[out]});
         }
 }
 

@@ -1,5 +1,5 @@
-// Structural similarity (Wang, Bovik, Sheikh, Simoncelli 2004) as scikit-image computes it with Gaussian weights.
 #include <unseen/perception/judge.h>
+#include <unseen/perception/ssim_window.h>
 
 #include <array>
 #include <cmath>
@@ -9,24 +9,7 @@
 namespace unseen::perception {
 namespace {
 
-constexpr int window_radius = 5; // int(3.5 sigma + 0.5) pixels
-constexpr int window_size = 2 * window_radius + 1;
-constexpr double window_sigma = 1.5; // pixels
-constexpr double data_range = 255;   // 8-bit codes
-constexpr double c1 = (0.01 * data_range) * (0.01 * data_range);
-constexpr double c2 = (0.03 * data_range) * (0.03 * data_range);
 constexpr double luma_weights[3] = {0.299, 0.587, 0.114}; // ITU-R BT.601
-
-std::array<double, window_size> gaussian_window() {
-    std::array<double, window_size> w{};
-    double sum = 0;
-    for (int i = 0; i < window_size; ++i) {
-        const double x = (i - window_radius) / window_sigma;
-        sum += w[static_cast<std::size_t>(i)] = std::exp(-0.5 * x * x);
-    }
-    for (double& v : w) v /= sum;
-    return w;
-}
 
 // The code values as they would stand in an 8-bit file; luma itself is not rounded.
 std::vector<double> luma_codes(const Image& image) {
@@ -34,31 +17,12 @@ std::vector<double> luma_codes(const Image& image) {
     std::vector<double> luma(image.values.size() / channels);
     for (std::size_t p = 0; p < luma.size(); ++p) {
         for (std::size_t c = 0; c < channels; ++c) {
-            const double code = std::round(static_cast<double>(image.values[p * channels + c]) * data_range);
+            const double code =
+                std::round(static_cast<double>(image.values[p * channels + c]) * ssim_window::data_range);
             luma[p] += channels == 1 ? code : luma_weights[c] * code;
         }
     }
     return luma;
-}
-
-// Weighted local sums of the five products that SSIM needs, for one row of window centres at a time: first down the
-// columns, then along the row. Only windows that lie inside the image are wanted, so there are no edges to treat.
-struct Moments {
-    double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
-    void add(double w, const Moments& m) {
-        x += w * m.x;
-        y += w * m.y;
-        xx += w * m.xx;
-        yy += w * m.yy;
-        xy += w * m.xy;
-    }
-};
-
-double similarity(const Moments& m) {
-    const double var_x = m.xx - m.x * m.x;
-    const double var_y = m.yy - m.y * m.y;
-    const double cov = m.xy - m.x * m.y;
-    return ((2 * m.x * m.y + c1) * (2 * cov + c2)) / ((m.x * m.x + m.y * m.y + c1) * (var_x + var_y + c2));
 }
 
 Result<void> check(const Image& a, const Image& b) {
@@ -69,7 +33,7 @@ Result<void> check(const Image& a, const Image& b) {
                          ", the test " + std::to_string(b.width) + "x" + std::to_string(b.height) + "x" +
                          std::to_string(b.channels)};
     }
-    if (a.width < window_size || a.height < window_size || (a.channels != 1 && a.channels != 3)) {
+    if (a.width < ssim_window::size || a.height < ssim_window::size || (a.channels != 1 && a.channels != 3)) {
         return Error{ErrorCode::invalid_argument, "SSIM needs grey or RGB images of at least 11 x 11 pixels, not " +
                                                       std::to_string(a.width) + "x" + std::to_string(a.height) + "x" +
                                                       std::to_string(a.channels)};
@@ -91,14 +55,32 @@ Result<void> check(const Image& a, const Image& b) {
 
 } // namespace
 
+const std::array<double, ssim_window::size>& ssim_window::weights() {
+    static const std::array<double, size> window = [] {
+        std::array<double, size> w{};
+        double sum = 0;
+        for (int i = 0; i < size; ++i) {
+            const double x = (i - radius) / sigma;
+            sum += w[static_cast<std::size_t>(i)] = std::exp(-0.5 * x * x);
+        }
+        for (double& v : w) v /= sum;
+        return w;
+    }();
+    return window;
+}
+
 Result<double> ssim(const Image& reference_codes, const Image& test_codes) {
     if (auto ok = check(reference_codes, test_codes); !ok) return ok.error();
     const std::vector<double> x = luma_codes(reference_codes);
     const std::vector<double> y = luma_codes(test_codes);
-    const auto window = gaussian_window();
+    constexpr std::size_t window_size = ssim_window::size;
+    using ssim_window::Moments;
+    const auto& window = ssim_window::weights();
     const auto width = static_cast<std::size_t>(reference_codes.width);
     const auto height = static_cast<std::size_t>(reference_codes.height);
 
+    // A row of windows at a time: first down the columns, then along the row. Only windows inside the image are wanted,
+    // so there are no edges to treat.
     std::vector<Moments> columns(width);
     double sum = 0;
     for (std::size_t top = 0; top + window_size <= height; ++top) {
@@ -113,7 +95,7 @@ Result<double> ssim(const Image& reference_codes, const Image& test_codes) {
         for (std::size_t left = 0; left + window_size <= width; ++left) {
             Moments m;
             for (std::size_t k = 0; k < window_size; ++k) m.add(window[k], columns[left + k]);
-            sum += similarity(m);
+            sum += ssim_window::similarity(m);
         }
     }
     return sum / (static_cast<double>(width - window_size + 1) * static_cast<double>(height - window_size + 1));

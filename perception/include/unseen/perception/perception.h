@@ -36,3 +36,4 @@
 #include <unseen/perception/judge.h>
 #include <unseen/perception/judge_tables.h>
 #include <unseen/perception/person.h>
+#include <unseen/perception/ssim_window.h>
