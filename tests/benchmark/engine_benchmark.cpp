@@ -10,26 +10,18 @@
 #include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
+#include "followed_frames.h"
 
 namespace unseen::bench {
 namespace {
 
 using vdtree::Cut;
 
-// About half of the mesh is active, or 100,000 triangles where it is larger.
-constexpr double most_of_mesh = 0.5, wanted_active = 1e5;
-
 struct Subject {
     Subject(const vdtree::VertexTree& tree_, bool gazes, bool by_errors = false, bool frustum = false)
         : tree(tree_), options(fold_test(gazes)), with_frustum(frustum), criterion(make(by_errors)) {
         if (gazes) return; // as it comes out at threshold 1
-        const double wanted = std::min(wanted_active, most_of_mesh * tree.triangle_count());
-        Cut cut(tree);
-        double low = -20, high = 20; // log2 of the threshold
-        for (int step = 0; step < 20; ++step) {
-            threshold = static_cast<float>(std::exp2((low + high) / 2));
-            (follow(cut, 0).triangles > wanted ? low : high) = std::log2(static_cast<double>(threshold));
-        }
+        threshold = threshold_of_much(tree, [&](Cut& cut, float at) { return follow(cut, 0, at); });
     }
 
     vdtree::AdjustStats follow(Cut& cut, double degrees) const { return follow(cut, degrees, threshold); }
@@ -74,22 +66,7 @@ const vdtree::VertexTree& tree_with_errors() {
 }
 
 void follow_orbit_of(benchmark::State& state, const Subject& s) {
-    Cut cut(s.tree);
-    double degrees = 0, changes = 0, tests = 0, triangles = 0;
-    const double step = static_cast<double>(state.range(0)) / 10;
-    const auto next = [&] {
-        const auto stats = s.follow(cut, degrees += step);
-        benchmark::DoNotOptimize(cut.indices().data());
-        changes += static_cast<double>(stats.folds + stats.unfolds);
-        tests += static_cast<double>(stats.node_tests);
-        triangles = stats.triangles;
-    };
-    for (int warm_up = 0; warm_up < 5; ++warm_up) next();
-    changes = tests = 0;
-    for (auto _ : state) next();
-    state.counters["changes"] = benchmark::Counter(changes, benchmark::Counter::kAvgIterations);
-    state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
-    state.counters["triangles"] = triangles;
+    follow_turns(state, s.tree, 5, [&](Cut& cut, double degrees) { return s.follow(cut, degrees); });
 }
 void follow_orbit(benchmark::State& state, bool gazes, bool large) { follow_orbit_of(state, subject(gazes, large)); }
 BENCHMARK_CAPTURE(follow_orbit, foveal, false, false)
@@ -181,8 +158,7 @@ void budget(benchmark::State& state, bool cold, float hysteresis) {
     const Subject& s = subject(false, false);
     Cut cut(s.tree);
     vdtree::FollowOptions following;
-    following.triangle_budget =
-        static_cast<vdtree::Index>(std::min(wanted_active, most_of_mesh * s.tree.triangle_count()));
+    following.triangle_budget = static_cast<vdtree::Index>(much_of(s.tree));
     following.hysteresis = hysteresis;
     double degrees = 0;
     for (auto _ : state) {

@@ -2,14 +2,13 @@
 // active or half of the mesh where it is smaller.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/cut.h>
 
 #include "bench_mesh.h"
+#include "followed_frames.h"
 #include "turning_light.h"
 
 namespace unseen::bench {
@@ -23,19 +22,14 @@ struct Subject {
     explicit Subject(TurningLight kind_)
         : kind(kind_), bounds(std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree()))),
           criterion(make()) {
-        const double wanted = std::min(1e5, 0.5 * tree().triangle_count());
-        Cut cut(tree());
-        double low = -20, high = 20; // log2 of the threshold
-        for (int step = 0; step < 20; ++step) {
-            threshold = static_cast<float>(std::exp2((low + high) / 2));
-            (follow(cut, 0).triangles > wanted ? low : high) = std::log2(static_cast<double>(threshold));
-        }
+        threshold = threshold_of_much(tree(), [&](Cut& cut, float at) { return follow(cut, 0, at); });
     }
-    vdtree::AdjustStats follow(Cut& cut, double degrees) const {
+    vdtree::AdjustStats follow(Cut& cut, double degrees) const { return follow(cut, degrees, threshold); }
+    vdtree::AdjustStats follow(Cut& cut, double degrees, float at) const {
         vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree(), orbit(0), {}, {}, false);
         viewpoint.lighting = lighting_at(tree(), kind, degrees);
         vdtree::FollowOptions following;
-        following.threshold = threshold;
+        following.threshold = at;
         return *cut.follow(criterion, viewpoint, following);
     }
 
@@ -61,22 +55,7 @@ const Subject& subject(TurningLight kind) {
 
 void moving_light(benchmark::State& state, TurningLight kind) {
     const Subject& s = subject(kind);
-    Cut cut(tree());
-    double degrees = 0, changes = 0, tests = 0, triangles = 0;
-    const double step = static_cast<double>(state.range(0)) / 10;
-    const auto next = [&] {
-        const auto stats = s.follow(cut, degrees += step);
-        benchmark::DoNotOptimize(cut.indices().data());
-        changes += static_cast<double>(stats.folds + stats.unfolds);
-        tests += static_cast<double>(stats.node_tests);
-        triangles = stats.triangles;
-    };
-    for (int warm_up = 0; warm_up < 20; ++warm_up) next();
-    changes = tests = 0;
-    for (auto _ : state) next();
-    state.counters["changes"] = benchmark::Counter(changes, benchmark::Counter::kAvgIterations);
-    state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
-    state.counters["triangles"] = triangles;
+    follow_turns(state, tree(), 20, [&](Cut& cut, double degrees) { return s.follow(cut, degrees); });
 }
 BENCHMARK_CAPTURE(moving_light, directional, TurningLight::directional)
     ->ArgName("tenth_degrees")
