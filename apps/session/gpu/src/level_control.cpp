@@ -5,7 +5,6 @@
 #include <cmath>
 #include <deque>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -22,6 +21,8 @@
 #include <unseen/render/visibility.h>
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/level_pictures.h>
+
+#include "shared_uploads.h"
 
 namespace unseen::session {
 namespace {
@@ -104,13 +105,8 @@ bool same_gaze(const std::optional<Gaze>& a, const std::optional<Gaze>& b) {
 } // namespace
 
 struct LevelControl::Impl {
-    // Of a tree, and of all objects that share it.
-    struct Levels {
-        LevelChain chain;
-        std::vector<render::GpuCut> cuts; // by level
-    };
     struct Thing {
-        Levels* levels = nullptr;
+        const UploadedLevels* levels = nullptr;
         vdtree::Similarity placement;
         WorldSphere sphere;
         int level = 0, drawn_level = -1;
@@ -141,7 +137,7 @@ struct LevelControl::Impl {
 
     Impl(const render::Context& context_, Session& session_, const LevelControlOptions& options_,
          render::StageTimes times_)
-        : context(context_), session(session_), options(options_), times(std::move(times_)) {}
+        : context(context_), session(session_), options(options_), uploads(context_), times(std::move(times_)) {}
 
     Result<void> load(const vdtree::View& view, const Request& request);
     Result<void> need_passes(const vdtree::View& view);
@@ -166,7 +162,7 @@ struct LevelControl::Impl {
     render::Context context;
     Session& session;
     LevelControlOptions options;
-    std::map<const vdtree::VertexTree::Data*, Levels> trees;
+    SharedUploads uploads;
     std::vector<Thing> things;
     std::vector<render::GpuCut> backdrop;
     std::vector<WorldSphere> backdrop_spheres;
@@ -194,49 +190,23 @@ struct LevelControl::Impl {
 
 Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& request) {
     if (auto ready = session.prepare(from, request); !ready) return ready.error();
-    std::map<const vdtree::VertexTree::Data*, render::GpuTree> on_gpu; // objects share them
-    const auto tree_of = [&](const vdtree::VertexTree& tree) -> Result<render::GpuTree> {
-        const auto known = on_gpu.find(&tree.data());
-        if (known != on_gpu.end()) return known->second;
-        auto made = render::GpuTree::create(context, tree);
-        if (made) on_gpu.emplace(&tree.data(), *made);
-        return made;
-    };
     const Scene& scene = session.scene();
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-        const vdtree::VertexTree& tree = session.tree(i);
-        auto levels = trees.find(&tree.data());
-        if (levels == trees.end()) {
-            auto chain = options.method == LevelMethod::given ? selection_chain(session, i)
-                                                              : level_chain(session, from, request, i, options.chain);
-            if (!chain) return chain.error();
-            const auto uploaded = tree_of(tree);
-            if (!uploaded) return uploaded.error();
-            levels = trees.emplace(&tree.data(), Levels{std::move(*chain), {}}).first;
-            for (int level = 0; level < levels->second.chain.size(); ++level) {
-                render::GpuCut& cut = levels->second.cuts.emplace_back(*uploaded);
-                if (auto followed = cut.follow(levels->second.chain.cut(level)); !followed) return followed;
-            }
-        }
+        const auto levels = uploads.levels(session.tree(i), [&] {
+            return options.method == LevelMethod::given ? selection_chain(session, i)
+                                                        : level_chain(session, from, request, i, options.chain);
+        });
+        if (!levels) return levels.error();
         Thing& thing = things.emplace_back();
-        thing.levels = &levels->second;
+        thing.levels = *levels;
         thing.placement = scene.objects[i].placement;
         thing.sphere = world_sphere(scene.objects[i]);
-        thing.level = levels->second.chain.size() - 1;
+        thing.level = thing.levels->chain.size() - 1;
     }
-    std::map<const vdtree::VertexTree::Data*, render::GpuCut> whole;
     for (const Object& part : scene.backdrop) {
-        auto known = whole.find(&part.tree.data());
-        if (known == whole.end()) {
-            const auto tree = tree_of(part.tree);
-            if (!tree) return tree.error();
-            vdtree::Cut all(part.tree);
-            all.unfold_all();
-            render::GpuCut cut(*tree);
-            if (auto followed = cut.follow(all); !followed) return followed;
-            known = whole.emplace(&part.tree.data(), cut).first;
-        }
-        backdrop.push_back(known->second);
+        auto whole = uploads.whole(part.tree);
+        if (!whole) return whole.error();
+        backdrop.push_back(std::move(*whole));
         backdrop_spheres.push_back(world_sphere(part));
     }
     return {};

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
 #include <string>
 #include <utility>
 
@@ -12,6 +11,8 @@
 #include <unseen/render/sample_sum.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
+
+#include "shared_uploads.h"
 
 namespace unseen::session {
 namespace {
@@ -31,17 +32,13 @@ Result<LevelChain> selection_chain(Session& session, std::size_t object) {
 }
 
 struct LevelPictures::Impl {
-    // Of a tree, and of all objects that share it.
-    struct Levels {
-        LevelChain chain;
-        std::vector<render::GpuCut> cuts; // by level
-    };
     struct Drawn {
         std::vector<glm::vec4> pixels;
         std::vector<float> depth;
     };
 
-    Impl(const render::Context& context_, Session& session_) : context(context_), session(session_) {}
+    Impl(const render::Context& context_, Session& session_)
+        : context(context_), session(session_), uploads(context_) {}
 
     Result<void> load();
     Result<void> need_target(const vdtree::View& view);
@@ -54,9 +51,9 @@ struct LevelPictures::Impl {
 
     render::Context context;
     Session& session;
-    std::map<const vdtree::VertexTree::Data*, Levels> trees;
-    std::vector<Levels*> levels;      // by object
-    std::vector<WorldSphere> spheres; // by object
+    SharedUploads uploads;
+    std::vector<const UploadedLevels*> levels; // by object
+    std::vector<WorldSphere> spheres;          // by object
     std::vector<std::vector<std::uint32_t>> triangles;
     std::vector<render::GpuCut> backdrop;
     std::optional<render::Target> target;
@@ -67,40 +64,19 @@ struct LevelPictures::Impl {
 Result<void> LevelPictures::Impl::load() {
     if (auto ready = session.prepare(session.default_view(), {}); !ready) return ready.error();
     const Scene& scene = session.scene();
-    std::map<const vdtree::VertexTree::Data*, render::GpuTree> on_gpu;
-    const auto tree_of = [&](const vdtree::VertexTree& tree) -> Result<render::GpuTree> {
-        const auto known = on_gpu.find(&tree.data());
-        if (known != on_gpu.end()) return known->second;
-        auto made = render::GpuTree::create(context, tree);
-        if (made) on_gpu.emplace(&tree.data(), *made);
-        return made;
-    };
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-        const vdtree::VertexTree& tree = session.tree(i);
-        auto own = trees.find(&tree.data());
-        if (own == trees.end()) {
-            auto chain = selection_chain(session, i);
-            if (!chain) return chain.error();
-            const auto uploaded = tree_of(tree);
-            if (!uploaded) return uploaded.error();
-            own = trees.emplace(&tree.data(), Levels{std::move(*chain), {}}).first;
-            for (int level = 0; level < own->second.chain.size(); ++level) {
-                render::GpuCut& cut = own->second.cuts.emplace_back(*uploaded);
-                if (auto followed = cut.follow(own->second.chain.cut(level)); !followed) return followed;
-            }
-        }
-        levels.push_back(&own->second);
+        const auto own = uploads.levels(session.tree(i), [&] { return selection_chain(session, i); });
+        if (!own) return own.error();
+        const LevelChain& chain = (*own)->chain;
+        levels.push_back(*own);
         spheres.push_back(world_sphere(scene.objects[i]));
         auto& counts = triangles.emplace_back();
-        for (int level = 0; level < own->second.chain.size(); ++level)
-            counts.push_back(own->second.chain.triangles(level));
+        for (int level = 0; level < chain.size(); ++level) counts.push_back(chain.triangles(level));
     }
     for (const Object& part : scene.backdrop) {
-        const auto tree = tree_of(part.tree);
-        if (!tree) return tree.error();
-        vdtree::Cut all(part.tree);
-        all.unfold_all();
-        if (auto followed = backdrop.emplace_back(*tree).follow(all); !followed) return followed;
+        auto whole = uploads.whole(part.tree);
+        if (!whole) return whole.error();
+        backdrop.push_back(std::move(*whole));
     }
     return {};
 }

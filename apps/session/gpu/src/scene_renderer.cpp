@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <chrono>
-#include <unordered_map>
+
+#include "shared_uploads.h"
 
 namespace unseen::session {
 
@@ -32,34 +33,16 @@ struct SceneRenderer::Impl {
 };
 
 Result<void> SceneRenderer::Impl::load() {
-    std::unordered_map<const vdtree::VertexTree::Data*, render::GpuTree> trees;
-    const auto tree_of = [&](const Object& object) -> Result<render::GpuTree> {
-        const auto known = trees.find(&object.tree.data());
-        if (known != trees.end()) return known->second;
-        auto made = render::GpuTree::create(context, object.tree);
-        if (made) trees.emplace(&object.tree.data(), *made);
-        return made;
-    };
+    SharedUploads uploads(context);
     for (const Object& object : session.scene().objects) {
-        const auto tree = tree_of(object);
+        const auto tree = uploads.tree(object.tree);
         if (!tree) return tree.error();
         objects.emplace_back(*tree);
     }
-    std::unordered_map<const vdtree::VertexTree::Data*, render::GpuCut> whole; // parts with one tree share it
     for (const Object& part : session.scene().backdrop) {
-        const auto known = whole.find(&part.tree.data());
-        if (known != whole.end()) {
-            backdrop.push_back(known->second);
-            continue;
-        }
-        const auto tree = tree_of(part);
-        if (!tree) return tree.error();
-        vdtree::Cut all(part.tree);
-        all.unfold_all();
-        render::GpuCut cut(*tree);
-        if (const auto followed = cut.follow(all); !followed) return followed;
-        whole.emplace(&part.tree.data(), cut);
-        backdrop.push_back(std::move(cut));
+        auto whole = uploads.whole(part.tree);
+        if (!whole) return whole.error();
+        backdrop.push_back(std::move(*whole));
     }
     return {};
 }
