@@ -149,7 +149,7 @@ SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_
 Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
                                          int attachment, Use use) {
     const vdtree::View& view = camera.view;
-    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
     if (view.width != target.width || view.height != target.height)
         return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                                 " pixels, and the target has " + std::to_string(target.width) + "x" +
