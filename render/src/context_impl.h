@@ -26,6 +26,7 @@ public:
 // GLX (under GLFW) and EGL refuse to take over a thread from each other: each lets go before the other makes current.
 void release_egl_thread();
 void release_glfw_thread();
+void release_glx_thread(); // of whoever it is
 
 // What is current on this thread, by EGL or GLX; null: none. Only to compare with.
 void* current_native_context();

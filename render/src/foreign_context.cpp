@@ -13,17 +13,20 @@
 namespace unseen::render {
 namespace {
 
-// GLX is asked only where somebody has loaded it: nothing here needs it.
+// A function of GLX, which is asked only where somebody has loaded it: nothing here needs it. It may be loaded later.
+template <class Function>
+Function glx_function(const char* name) {
+    for (const char* library : {"libGLX.so.0", "libGL.so.1"})
+        if (void* const loaded = dlopen(library, RTLD_LAZY | RTLD_NOLOAD))
+            if (void* const found = dlsym(loaded, name)) return reinterpret_cast<Function>(found);
+    return nullptr;
+}
+
 void* current_glx_context() {
     using GetCurrent = void* (*)();
-    static std::atomic<GetCurrent> known = nullptr; // it may be loaded later
-    GetCurrent get = known;
-    for (const char* library : {"libGLX.so.0", "libGL.so.1"}) {
-        if (get) break;
-        if (void* const loaded = dlopen(library, RTLD_LAZY | RTLD_NOLOAD))
-            get = reinterpret_cast<GetCurrent>(dlsym(loaded, "glXGetCurrentContext"));
-    }
-    known = get;
+    static std::atomic<GetCurrent> known = nullptr;
+    if (!known) known = glx_function<GetCurrent>("glXGetCurrentContext");
+    const GetCurrent get = known;
     return get ? get() : nullptr;
 }
 
@@ -53,6 +56,13 @@ private:
 };
 
 } // namespace
+
+void release_glx_thread() {
+    if (!current_glx_context()) return;
+    const auto get_display = glx_function<void* (*)()>("glXGetCurrentDisplay");
+    const auto make_current = glx_function<int (*)(void*, unsigned long, void*)>("glXMakeCurrent");
+    if (get_display && make_current) make_current(get_display(), 0, nullptr);
+}
 
 void* current_native_context() {
     // By EGL, of desktop OpenGL; what is current for OpenGL ES is kept apart.
