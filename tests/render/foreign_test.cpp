@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -195,40 +196,41 @@ struct ClientState {
             glGetDoublev(name, values);
             all.insert(all.end(), values, values + 4);
         };
-        for (const GLenum name : {GL_CURRENT_PROGRAM,
-                                  GL_VERTEX_ARRAY_BINDING,
-                                  GL_DRAW_FRAMEBUFFER_BINDING,
-                                  GL_READ_FRAMEBUFFER_BINDING,
-                                  GL_PIXEL_UNPACK_BUFFER_BINDING,
-                                  GL_PIXEL_PACK_BUFFER_BINDING,
-                                  GL_SHADER_STORAGE_BUFFER_BINDING,
-                                  GL_VIEWPORT,
-                                  GL_SCISSOR_BOX,
-                                  GL_DEPTH_RANGE,
-                                  GL_SCISSOR_TEST,
-                                  GL_DITHER,
-                                  GL_STENCIL_TEST,
-                                  GL_DEPTH_TEST,
-                                  GL_CULL_FACE,
-                                  GL_CULL_FACE_MODE,
-                                  GL_FRONT_FACE,
-                                  GL_DEPTH_WRITEMASK,
-                                  GL_DEPTH_FUNC,
-                                  GL_CLIP_ORIGIN,
-                                  GL_CLIP_DEPTH_MODE,
-                                  GL_UNPACK_ALIGNMENT,
-                                  GL_PACK_ROW_LENGTH,
-                                  GL_MULTISAMPLE,
-                                  GL_FRAMEBUFFER_SRGB,
-                                  GL_ACTIVE_TEXTURE})
+        for (const GLenum name : std::initializer_list<GLenum>{GL_CURRENT_PROGRAM,
+                                                               GL_VERTEX_ARRAY_BINDING,
+                                                               GL_DRAW_FRAMEBUFFER_BINDING,
+                                                               GL_READ_FRAMEBUFFER_BINDING,
+                                                               GL_PIXEL_UNPACK_BUFFER_BINDING,
+                                                               GL_PIXEL_PACK_BUFFER_BINDING,
+                                                               GL_SHADER_STORAGE_BUFFER_BINDING,
+                                                               GL_VIEWPORT,
+                                                               GL_SCISSOR_BOX,
+                                                               GL_DEPTH_RANGE,
+                                                               GL_SCISSOR_TEST,
+                                                               GL_DITHER,
+                                                               GL_STENCIL_TEST,
+                                                               GL_DEPTH_TEST,
+                                                               GL_CULL_FACE,
+                                                               GL_CULL_FACE_MODE,
+                                                               GL_FRONT_FACE,
+                                                               GL_DEPTH_WRITEMASK,
+                                                               GL_DEPTH_FUNC,
+                                                               GL_CLIP_ORIGIN,
+                                                               GL_CLIP_DEPTH_MODE,
+                                                               GL_UNPACK_ALIGNMENT,
+                                                               GL_PACK_ROW_LENGTH,
+                                                               GL_MULTISAMPLE,
+                                                               GL_FRAMEBUFFER_SRGB,
+                                                               GL_ACTIVE_TEXTURE})
             add(name);
         GLint modes[2] = {};
         glGetIntegerv(GL_POLYGON_MODE, modes);
         all.push_back(modes[0]);
         for (GLuint i = 0; i < 4; ++i) {
-            for (const GLenum name : {GL_BLEND_SRC_RGB, GL_BLEND_DST_RGB, GL_BLEND_SRC_ALPHA, GL_BLEND_DST_ALPHA,
-                                      GL_BLEND_EQUATION_RGB, GL_TEXTURE_BINDING_2D, GL_TEXTURE_BINDING_CUBE_MAP,
-                                      GL_SAMPLER_BINDING, GL_SHADER_STORAGE_BUFFER_BINDING}) {
+            for (const GLenum name : std::initializer_list<GLenum>{
+                     GL_BLEND_SRC_RGB, GL_BLEND_DST_RGB, GL_BLEND_SRC_ALPHA, GL_BLEND_DST_ALPHA, GL_BLEND_EQUATION_RGB,
+                     GL_TEXTURE_BINDING_2D, GL_TEXTURE_BINDING_CUBE_MAP, GL_SAMPLER_BINDING,
+                     GL_SHADER_STORAGE_BUFFER_BINDING}) {
                 GLint value = 0;
                 glGetIntegeri_v(name, i, &value);
                 all.push_back(value);
