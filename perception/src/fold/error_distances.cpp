@@ -788,8 +788,8 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
     const Bands bands(screen.highest_cpd, options.model, csf.samples().summation);
     std::map<int, Eye> eyes; // by luminance
     // Strips that are lit by `own`, whatever the angle: all that is below the illuminance occurs.
-    std::vector<double> widest;
-    double narrowest = std::numeric_limits<double>::infinity();
+    std::vector<double> widest_strips;
+    double least = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= illuminance_octaves * illuminances_per_octave; ++i) {
         const double own = illuminance_at(i), before = i > 0 ? illuminance_at(i - 1) : 0;
         const double mean = levels.in_cdm2(ambient + own / 2);
@@ -806,10 +806,10 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
             contrast == no_contrast ? 0 : eye->second.strip_distance(Levels::contrast(contrast), Course::one_way);
         // Between the last one's light and this one's, the widest is no less than this. Below the first, taken as there.
         const double from = i > 0 ? before : own;
-        if (needed_widths > 0) narrowest = std::min(narrowest, from / needed_widths);
-        widest.push_back(narrowest);
+        if (needed_widths > 0) least = std::min(least, from / needed_widths);
+        widest_strips.push_back(least);
     }
-    return ShadowEdges(std::move(widest));
+    return ShadowEdges(std::move(widest_strips));
 }
 
 double ShadowEdges::widest_unseen(double illuminance) const {
