@@ -1,26 +1,71 @@
-# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ...)
+# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ... [PACKAGES ...])
 #
-# One module of the house: a static library `unseen_<name>`, alias and export name `unseen::<name>`, whose public headers lie in
-# include/unseen/<name> and are installed alike. DEPENDS is what its headers need, PRIVATE_DEPENDS what
-# only its sources need.
+# One module of the house: a library `unseen_<name>`, static or by BUILD_SHARED_LIBS shared, alias and export name
+# `unseen::<name>`, whose public headers lie in include/unseen/<name> and are installed alike. DEPENDS is what its headers
+# need, PRIVATE_DEPENDS what only its sources need. PACKAGES: the latter as pkg-config names them.
 function(unseen_add_library name)
-    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS;PACKAGES" ${ARGN})
     set(target unseen_${name})
-    add_library(${target} STATIC ${arg_SOURCES})
+    add_library(${target} ${arg_SOURCES})
     add_library(unseen::${name} ALIAS ${target})
     target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${arg_HEADERS})
     target_include_directories(${target} PRIVATE src)
     target_compile_features(${target} PUBLIC cxx_std_20)
     target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS})
-    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+    # Before 1.0 a minor version may change the ABI.
+    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
+        SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN"
+        LINK_DEPENDS ${UNSEEN_EXPORTS_SCRIPT})
+    # What shared libraries show of themselves. Of static ones the options say nothing.
+    target_link_options(${target} PRIVATE "LINKER:--version-script=${UNSEEN_EXPORTS_SCRIPT}")
     unseen_set_compile_options(${target})
     if(UNSEEN_INSTALL)
         install(TARGETS ${target} EXPORT unseen_${name}_targets
             ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
+            LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
             FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${name})
         install(EXPORT unseen_${name}_targets NAMESPACE unseen:: FILE unseen_${name}_targets.cmake
             DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen COMPONENT ${name})
+        unseen_install_pkg_config(${name} DEPENDS ${arg_DEPENDS} PACKAGES ${arg_PACKAGES})
     endif()
+endfunction()
+
+set(UNSEEN_EXPORTS_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/exports.map)
+set(UNSEEN_PKG_CONFIG_FILE ${CMAKE_CURRENT_LIST_DIR}/unseen.pc.in)
+
+# unseen-<name>.pc, with - for _. Where libraries are static, a client links what is inside, too, without asking for it.
+function(unseen_install_pkg_config name)
+    cmake_parse_arguments(arg "" "" "DEPENDS;PACKAGES" ${ARGN})
+    set(needed)
+    foreach(depends IN LISTS arg_DEPENDS)
+        string(REGEX REPLACE "^glm::glm$" "glm" depends ${depends})
+        string(REGEX REPLACE "^unseen::" "unseen-" depends ${depends})
+        string(REPLACE "_" "-" depends ${depends})
+        list(APPEND needed ${depends})
+    endforeach()
+    set(inside ${arg_PACKAGES})
+    if(NOT BUILD_SHARED_LIBS)
+        list(APPEND needed ${inside})
+        set(inside)
+    endif()
+    list(JOIN needed ", " PC_REQUIRES)
+    list(JOIN inside ", " PC_REQUIRES_PRIVATE)
+    string(REPLACE "_" "-" package ${name})
+    set(PC_NAME ${name})
+    # Folders may be absolute, as distributions set them.
+    foreach(folder IN ITEMS LIBDIR INCLUDEDIR)
+        set(PC_${folder} "\${prefix}/${CMAKE_INSTALL_${folder}}")
+        if(IS_ABSOLUTE "${CMAKE_INSTALL_${folder}}")
+            set(PC_${folder} "${CMAKE_INSTALL_${folder}}")
+        endif()
+    endforeach()
+    # The prefix counts from the file, so that an installed folder may be moved.
+    set(place /${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+    cmake_path(RELATIVE_PATH place BASE_DIRECTORY / OUTPUT_VARIABLE below)
+    string(REGEX REPLACE "[^/]+" ".." PC_UP "${below}")
+    configure_file(${UNSEEN_PKG_CONFIG_FILE} ${PROJECT_BINARY_DIR}/unseen-${package}.pc @ONLY)
+    install(FILES ${PROJECT_BINARY_DIR}/unseen-${package}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+        COMPONENT ${name})
 endfunction()
 
 function(unseen_set_compile_options target)

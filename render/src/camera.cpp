@@ -20,13 +20,13 @@ constexpr double near_margin = 0.5;
 // What stands for the radius of a ball of no size (coincident vertices), units of the frame.
 constexpr double point_radius = 1e-6;
 
-double near_plane(glm::dvec3 centre_in_view, double radius, double tan_x, double tan_y) {
+double near_plane(glm::dvec3 centre_in_view, double radius, glm::dvec2 corner) {
     const double distance = glm::length(centre_in_view);
     const double nearest = distance - radius;
     const double floor = least_near * std::max(radius, point_radius);
     if (!(nearest > 0)) return floor;
     // A point that far away in the corner of the picture has the least depth.
-    const double corner_cosine = 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y);
+    const double corner_cosine = 1 / std::sqrt(1 + glm::dot(corner, corner));
     const double depth = std::max(-centre_in_view.z - radius, nearest * corner_cosine);
     return std::max(near_margin * depth, floor);
 }
@@ -63,13 +63,14 @@ Projection projection_of(const vdtree::View& view, const vdtree::Similarity& pla
     glm::dmat4 view_from_unit(rotation);
     view_from_unit[3] = glm::dvec4(centre_in_view, 1);
 
-    const double tan_y = std::tan(glm::radians(view.fov_y_degrees) / 2);
-    const double tan_x = tan_y * view.width / view.height;
+    const vdtree::WindowPlane window = vdtree::window_plane(view);
     glm::dmat4 clip_from_view(0);
-    clip_from_view[0][0] = 1 / tan_x;
-    clip_from_view[1][1] = 1 / tan_y;
+    clip_from_view[0][0] = 1 / window.half.x;
+    clip_from_view[1][1] = 1 / window.half.y;
+    clip_from_view[2][0] = view.shift.x;
+    clip_from_view[2][1] = view.shift.y;
     clip_from_view[2][3] = -1;
-    clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, tan_x, tan_y);
+    clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, glm::abs(window.middle) + window.half);
 
     Projection projection;
     projection.clip_from_unit = clip_from_view * view_from_unit;

@@ -3,6 +3,7 @@
 
 #include "context_impl.h"
 #include "gl.h"
+#include "gl_object.h"
 
 namespace unseen::render {
 namespace {
@@ -23,32 +24,56 @@ Result<void> check_version(const std::string& version) {
 } // namespace
 
 Context::Impl::~Impl() {
-    if (platform) static_cast<void>(platform->make_current());
+    if (platform) let_objects_go(platform->make_current().has_value());
 }
 
 Result<Context> Context::headless() {
     auto platform = make_egl_platform();
     if (!platform) return platform.error();
-    return adopt(std::move(*platform));
+    return take(std::move(*platform));
 }
 
 Result<Context> Context::window(const WindowOptions& options) {
     auto platform = make_glfw_platform(options);
     if (!platform) return platform.error();
-    return adopt(std::move(*platform));
+    return take(std::move(*platform));
 }
 
-Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
+Result<Context> Context::take(std::unique_ptr<Platform> platform) {
     auto impl = std::make_shared<Impl>();
     impl->platform = std::move(platform);
     impl->version = gl_text(GL_VERSION);
     impl->renderer_name = gl_text(GL_RENDERER);
     if (auto enough = check_version(impl->version); !enough) return enough.error();
-    impl->errors.attach();
+    // Debug output of others stays theirs.
+    if (!impl->platform->is_foreign()) impl->errors.attach();
     return Context(std::move(impl));
 }
 
-Result<void> Context::make_current() const { return impl_->platform->make_current(); }
+Result<Context> Context::adopt(const AdoptOptions& options) {
+    auto platform = make_foreign_platform(options);
+    if (!platform) return platform.error();
+    if (auto alive = check_alive(); !alive) return alive.error();
+    return take(std::move(*platform));
+}
+
+// What goes next may be deleted in this context, or else lives in one that is out of reach.
+Result<void> Context::make_current() const {
+    Result<void> current = impl_->platform->make_current();
+    let_objects_go(current.has_value());
+    return current;
+}
+
+Result<void> check_alive() {
+    switch (glGetGraphicsResetStatus()) {
+    case GL_NO_ERROR: return {};
+    case GL_GUILTY_CONTEXT_RESET:
+        return Error{ErrorCode::unsupported, "The OpenGL context was lost by a call made in it; make another one."};
+    default:
+        return Error{ErrorCode::unsupported,
+                     "The OpenGL context was lost when the driver was reset; make another one."};
+    }
+}
 
 Result<void> Context::finish() const {
     return in_context(*this, "Waiting for the GPU", []() -> Result<void> {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <unseen/render/context.h>
 
 #include "error_log.h"
+#include "kept_state.h"
 #include "programs.h"
 
 namespace unseen::render {
@@ -17,13 +19,20 @@ public:
     virtual ~Platform() = default;
     virtual Result<void> make_current() = 0; // does nothing where it already is
     virtual GLFWwindow* window() const noexcept { return nullptr; }
+    // Somebody else's, whose state is to stay as it is.
+    virtual bool is_foreign() const noexcept { return false; }
 };
 
 // GLX (under GLFW) and EGL refuse to take over a thread from each other: each lets go before the other makes current.
 void release_egl_thread();
 void release_glfw_thread();
+void release_glx_thread(); // of whoever it is
+
+// What is current on this thread, by EGL or GLX; null: none. Only to compare with.
+void* current_native_context();
 
 Result<std::unique_ptr<Platform>> make_egl_platform();
+Result<std::unique_ptr<Platform>> make_foreign_platform(const AdoptOptions& options);
 Result<std::unique_ptr<Platform>> make_glfw_platform(const WindowOptions& options);
 
 struct Context::Impl {
@@ -39,11 +48,19 @@ struct Context::Impl {
     ~Impl(); // current, for the programs, which go next
 };
 
+// Whether the current context has not been lost, as by a driver that was reset.
+Result<void> check_alive();
+
 // Does GL work that returns a Result<void>. The error is the work's own, or else what GL reported: "`what` failed in
 // OpenGL: ...".
 template <class Work>
 Result<void> in_context(const Context& context, const char* what, Work&& work) {
     if (auto current = context.make_current(); !current) return current;
+    std::optional<KeptState> kept;
+    if (context.impl().platform->is_foreign()) {
+        if (auto alive = check_alive(); !alive) return alive;
+        kept.emplace();
+    }
     ErrorLog& log = context.impl().errors;
     log.begin();
     Result<void> done = work();

@@ -1,4 +1,5 @@
 // Each draw of depth is reduced to cells, of which the extremes of all draws are kept.
+#include <initializer_list>
 #include <unseen/render/depth_cells.h>
 
 #include <algorithm>
@@ -96,7 +97,8 @@ void DepthCellReader::Impl::reduce(const DrawnDepth& drawn) {
 
 void DepthCellReader::Impl::read() {
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS}) glPixelStorei(zero, 0);
+    for (const GLenum zero : std::initializer_list<GLenum>{GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, cells.id());
     glReadBuffer(GL_COLOR_ATTACHMENT0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, staging.id());

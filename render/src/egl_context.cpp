@@ -166,6 +166,7 @@ Result<void> EglPlatform::make_current() {
     eglBindAPI(EGL_OPENGL_API); // current contexts are kept by thread and by API
     if (eglGetCurrentContext() == context_) return {};
     release_glfw_thread();
+    release_glx_thread();
     if (!eglMakeCurrent(display_, surface_, surface_, context_))
         return unsupported(failed("making the OpenGL context current on this thread"));
     return {};

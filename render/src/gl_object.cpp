@@ -5,6 +5,12 @@
 
 namespace unseen::render {
 
+namespace {
+thread_local bool are_objects_current = true;
+}
+
+void let_objects_go(bool are_in_current_context) noexcept { are_objects_current = are_in_current_context; }
+
 struct BufferTraits {
     static constexpr GLenum kind = GL_BUFFER;
     static void create(GLuint* id) { glCreateBuffers(1, id); }
@@ -69,7 +75,7 @@ GlObject<Traits> GlObject<Traits>::create(std::string_view label) {
 
 template <class Traits>
 GlObject<Traits>::~GlObject() {
-    if (id_ != 0) Traits::destroy(id_);
+    if (id_ != 0 && are_objects_current) Traits::destroy(id_);
 }
 
 template class GlObject<BufferTraits>;

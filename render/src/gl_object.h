@@ -20,6 +20,10 @@ struct FramebufferTraits;
 struct ProgramTraits;
 struct SamplerTraits;
 
+// Whether objects that go on this thread are deleted: told whenever a context was to be made current. Where that failed
+// the names would be those of another context.
+void let_objects_go(bool are_in_current_context) noexcept;
+
 template <class Traits>
 class GlObject {
 public:

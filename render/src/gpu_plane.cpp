@@ -1,6 +1,7 @@
 #include "gpu_plane.h"
 
 #include <algorithm>
+#include <initializer_list>
 
 #include <unseen/vdtree/internal/errors.h>
 
@@ -40,9 +41,9 @@ Result<GpuPlanes> GpuPlanes::create(glm::ivec2 pixels, int count, PlaneFormat fo
 PlanePasses::PlanePasses() : no_arrays_(VertexArray::create("full screen")), nearest_(Sampler::create("nearest")) {
     glSamplerParameteri(nearest_.id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST); // none of the levels that a texture lacks
     glSamplerParameteri(nearest_.id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    for (const GLenum off :
-         {GL_DEPTH_TEST, GL_STENCIL_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_DITHER, GL_RASTERIZER_DISCARD,
-          GL_COLOR_LOGIC_OP, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_PRIMITIVE_RESTART, GL_FRAMEBUFFER_SRGB})
+    for (const GLenum off : std::initializer_list<GLenum>{
+             GL_DEPTH_TEST, GL_STENCIL_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_DITHER, GL_RASTERIZER_DISCARD,
+             GL_COLOR_LOGIC_OP, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_PRIMITIVE_RESTART, GL_FRAMEBUFFER_SRGB})
         glDisable(off);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);

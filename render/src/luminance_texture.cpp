@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
@@ -47,9 +48,11 @@ Result<void> check_texture(const LuminanceTexture& t) {
 }
 
 void reset_pixel_stores() {
-    for (const GLenum four : {GL_PACK_ALIGNMENT, GL_UNPACK_ALIGNMENT}) glPixelStorei(four, 4);
-    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_UNPACK_ROW_LENGTH,
-                              GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+    for (const GLenum four : std::initializer_list<GLenum>{GL_PACK_ALIGNMENT, GL_UNPACK_ALIGNMENT})
+        glPixelStorei(four, 4);
+    for (const GLenum zero :
+         std::initializer_list<GLenum>{GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_UNPACK_ROW_LENGTH,
+                                       GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
         glPixelStorei(zero, 0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);

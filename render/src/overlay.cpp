@@ -1,4 +1,5 @@
 // A texture of the image, and a pass over the pixels that it covers.
+#include <initializer_list>
 #include <unseen/render/overlay.h>
 
 #include <algorithm>
@@ -82,7 +83,9 @@ Result<void> Overlay::Impl::take(const OverlayImage& image) {
     }
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    for (const GLenum zero : {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS}) glPixelStorei(zero, 0);
+    for (const GLenum zero :
+         std::initializer_list<GLenum>{GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
     glTextureSubImage2D(texture.id(), 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.pixels.data());
     return {};
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <numbers>
 #include <string>
@@ -148,9 +149,9 @@ Result<void> Shadows::Impl::reserve(std::size_t wanted) {
     }
     const GLfloat nothing[] = {0, 0, 0, 0}; // infinitely far
     glTextureParameterfv(maps.id(), GL_TEXTURE_BORDER_COLOR, nothing);
-    for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    for (const GLenum wrap : std::initializer_list<GLenum>{GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
         glTextureParameteri(maps.id(), wrap, GL_CLAMP_TO_BORDER);
-    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    for (const GLenum filter : std::initializer_list<GLenum>{GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
         glTextureParameteri(maps.id(), filter, GL_NEAREST);
     framebuffer = FramebufferObject::create("shadow maps");
     glNamedFramebufferDrawBuffer(framebuffer.id(), GL_NONE);
@@ -219,8 +220,9 @@ void Shadows::Impl::draw(const Program& program) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glDepthMask(GL_TRUE);
-    for (const GLenum off : {GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_RASTERIZER_DISCARD, GL_DEPTH_CLAMP,
-                             GL_POLYGON_OFFSET_FILL, GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND})
+    for (const GLenum off :
+         std::initializer_list<GLenum>{GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_RASTERIZER_DISCARD, GL_DEPTH_CLAMP,
+                                       GL_POLYGON_OFFSET_FILL, GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND})
         glDisable(off);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); // depth is reversed

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <string>
 
@@ -117,9 +118,10 @@ void set_fixed_state(const Target::Impl& target) {
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glDepthMask(GL_TRUE);
-    for (GLenum off : {GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD, GL_COLOR_LOGIC_OP,
-                       GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK,
-                       GL_PRIMITIVE_RESTART, GL_FRAMEBUFFER_SRGB})
+    for (GLenum off : std::initializer_list<GLenum>{GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD,
+                                                    GL_COLOR_LOGIC_OP, GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL,
+                                                    GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_PRIMITIVE_RESTART,
+                                                    GL_FRAMEBUFFER_SRGB})
         glDisable(off);
     glEnable(GL_MULTISAMPLE);
 }
@@ -149,7 +151,7 @@ SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_
 Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
                                          int attachment, Use use) {
     const vdtree::View& view = camera.view;
-    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
     if (view.width != target.width || view.height != target.height)
         return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                                 " pixels, and the target has " + std::to_string(target.width) + "x" +

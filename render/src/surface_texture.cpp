@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -63,7 +64,9 @@ Level halved(int width, int height, Pixel&& pixel) {
 void set_unpacking() {
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    for (const GLenum zero : {GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS}) glPixelStorei(zero, 0);
+    for (const GLenum zero :
+         std::initializer_list<GLenum>{GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
 }
 
 void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels) {
@@ -115,7 +118,7 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
     glNamedBufferStorage(made.uvs_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(uvs.size_bytes(), 1)),
                          uvs.data(), 0);
     made.image_ = Texture2d::create("texture");
-    const int levels = std::bit_width(std::max(texture.width, texture.height));
+    const auto levels = static_cast<GLsizei>(std::bit_width(std::max(texture.width, texture.height)));
     // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent,
     // and coarse levels would be rounded to codes.
     glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width),

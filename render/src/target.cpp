@@ -2,6 +2,7 @@
 #include "target_impl.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <string>
 
 #include <unseen/vdtree/internal/errors.h>
@@ -61,7 +62,8 @@ bool encodes_srgb(unsigned framebuffer) {
 // GL keeps pixels in the order of its own rows.
 void read(const Target::Impl& from, GLenum format, std::size_t channels, std::span<float> values) {
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS}) glPixelStorei(zero, 0);
+    for (const GLenum zero : std::initializer_list<GLenum>{GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, from.id);
     glReadPixels(0, 0, from.width, from.height, format, GL_FLOAT, values.data());

@@ -1,4 +1,5 @@
 // Checks what is asked for, and hands it to the shader.
+#include <initializer_list>
 #include <unseen/render/test_pattern.h>
 
 #include <array>
@@ -117,8 +118,8 @@ void TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int height, 
 
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
-    for (const GLenum off :
-         {GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER})
+    for (const GLenum off : std::initializer_list<GLenum>{GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST,
+                                                          GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER})
         glDisable(off);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);

@@ -421,5 +421,34 @@ TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
     }
 }
 
+// The part of a window is the same view off centre: a gaze at the same place has the same direction. And an orthographic
+// view has none.
+TEST(ViewpointOf, TakesGazesOffCentreAndNoneInParallel) {
+    const vdtree::VertexTree tree = *vdtree::build_tree(shapes::bumpy_sphere(2).view());
+    FoldTestOptions options;
+    vdtree::View whole{.eye = {0.3, 0.2, 3}, .width = 1000, .height = 800};
+    whole.fov_y_degrees = physical_field(options.display, whole.height).value();
+    vdtree::View part = whole;
+    part.width = 300, part.height = 200; // from (600, 100) on
+    part.fov_y_degrees = physical_field(options.display, part.height).value();
+    part.shift = {(600 + 150 - 500) / 150.0, -(100 + 100 - 400) / 100.0};
+    options.gaze_px = glm::dvec2(700, 150);
+    const auto in_whole = viewpoint_of(tree, whole, options);
+    options.gaze_px = glm::dvec2(100, 50);
+    const auto in_part = viewpoint_of(tree, part, options);
+    ASSERT_TRUE(in_whole.gaze && in_part.gaze);
+    EXPECT_NEAR(glm::length(*in_whole.gaze - *in_part.gaze), 0, 1e-12);
+
+    vdtree::View parallel{.eye = {0.3, 0.2, 3}, .orthographic_height = 3};
+    const auto refused = luebke_hallen_distances(tree, parallel, options);
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("orthographic"), std::string::npos);
+    options.gaze_px = {};
+    const auto criterion = luebke_hallen_distances(tree, parallel, options);
+    ASSERT_TRUE(criterion) << criterion.error().message;
+    vdtree::Cut cut(tree);
+    EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, parallel, options)));
+}
+
 } // namespace
 } // namespace unseen::perception

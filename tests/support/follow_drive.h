@@ -191,6 +191,7 @@ private:
         default: viewpoint_.eye += radius * std::pow(10.0, in_.between(-4, 0)) * in_.direction(); break;
         }
         if (glm::length(viewpoint_.eye) > 9e17) viewpoint_.eye = glm::dvec3(0);
+        if (in_.one_in(12)) viewpoint_.eye_spread = in_.one_in(2) ? 0 : radius * std::pow(10.0, in_.between(-4, 1));
         if (in_.below(4) == 0) viewpoint_.gaze = in_.direction();
         if (in_.one_in(8)) viewpoint_.gaze = {};
         if (in_.below(6) == 0) {
@@ -217,7 +218,8 @@ private:
         // An occluder that the eye is in, or one at all with other spheres, is no good viewpoint.
         if (criterion_->parts().spheres != DistanceCriterion::Spheres::ring) viewpoint_.occluders.clear();
         std::erase_if(viewpoint_.occluders, [&](const Sphere& s) {
-            return !(glm::distance(glm::dvec3(s.centre), viewpoint_.eye) > static_cast<double>(s.radius));
+            return !(glm::distance(glm::dvec3(s.centre), viewpoint_.eye) >
+                     static_cast<double>(s.radius) + viewpoint_.eye_spread);
         });
         return viewpoint_;
     }

@@ -16,6 +16,7 @@
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/footprint.h>
 
 #include "shapes.h"
 #include "sound.h"
@@ -624,6 +625,155 @@ TEST(Frustum, FoldsWhatIsBehindTheEye) {
     cut.unfold_all();
     EXPECT_EQ(cut.adjust(everything, {.visibility = frustum}).triangles, 0u);
     EXPECT_GT(cut.adjust(everything).triangles, 0u);
+}
+
+// ---- windows off centre, orthographic views, pairs
+
+// Whether the sphere shows in the window, from the definition: sides by the half space, conservatively.
+bool may_show(const View& view, glm::dvec3 point) {
+    const CameraFrame frame = camera_frame(view);
+    const glm::dvec3 from = point - view.eye;
+    if (view.orthographic_height)
+        return std::abs(glm::dot(from, frame.up)) < 0.5 * *view.orthographic_height &&
+               std::abs(glm::dot(from, frame.right)) < 0.5 * *view.orthographic_height * view.width / view.height;
+    const Footprint at = Projector(view)(point);
+    return at.nearest > 0 && at.left > 0 && at.top > 0 && at.right < view.width && at.bottom < view.height;
+}
+
+View shifted(View view, std::mt19937_64& random) {
+    view.shift = {random_between(random, -3, 3), random_between(random, -3, 3)};
+    return view;
+}
+View parallel(View view, std::mt19937_64& random, double height) {
+    view.orthographic_height = height * std::pow(10.0, random_between(random, -2, 1));
+    return view;
+}
+
+TEST(FrustumOf, HoldsAllThatShowsOffCentreAndInParallel) {
+    std::mt19937_64 random(21);
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    const double radius = tree.bounding_sphere().radius;
+    int shown = 0, hidden = 0;
+    for (int i = 0; i < 300; ++i) {
+        const View centred = random_view(random, tree);
+        const View view = i % 2 == 0 ? shifted(centred, random) : parallel(centred, random, radius);
+        const Frustum frustum = frustum_of(tree, view);
+        for (int k = 0; k < 40; ++k) {
+            const glm::dvec3 point = tree.origin() + glm::dvec3(tree.positions()[random() % tree.node_count()]);
+            double lowest = 1e300;
+            for (const Plane& plane : frustum.planes)
+                lowest = std::min(lowest, glm::dot(plane.normal, point - tree.origin()) + plane.offset);
+            if (may_show(view, point)) {
+                EXPECT_GT(lowest, -1e-9);
+                ++shown;
+            } else {
+                // Orthographic sides are farther out by a share of the eye's distance, for rounding.
+                hidden += lowest < 0;
+                const double out = view.orthographic_height ? 2.1e-3 * *view.orthographic_height + 1e-5 * radius : 1e-9;
+                EXPECT_LT(lowest, out);
+            }
+        }
+    }
+    EXPECT_GT(shown, 300);
+    EXPECT_GT(hidden, 300);
+}
+
+// In an orthographic view a ball of radius r is 2 r px high, wherever it is: nothing folds that is larger than the
+// tolerance, and of what is a few per cent smaller nothing stays, where the window shows all of the tree.
+TEST(Orthographic, FoldsBySizesThatDoNotFallWithTheDistance) {
+    std::mt19937_64 random(22);
+    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.05));
+    const double radius = tree.bounding_sphere().radius;
+    for (int i = 0; i < 60; ++i) {
+        View view = random_view(random, tree);
+        view.width = view.height = 1000;
+        view.orthographic_height = (i % 3 == 0 ? 2.2 : std::pow(10.0, random_between(random, -1, 1))) * radius;
+        const double pixels_a_unit = view.height / *view.orthographic_height;
+        const double tolerance = std::pow(10.0, random_between(random, 0, 2));
+        for (const bool by_extent : {true, false}) {
+            const auto criterion =
+                by_extent ? extent_criterion(tree, view, tolerance) : displacement_criterion(tree, view, tolerance);
+            ASSERT_TRUE(criterion);
+            const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false));
+            ASSERT_TRUE(bits) << bits.error().message;
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                const double length = by_extent ? 2.0 * static_cast<double>(tree.support_spheres()[node].radius)
+                                                : static_cast<double>(tree.displacement()[node]);
+                const bool unfolded = (*bits)[node / 64] >> (node % 64) & 1;
+                // Depth and spread: two diameters and two radii of 2000 windows, which the nearest may gain.
+                const double gain = 1 + 8 * radius / (2000 * *view.orthographic_height);
+                if (length * pixels_a_unit > tolerance * (1 + 1e-5)) {
+                    EXPECT_TRUE(unfolded) << node;
+                }
+                if (gain < 1.1 && length * pixels_a_unit * gain * 1.001 < tolerance) {
+                    EXPECT_FALSE(unfolded) << node;
+                }
+            }
+        }
+    }
+}
+
+// Facing: a criterion in which outlines alone are seen. All nodes whose ring has triangles that face both ways in the
+// parallel view must be unfolded.
+TEST(Orthographic, TakesAllOutlinesForOutlines) {
+    std::mt19937_64 random(23);
+    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.05));
+    DistanceCriterion::Parts parts;
+    parts.classes.assign(tree.interior_count(), {0, 1});
+    parts.switch_distance = {DistanceCriterion::never_visible, DistanceCriterion::always_visible};
+    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
+    ASSERT_TRUE(criterion);
+    std::size_t outlines = 0, all_kept = 0;
+    for (int i = 0; i < 40; ++i) {
+        View view = random_view(random, tree);
+        view.orthographic_height = 2.2 * tree.bounding_sphere().radius;
+        const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false));
+        ASSERT_TRUE(bits) << bits.error().message;
+        const glm::dvec3 back = camera_frame(view).back;
+        std::vector<std::uint8_t> sides(tree.interior_count());
+        for (std::size_t t = 0; t < tree.triangle_count(); ++t) {
+            glm::dvec3 corner[3];
+            for (int k = 0; k < 3; ++k)
+                corner[k] =
+                    glm::dvec3(tree.positions()[support::sound(tree).triangles()[t][k] + tree.interior_count()]);
+            const double facing = glm::dot(glm::cross(corner[1] - corner[0], corner[2] - corner[0]), back);
+            for (int k = 0; k < 3; ++k)
+                for (NodeId node =
+                         support::sound(tree).parents()[support::sound(tree).triangles()[t][k] + tree.interior_count()];
+                     node != no_node; node = support::sound(tree).parents()[node])
+                    sides[node] |= facing > 0 ? 1 : 2;
+        }
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            const bool unfolded = (*bits)[node / 64] >> (node % 64) & 1;
+            outlines += sides[node] == 3;
+            all_kept += unfolded;
+            if (sides[node] == 3) {
+                EXPECT_TRUE(unfolded) << node;
+            }
+        }
+    }
+    EXPECT_GT(outlines, 100u);
+    EXPECT_LT(all_kept, 40u * tree.interior_count()); // some are told to face one way
+}
+
+TEST(ViewpointOfPair, HoldsWhatEitherWindowShowsAndRefusesWhatIsNone) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    View left{.eye = {-0.03, 0, 3}, .target = {-0.03, 0, 0}, .shift = {0.2, 0}};
+    View right{.eye = {0.03, 0, 3}, .target = {0.03, 0, 0}, .shift = {-0.2, 0}};
+    const auto pair = viewpoint_of_pair(tree, left, right, {.scale = 2});
+    ASSERT_TRUE(pair);
+    EXPECT_EQ(pair->frusta.size(), 2u);
+    EXPECT_NEAR(pair->eye_spread, 0.015, 1e-9); // mesh units
+    EXPECT_NEAR(glm::length(pair->eye + tree.origin() - glm::dvec3(0, 0, 1.5)), 0, 1e-12);
+    right.orthographic_height = 1;
+    right.shift = {0, 0};
+    EXPECT_FALSE(viewpoint_of_pair(tree, left, right));
+    left = right;
+    EXPECT_TRUE(viewpoint_of_pair(tree, left, right));
+    left.orthographic_height = 2;
+    EXPECT_FALSE(viewpoint_of_pair(tree, left, right));
+    left.eye.x = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(viewpoint_of_pair(tree, left, left));
 }
 
 } // namespace

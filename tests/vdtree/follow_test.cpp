@@ -361,6 +361,44 @@ TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
     }
 }
 
+// What one cut for several eyes keeps: all that the cut of any of them has, whatever the criterion, gazes, back faces and
+// occluders; and it is followed like others.
+TEST_P(Follow, KeepsForAllEyesWithinTheSpreadWhatOneOfThemNeeds) {
+    const VertexTree tree = built(GetParam().make());
+    const Sphere sphere = tree.bounding_sphere();
+    std::mt19937_64 random(37);
+    std::ptrdiff_t of_all = 0, of_one = 0;
+    for (unsigned variant = 0; variant < 8; ++variant) {
+        const bool with_gaze = variant & 1, with_occluders = variant & 2, without_backs = variant & 4;
+        const DistanceCriterion criterion = rich_criterion(tree, 6 + variant, with_gaze);
+        FollowOptions options;
+        options.cull_back_faces = without_backs && tree.closedness() != Closedness::open;
+        Path path(tree, 41 + variant, with_gaze, false);
+        if (with_occluders) path.put_occluders();
+        const double spread = static_cast<double>(sphere.radius) * std::pow(10.0, -0.5 - 2 * random_unit(random));
+        Cut cut(tree);
+        for (int frame = 0; frame < frame_count() / 8; ++frame) {
+            Viewpoint viewpoint = path.next();
+            std::erase_if(viewpoint.occluders, [&](const Sphere& s) {
+                return !(glm::distance(glm::dvec3(s.centre), viewpoint.eye) > 1.001 * spread + s.radius);
+            });
+            viewpoint.eye_spread = spread;
+            ASSERT_TRUE(cut.follow(criterion, viewpoint, options));
+            const std::vector<bool> kept = state_of(cut);
+            ASSERT_EQ(kept, from_scratch(tree, criterion, viewpoint, options)) << "frame " << frame;
+            of_all += std::count(kept.begin(), kept.end(), true);
+            Viewpoint one = viewpoint;
+            one.eye_spread = 0;
+            one.eye += (frame % 4 == 0 ? 1 : random_unit(random)) * spread * random_direction(random);
+            const std::vector<bool> needed = from_scratch(tree, criterion, one, options);
+            of_one += std::count(needed.begin(), needed.end(), true);
+            for (std::size_t node = 0; node < needed.size(); ++node)
+                ASSERT_TRUE(kept[node] || !needed[node]) << "node " << node << ", frame " << frame << ", " << variant;
+        }
+    }
+    EXPECT_GT(of_all, of_one); // else the spread did nothing
+}
+
 #ifdef NDEBUG // else an assertion tells
 TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());
@@ -930,6 +968,9 @@ TEST(FollowBadInput, IsRefusedAndChangesNothing) {
     EXPECT_FALSE(cut.follow(criterion, {.eye = {nan, 0, 0}}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {0, infinity, 0}}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {0, 1e30, 0}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = nan}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = -1}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = infinity}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(0)}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(nan)}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .frusta = {{{Plane{{0, 0, nan}, 0}}}}}));

@@ -11,7 +11,10 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <gtest/gtest.h>
+
+#include <unseen/vdtree/footprint.h>
 
 #include "shapes.h"
 
@@ -176,6 +179,139 @@ TEST(Similarity, GoesToTheWorldAndBack) {
         EXPECT_NEAR(glm::distance(s.to_world(p), s.to_world(q)) / s.scale, glm::distance(p, q), rounding);
         EXPECT_LT(glm::distance(s.direction_to_mesh(s.rotation * p), p), rounding);
     }
+}
+
+// ---- from matrices
+
+glm::dmat4 frustum_matrix(double left, double right, double bottom, double top, double near_distance,
+                          double far_distance) {
+    return glm::frustum(left, right, bottom, top, near_distance, far_distance);
+}
+
+struct Matrices {
+    glm::dmat4 view, projection;
+};
+// Of a camera somewhere, whose window of 800 x 600 lies anywhere before it.
+Matrices random_matrices(std::mt19937_64& random, bool orthographic) {
+    const glm::dvec3 eye = 3.0 * random_direction(random);
+    const glm::dmat4 view = glm::lookAt(eye, eye + random_direction(random), random_direction(random));
+    const double height = std::pow(10.0, random_between(random, -1, 1)), width = height * 800 / 600;
+    const double left = random_between(random, -2, 1) * width, bottom = random_between(random, -2, 1) * height;
+    return {view, orthographic ? glm::ortho(left, left + width, bottom, bottom + height, -3.0, 100.0)
+                               : frustum_matrix(left, left + width, bottom, bottom + height, 0.5, 100)};
+}
+
+// Where a view shows a point: by what Projector and the frame say.
+glm::dvec2 shown_at(const View& view, glm::dvec3 point) {
+    if (!view.orthographic_height) {
+        const Footprint at = Projector(view)(point);
+        return {at.left, at.top};
+    }
+    const CameraFrame frame = camera_frame(view);
+    const double px = view.height / *view.orthographic_height;
+    return {view.width / 2.0 + px * glm::dot(point - view.eye, frame.right),
+            view.height / 2.0 - px * glm::dot(point - view.eye, frame.up)};
+}
+
+TEST(ViewFromMatrices, ShowsPointsWhereTheMatricesDo) {
+    std::mt19937_64 random(3);
+    int seen = 0;
+    for (int i = 0; i < 400; ++i) {
+        const Matrices m = random_matrices(random, i % 2 == 1);
+        const auto view = view_from_matrices(m.view, m.projection, 800, 600);
+        ASSERT_TRUE(view) << view.error().message;
+        EXPECT_EQ(view->orthographic_height.has_value(), i % 2 == 1);
+        for (int k = 0; k < 20; ++k) {
+            const glm::dvec3 point = 5.0 * random_direction(random);
+            const glm::dvec4 clip = m.projection * m.view * glm::dvec4(point, 1);
+            if (!(clip.w > 0.1)) continue;
+            const glm::dvec2 expected((clip.x / clip.w + 1) * 400, (1 - clip.y / clip.w) * 300);
+            const glm::dvec2 at = shown_at(*view, point);
+            const double tolerance_px = 1e-8 * (1 + glm::length(expected));
+            EXPECT_NEAR(at.x, expected.x, tolerance_px);
+            EXPECT_NEAR(at.y, expected.y, tolerance_px);
+            ++seen;
+        }
+    }
+    EXPECT_GT(seen, 2000);
+}
+
+TEST(ViewFromMatrices, IsTheViewThatTheyAreOf) {
+    const glm::dmat4 view = glm::lookAt(glm::dvec3(1, 2, 3), glm::dvec3(0, 0, 0), glm::dvec3(0, 1, 0));
+    const auto made = view_from_matrices(view, glm::perspective(0.7, 2.0, 0.1, 10.0), 640, 320);
+    ASSERT_TRUE(made) << made.error().message;
+    EXPECT_NEAR(glm::length(made->eye - glm::dvec3(1, 2, 3)), 0, 1e-12);
+    EXPECT_NEAR(made->fov_y_degrees, 0.7 * 180 / std::numbers::pi, 1e-12);
+    EXPECT_EQ(made->shift, glm::dvec2(0));
+    // The same in floats, with reversed infinite depth, and as a multiple of itself.
+    glm::dmat4 reversed(0);
+    reversed[0][0] = 1 / (2 * std::tan(0.35)), reversed[1][1] = 1 / std::tan(0.35), reversed[2][3] = -1;
+    reversed[3][2] = 0.1;
+    const auto other = view_from_matrices(glm::dmat4(glm::mat4(view)), 3.0 * glm::dmat4(glm::mat4(reversed)), 640, 320);
+    ASSERT_TRUE(other) << other.error().message;
+    EXPECT_NEAR(glm::length(other->eye - made->eye), 0, 1e-5);
+    EXPECT_NEAR(other->fov_y_degrees, made->fov_y_degrees, 1e-4);
+}
+
+TEST(ViewFromMatrices, RefusesWhatIsNoCameraAndSaysWhatToDo) {
+    const glm::dmat4 view = glm::lookAt(glm::dvec3(1, 2, 3), glm::dvec3(0), glm::dvec3(0, 1, 0));
+    const glm::dmat4 perspective = glm::perspective(0.7, 1.0, 0.1, 10.0), ortho = glm::ortho(-1.0, 1.0, -1.0, 1.0);
+    const auto with = [](glm::dmat4 m, int column, int row, double value) {
+        m[column][row] = value;
+        return m;
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    const auto scaled = [](double x, double y, double z) { return glm::scale(glm::dmat4(1), glm::dvec3(x, y, z)); };
+    struct Fault {
+        const char* says;
+        glm::dmat4 view, projection;
+    };
+    const std::vector<Fault> faults = {
+        {"view matrix must be finite", with(view, 3, 0, nan), perspective},
+        {"view matrix must be finite", with(view, 0, 0, inf), perspective},
+        {"view matrix is singular", scaled(1, 0, 1), perspective},
+        {"view matrix mirrors", scaled(-1, 1, 1) * view, perspective},
+        {"scales or shears", scaled(2, 2, 2) * view, perspective},
+        {"scales or shears", with(glm::dmat4(1), 1, 0, 0.5), perspective},
+        {"last row of the view matrix", perspective, perspective},
+        {"last row of the view matrix", glm::transpose(view), perspective},
+        {"projection matrix must be finite", view, with(perspective, 1, 1, nan)},
+        {"projection matrix is singular", view, glm::dmat4(0)},
+        {"projection matrix is singular", view, with(perspective, 0, 0, 0)},
+        {"projection matrix is singular", view, with(perspective, 3, 2, 0)},
+        {"projection matrix is singular", view, with(ortho, 2, 2, 0)},
+        {"looks along +z", view, glm::perspectiveLH(0.7, 1.0, 0.1, 10.0)},
+        {"mirrors the picture", view, scaled(1, -1, 1) * perspective},
+        {"mirrors the picture", view, scaled(-1, 1, 1) * perspective},
+        {"mirrors the picture", view, scaled(1, -1, 1) * ortho},
+        {"last row of the projection matrix", view, perspective * view},
+        {"turns or shears", view, with(perspective, 1, 0, 0.4)},
+        {"turns or shears", view, with(ortho, 2, 0, 0.4)},
+        {"not be square", view, glm::perspective(0.7, 1.5, 0.1, 10.0)},
+        {"not be square", view, glm::ortho(-2.0, 2.0, -1.0, 1.0)},
+    };
+    for (const auto& [says, of_view, projection] : faults) {
+        const auto made = view_from_matrices(of_view, projection, 500, 500);
+        ASSERT_FALSE(made) << says;
+        EXPECT_NE(made.error().message.find(says), std::string::npos) << made.error().message << " for: " << says;
+    }
+    EXPECT_FALSE(view_from_matrices(view, perspective, 0, 500));
+    EXPECT_TRUE(view_from_matrices(view, perspective, 500, 500));
+    EXPECT_TRUE(view_from_matrices(view, ortho, 500, 500));
+}
+
+TEST(View, RefusesShiftsAndHeightsThatAreNone) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(validate({.shift = {0.5, -2}}));
+    EXPECT_FALSE(validate({.shift = {nan, 0}}));
+    EXPECT_FALSE(validate({.shift = {0, 1e9}}));
+    EXPECT_TRUE(validate({.orthographic_height = 2}));
+    for (const double none : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()})
+        EXPECT_FALSE(validate({.orthographic_height = none}));
+    EXPECT_FALSE(validate({.shift = {1, 0}, .orthographic_height = 2}));
+    EXPECT_FALSE(validate_perspective({.orthographic_height = 2}, "This"));
+    EXPECT_TRUE(validate_perspective({.shift = {1, 0}}, "This"));
+    EXPECT_FALSE(validate_centred({.shift = {1, 0}}, "This"));
 }
 
 } // namespace

@@ -90,7 +90,7 @@ Effect reach_effect(const Sight& sight, const Decision& decision) {
     if (sight.gaze_px) {
         const double distance_px = display.distance / display.pixel_pitch;
         const auto direction = [&](double x, double y) {
-            return glm::normalize(glm::dvec3(x - sight.view.width * 0.5, y - sight.view.height * 0.5, distance_px));
+            return glm::normalize(glm::dvec3(glm::dvec2(x, y) - vdtree::axis_px(sight.view), distance_px));
         };
         const glm::dvec3 gaze = direction(sight.gaze_px->x, sight.gaze_px->y);
         for (const double x : {0.0, double(sight.view.width)})

@@ -103,6 +103,7 @@ struct Key {
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     int width = 0, height = 0;
     double fov_y_degrees = 0;
+    glm::dvec2 shift = {0, 0};
     bool operator==(const Key&) const = default;
 };
 
@@ -110,8 +111,7 @@ struct Key {
 // are rounded up to whole windows.
 double farthest_gaze_px(const vdtree::View& view, glm::dvec2 gaze_px) {
     const double side = std::max(view.width, view.height);
-    const glm::dvec2 from_centre = gaze_px - glm::dvec2(view.width, view.height) * 0.5;
-    return std::ceil(std::max(glm::length(from_centre) / side, 1.0)) * side;
+    return std::ceil(std::max(glm::length(gaze_px - vdtree::axis_px(view)) / side, 1.0)) * side;
 }
 
 // A budget goes by the order of the costs alone, for which any tolerance will do.
@@ -123,6 +123,7 @@ Key key_of(const Sight& sight, const Decision& decision) {
     key.width = sight.view.width;
     key.height = sight.view.height;
     key.fov_y_degrees = sight.view.fov_y_degrees;
+    key.shift = sight.view.shift;
     if (!is_perceptual(decision.test)) {
         key.pixels = tolerance_px(decision.request.goal);
         return key;
@@ -157,7 +158,7 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (decision.test == FoldTest::extent) return vdtree::extent_criterion(tree, view, key.pixels);
     if (decision.test == FoldTest::displacement) return vdtree::displacement_criterion(tree, view, key.pixels);
     perception::FoldTestOptions options = test_options(sight, decision.request);
-    if (key.farthest_gaze_px) options.gaze_px = glm::dvec2(view.width * 0.5 + *key.farthest_gaze_px, view.height * 0.5);
+    if (key.farthest_gaze_px) options.gaze_px = vdtree::axis_px(view) + glm::dvec2(*key.farthest_gaze_px, 0);
     if (sight.lighting && decision.test == FoldTest::luebke_hallen)
         return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
     if (decision.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(tree, view, options);
@@ -196,13 +197,12 @@ Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(const Sight& sig
     if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::shared_ptr<const perception::ShadowEdges>();
     // A highlight may be all there is on what is otherwise black.
     const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
-    const SceneShadows::EdgesKey edges_key{key.width, key.height,           key.fov_y_degrees,
-                                           ambient,   key.farthest_gaze_px, key.csf};
+    const SceneShadows::EdgesKey edges_key{
+        key.width, key.height, key.fov_y_degrees, key.shift, ambient, key.farthest_gaze_px, key.csf};
     SceneShadows& all = sight.scene_shadows;
     if (all.edges && all.edges_key == edges_key) return all.edges;
     perception::FoldTestOptions options = test_options(sight, decision.request);
-    if (key.farthest_gaze_px)
-        options.gaze_px = glm::dvec2(sight.view.width * 0.5 + *key.farthest_gaze_px, sight.view.height * 0.5);
+    if (key.farthest_gaze_px) options.gaze_px = vdtree::axis_px(sight.view) + glm::dvec2(*key.farthest_gaze_px, 0);
     auto made = perception::ShadowEdges::create(sight.view, options, ambient);
     if (!made) return made.error();
     all.edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
@@ -291,7 +291,8 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
 
 bool is_same(const vdtree::View& a, const vdtree::View& b) {
     return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees &&
-           a.width == b.width && a.height == b.height;
+           a.shift == b.shift && a.orthographic_height == b.orthographic_height && a.width == b.width &&
+           a.height == b.height;
 }
 
 struct KeptCriterion {

@@ -34,8 +34,10 @@ vdtree::View widened(const vdtree::View& view) {
     constexpr double wider = 1.3, widest_degrees = 179;
     const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
     vdtree::View wide = view;
+    // The middle stays where it is: halves of a wider window are longer.
     wide.fov_y_degrees = std::max(view.fov_y_degrees,
                                   std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));
+    wide.shift *= half_tangent / std::tan(wide.fov_y_degrees * (std::numbers::pi / 360));
     return wide;
 }
 

@@ -91,13 +91,13 @@ Result<float> relative_background(const perception::Display& display, std::optio
 
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
     const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
-    return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
+    return vdtree::axis_px(view) + glm::dvec2(tangent * (display.distance / display.pixel_pitch), 0);
 }
 
 std::vector<glm::dvec2> gaze_circle(const perception::Display& display, const vdtree::View& view, glm::dvec2 gaze_px,
                                     double degrees, int count) {
     const double distance_px = display.distance / display.pixel_pitch;
-    const glm::dvec2 centre = glm::dvec2(view.width, view.height) * 0.5;
+    const glm::dvec2 centre = vdtree::axis_px(view);
     const glm::dvec3 gaze = glm::normalize(glm::dvec3(gaze_px - centre, distance_px)); // right, down, into the screen
     const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), gaze)), down = glm::cross(gaze, right);
     const double radius = perception::to_radians(perception::Degrees(degrees)).value();

@@ -273,7 +273,7 @@ Result<SelectionFollower> SelectionFollower::create(Selections selections, const
 }
 
 Result<ChosenLevels> SelectionFollower::choose(const vdtree::View& view) {
-    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "A selection of levels"); !valid) return valid.error();
     Impl& own = *impl_;
     std::vector<std::size_t> objects;
     for (std::size_t i = 0; i < own.spheres.size(); ++i)

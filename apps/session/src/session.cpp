@@ -38,11 +38,12 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
 // Around the eye: the planes go through it, and their offsets are 0.
 std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
     const vdtree::CameraFrame frame = vdtree::camera_frame(view);
-    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
-    const double tan_x = tan_y * view.width / view.height;
+    const vdtree::WindowPlane window = vdtree::window_plane(view);
+    const glm::dvec2 low = window.half - window.middle,
+                     high = window.half + window.middle; // left and down; right and up
     std::vector<vdtree::Plane> planes;
-    for (const glm::dvec3& inward : {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
-                                     frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back})
+    for (const glm::dvec3& inward : {-frame.back, frame.right - low.x * frame.back, -frame.right - high.x * frame.back,
+                                     frame.up - low.y * frame.back, -frame.up - high.y * frame.back})
         planes.push_back({glm::normalize(inward), 0});
     return planes;
 }
@@ -78,15 +79,19 @@ WorldSphere world_sphere(const Object& object) {
 bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
     const vdtree::CameraFrame frame = vdtree::camera_frame(view);
     const glm::dvec3 to = sphere.centre - view.eye;
-    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360),
-                 half_right = half_up * view.width / view.height;
+    const vdtree::WindowPlane window = vdtree::window_plane(view);
     const double ahead = -glm::dot(to, frame.back);
     if (ahead < -sphere.radius) return false;
     // Beyond a side of the window: the distance from its plane through the eye.
-    const auto is_beyond = [&](double aside, double half) {
-        return (std::abs(aside) - half * ahead) / std::sqrt(1 + half * half) > sphere.radius;
+    const auto is_beyond = [&](double aside, double tangent) {
+        return (aside - tangent * ahead) / std::sqrt(1 + tangent * tangent) > sphere.radius;
     };
-    return !is_beyond(glm::dot(to, frame.right), half_right) && !is_beyond(glm::dot(to, frame.up), half_up);
+    const glm::dvec2 aside = {glm::dot(to, frame.right), glm::dot(to, frame.up)};
+    for (int k = 0; k < 2; ++k)
+        if (is_beyond(aside[k], window.half[k] + window.middle[k]) ||
+            is_beyond(-aside[k], window.half[k] - window.middle[k]))
+            return false;
+    return true;
 }
 
 WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
@@ -261,7 +266,7 @@ Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
 }
 
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
-    if (const auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (const auto valid = vdtree::validate_perspective(view, "A session"); !valid) return valid.error();
     window_ = window_of(view);
     std::vector<Sight> sights;
     sights.reserve(scene.objects.size());

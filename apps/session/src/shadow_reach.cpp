@@ -42,7 +42,7 @@ struct Piece {
 
 WorldSphere around(const Corners& part) {
     WorldSphere best{{}, infinity};
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
         const glm::dvec3 middle = (part[i] + part[(i + 1) % 3]) * 0.5;
         const double radius = std::max(glm::length(part[i] - middle), glm::length(part[(i + 2) % 3] - middle));
         if (radius < best.radius) best = {middle, radius};

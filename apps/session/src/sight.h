@@ -40,7 +40,9 @@ struct SceneShadows {
     // For views like this one; and what it is of.
     struct EdgesKey {
         int width = 0, height = 0;
-        double fov_y_degrees = 0, ambient = 0;
+        double fov_y_degrees = 0;
+        glm::dvec2 shift = {0, 0};
+        double ambient = 0;
         std::optional<double> farthest_gaze_px = {};
         std::shared_ptr<const perception::CsfTable> csf = {};
         bool operator==(const EdgesKey&) const = default;

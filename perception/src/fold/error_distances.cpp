@@ -788,7 +788,7 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
     const Bands bands(screen.highest_cpd, options.model, csf.samples().summation);
     std::map<int, Eye> eyes; // by luminance
     // Strips that are lit by `own`, whatever the angle: all that is below the illuminance occurs.
-    std::vector<double> widest;
+    std::vector<double> widest_strips;
     double least = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= illuminance_octaves * illuminances_per_octave; ++i) {
         const double own = illuminance_at(i), before = i > 0 ? illuminance_at(i - 1) : 0;
@@ -807,9 +807,9 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
         // Between the last one's light and this one's, the widest is no less than this. Below the first, taken as there.
         const double from = i > 0 ? before : own;
         if (needed_widths > 0) least = std::min(least, from / needed_widths);
-        widest.push_back(least);
+        widest_strips.push_back(least);
     }
-    return ShadowEdges(std::move(widest));
+    return ShadowEdges(std::move(widest_strips));
 }
 
 double ShadowEdges::widest_unseen(double illuminance) const {

@@ -365,16 +365,15 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement, bool window_only) {
-    vdtree::Viewpoint viewpoint;
-    viewpoint.eye = vdtree::eye_in_tree(tree, view, placement);
+    vdtree::Viewpoint viewpoint = vdtree::viewpoint_of(tree, view, placement, window_only);
     if (options.gaze_px) {
         const Screen screen(view, options);
         const vdtree::CameraFrame frame = vdtree::camera_frame(view);
-        const double x = (options.gaze_px->x - view.width * 0.5) * screen.pitch_over_distance / screen.scale;
-        const double y = (view.height * 0.5 - options.gaze_px->y) * screen.pitch_over_distance / screen.scale;
+        const glm::dvec2 from_axis = *options.gaze_px - vdtree::axis_px(view);
+        const double x = from_axis.x * screen.pitch_over_distance / screen.scale;
+        const double y = -from_axis.y * screen.pitch_over_distance / screen.scale;
         viewpoint.gaze = glm::normalize(placement.direction_to_mesh(x * frame.right + y * frame.up - frame.back));
     }
-    if (window_only) viewpoint.frusta.push_back(vdtree::frustum_of(tree, view, placement));
     return viewpoint;
 }
 

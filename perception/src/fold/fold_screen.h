@@ -32,6 +32,11 @@ inline const CsfTable& csf_of(const FoldTestOptions& options) {
 inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOptions& options) {
     if (auto ok = validate(options.display); !ok) return ok;
     if (auto ok = vdtree::validate(view); !ok) return ok;
+    // The eye that stands for such a view is so far away that floats do not tell apart where it looks.
+    if (options.gaze_px && view.orthographic_height)
+        return Error{
+            ErrorCode::invalid_argument,
+            "fold test: an orthographic view has no gaze; leave it out, and all of the view counts as looked at"};
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y)))
         return Error{ErrorCode::invalid_argument, "fold test: the gaze must be a finite position in pixels"};
     const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{});
@@ -51,20 +56,22 @@ struct Screen {
 
     Screen(const vdtree::View& view, const FoldTestOptions& options) {
         const double tan_physical = std::tan(to_radians(physical_field(options.display, view.height)).value() / 2);
-        const double tan_camera = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+        const double tan_camera = view.orthographic_height ? view.height / (2 * vdtree::pixels_per_radian(view))
+                                                           : std::tan(view.fov_y_degrees * std::numbers::pi / 360);
         scale = tan_physical / tan_camera;
         constexpr double same = 1e-9; // the default field is the physical one by way of degrees
         if (std::abs(scale - 1) < same) scale = 1;
         pixel_deg = 1 / coarsest_pixels_per_degree(options.display).value();
         highest_cpd = nyquist(finest_pixels_per_degree(options.display)).value();
         pitch_over_distance = options.display.pixel_pitch.value() / options.display.distance.value();
-        // From the axis to the farthest corner of the window, or to the gaze if that is farther.
+        // From the axis to the farthest corner of the window, or to the gaze if that is farther. The viewer's eye is before
+        // the point of the screen where the line of sight meets it.
         const double aspect = static_cast<double>(view.width) / view.height;
-        double farthest = tan_camera * std::hypot(aspect, 1);
-        if (options.gaze_px)
-            farthest = std::max(
-                farthest, std::hypot(options.gaze_px->x - view.width * 0.5, options.gaze_px->y - view.height * 0.5) *
-                              pitch_over_distance / scale);
+        double farthest = tan_camera * std::hypot(aspect * (1 + std::abs(view.shift.x)), 1 + std::abs(view.shift.y));
+        if (options.gaze_px) {
+            const glm::dvec2 from_axis = *options.gaze_px - vdtree::axis_px(view);
+            farthest = std::max(farthest, std::hypot(from_axis.x, from_axis.y) * pitch_over_distance / scale);
+        }
         const double t2 = farthest * farthest;
         const double at_edge =
             scale * (1 + t2) / (1 + scale * scale * t2); // along the radius; across it, its root in between

@@ -27,7 +27,6 @@ constexpr double least_beta = 1, largest_beta = 8; // beyond, powers of what is 
 // Steps of the tables. Between them log S and the weights are linear, over luminance and over eccentricity. log S is
 // linear in eccentricity. In luminance it errs by less than 1e-3 of S, most where castleCSF's peak crosses the band's
 // frequency.
-constexpr double eccentricity_step = BandTable::eccentricity_step;
 constexpr int fraction_bits = BandTable::fraction_bits;
 
 // Where own and smoothed are fitted, in units of the band's nominal frequency. Band 0 has no band above it; it is fitted

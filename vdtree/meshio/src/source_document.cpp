@@ -64,8 +64,8 @@ private:
     std::vector<std::byte> bytes_;
 };
 
-// Of values whose type is told beside them.
-std::vector<std::byte> values_in_file_order(const VertexArray& array) {
+// Of values whose type is told beside them. (Not used where memory is in the file's order.)
+[[maybe_unused]] std::vector<std::byte> values_in_file_order(const VertexArray& array) {
     std::vector<std::byte> values = array.values;
     change_order(values, byte_size(array.type), std::endian::little);
     return values;

@@ -181,6 +181,8 @@ Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const Dis
                        "; make one for this tree.");
     if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
     if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
+    if (!(viewpoint.eye_spread >= 0 && viewpoint.eye_spread <= farthest_eye))
+        return invalid("The spread of the eyes must be 0 or more and at most 1e18 mesh units.");
     constexpr double unit_slack = 1e-3; // directions given with three digits
     if (viewpoint.gaze && !(std::abs(glm::length(*viewpoint.gaze) - 1) <= unit_slack))
         return invalid("The gaze must be a direction of length 1.");
@@ -194,8 +196,8 @@ Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const Dis
         const glm::dvec3 centre(occluder.centre);
         if (!is_finite(centre) || !(occluder.radius >= 0) || !std::isfinite(occluder.radius))
             return invalid("An occluder needs a finite centre and a finite radius of 0 or more.");
-        if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius)))
-            return invalid("The eye is inside an occluder.");
+        if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius) + viewpoint.eye_spread))
+            return invalid("The eye is inside an occluder, or one of the eyes within the spread is.");
     }
     if (viewpoint.hidden) {
         constexpr std::size_t word = 64;

@@ -27,7 +27,7 @@ int to_pixel(double px, int size) {
 } // namespace
 
 Result<DepthPicture> DepthPicture::create(const View& view, std::span<const float> depth) {
-    if (const auto valid = validate(view); !valid) return valid.error();
+    if (const auto valid = validate_perspective(view, "A depth picture"); !valid) return valid.error();
     const auto pixels = static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height);
     if (depth.size() != pixels)
         return invalid_argument("A depth picture of this view has " + std::to_string(pixels) + " pixels, not " +

@@ -15,6 +15,7 @@
 #include <unseen/vdtree/internal/errors.h>
 
 #include "cut/kernel/fold_kernel.h"
+#include "cut/orthographic.h"
 #include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
@@ -187,12 +188,41 @@ Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Part
     return criterion;
 }
 
-Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {
+namespace {
+
+// Of an orthographic window, whose sides are parallel to the line of sight.
+Frustum orthographic_frustum(const VertexTree& tree, const View& view, const Similarity& placement) {
     const CameraFrame frame = camera_frame(view);
-    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
-    const double tan_x = tan_y * view.width / view.height;
-    const glm::dvec3 inward[] = {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
-                                 frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back};
+    const double half_up = *view.orthographic_height / 2 / placement.scale,
+                 half_right = half_up * view.width / view.height;
+    const glm::dvec3 middle = placement.to_mesh(view.eye) - tree.origin();
+    // Heights over these planes are summed in floats from products as large as the eye's distance: a few roundings of it.
+    constexpr double float_rounding = 1e-6;
+    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
+    const WholeSphere all = whole_sphere(tree);
+    const double inexact = float_rounding * (glm::length(eye - all.centre) + all.radius);
+    Frustum frustum;
+    const auto add = [&](glm::dvec3 direction, double half) {
+        const glm::dvec3 normal = glm::normalize(placement.direction_to_mesh(direction));
+        frustum.planes.push_back({normal, half + inexact - glm::dot(normal, middle)});
+    };
+    add(frame.right, half_right);
+    add(-frame.right, half_right);
+    add(frame.up, half_up);
+    add(-frame.up, half_up);
+    return frustum;
+}
+
+} // namespace
+
+Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {
+    if (view.orthographic_height) return orthographic_frustum(tree, view, placement);
+    const CameraFrame frame = camera_frame(view);
+    const WindowPlane window = window_plane(view);
+    const glm::dvec2 low = window.half - window.middle,
+                     high = window.half + window.middle; // left and down; right and up
+    const glm::dvec3 inward[] = {-frame.back, frame.right - low.x * frame.back, -frame.right - high.x * frame.back,
+                                 frame.up - low.y * frame.back, -frame.up - high.y * frame.back};
     const glm::dvec3 eye = eye_in_tree(tree, view, placement);
     Frustum frustum;
     for (const glm::dvec3& direction : inward) {
@@ -200,6 +230,39 @@ Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& p
         frustum.planes.push_back({normal, -glm::dot(normal, eye)});
     }
     return frustum;
+}
+
+Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement, bool window_only) {
+    Viewpoint viewpoint;
+    viewpoint.eye = eye_in_tree(tree, view, placement);
+    if (view.orthographic_height) {
+        // Every point of the tree is seen along the axis from one of the eyes.
+        const glm::dvec3 back = glm::normalize(placement.direction_to_mesh(camera_frame(view).back));
+        const WholeSphere all = whole_sphere(tree);
+        const glm::dvec3 to = all.centre - viewpoint.eye;
+        viewpoint.eye_spread = glm::length(to - back * glm::dot(to, back)) + all.radius;
+    }
+    if (window_only) viewpoint.frusta.push_back(frustum_of(tree, view, placement));
+    return viewpoint;
+}
+
+Result<Viewpoint> viewpoint_of_pair(const VertexTree& tree, const View& left, const View& right,
+                                    const Similarity& placement, bool window_only) {
+    for (const View* view : {&left, &right})
+        if (const auto valid = validate(*view); !valid) return valid.error();
+    if (left.orthographic_height.has_value() != right.orthographic_height.has_value())
+        return invalid_argument("Of a stereo pair both views must be orthographic, or none.");
+    if (left.orthographic_height && *left.orthographic_height != *right.orthographic_height)
+        return invalid_argument("The orthographic views of a stereo pair must be equally high.");
+    const Viewpoint a = viewpoint_of(tree, left, placement, window_only),
+                    b = viewpoint_of(tree, right, placement, window_only);
+    Viewpoint both = a;
+    both.eye = a.eye + (b.eye - a.eye) * 0.5;
+    constexpr double rounding = 1e-12; // of the middle and the distance, in doubles
+    both.eye_spread = glm::length(b.eye - a.eye) * 0.5 + rounding * (glm::length(a.eye) + glm::length(b.eye)) +
+                      std::max(a.eye_spread, b.eye_spread);
+    both.frusta.insert(both.frusta.end(), b.frusta.begin(), b.frusta.end());
+    return both;
 }
 
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {

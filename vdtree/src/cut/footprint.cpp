@@ -16,7 +16,7 @@ void Footprint::add(const Footprint& other) noexcept {
 }
 
 Projector::Projector(const View& view)
-    : eye_(view.eye), camera_(camera_frame(view)), middle_x_(0.5 * view.width), middle_y_(0.5 * view.height),
+    : eye_(view.eye), camera_(camera_frame(view)), middle_x_(axis_px(view).x), middle_y_(axis_px(view).y),
       focal_px_(view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360))) {}
 
 Footprint Projector::operator()(glm::dvec3 point) const noexcept {
@@ -29,7 +29,7 @@ Footprint Projector::operator()(glm::dvec3 point) const noexcept {
 }
 
 Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view) {
-    if (const auto valid = validate(view); !valid) return valid.error();
+    if (const auto valid = validate_perspective(view, "What parts cover of a window"); !valid) return valid.error();
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     const NodeId interior = tree.interior_count();

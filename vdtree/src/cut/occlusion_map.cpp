@@ -64,7 +64,7 @@ struct OcclusionMap::Grids {
 };
 
 Result<OcclusionMap> OcclusionMap::create(const View& view, DepthCells cells, const EyeReach& reach) {
-    if (const auto valid = validate(view); !valid) return valid.error();
+    if (const auto valid = validate_centred(view, "An occlusion map"); !valid) return valid.error();
     if (!(reach.around >= 0 && std::isfinite(reach.around) && std::isfinite(glm::length(reach.along))))
         return invalid_argument("The reach of an occlusion map must be 0 or more, and finite.");
     if (cells.cell_px < 1 || cells.columns != (view.width + cells.cell_px - 1) / cells.cell_px ||

@@ -133,7 +133,9 @@ bool MovingOcclusion::Impl::is_due(const vdtree::View& view) const {
     if ((reader && reader->is_under_way()) || looking.valid()) return false;
     if (!known) return true;
     const vdtree::View& of = known->map().view();
-    if (of.width != view.width || of.height != view.height || of.fov_y_degrees != view.fov_y_degrees) return true;
+    if (of.width != view.width || of.height != view.height || of.fov_y_degrees != view.fov_y_degrees ||
+        of.shift != view.shift)
+        return true;
     const vdtree::EyeReach& reaches = known->map().reach();
     if (!(glm::length(view.eye - of.eye) <= used_up * (glm::length(reaches.along) + reaches.around))) return true;
     const double turn = std::acos(std::clamp(glm::dot(forward(of), forward(view)), -1.0, 1.0));

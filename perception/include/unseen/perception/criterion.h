@@ -42,7 +42,8 @@ struct FoldTestOptions {
 };
 
 // All of these tests are in distance form. They depend on the field, the window and the options, and on whether there
-// is a gaze. They do not depend on where the eye or the gaze is. So one criterion does for all cuts of a view that
+// is a gaze. They do not depend on where the eye or the gaze is. Off centre the viewer's eye is taken to be before the
+// point of the screen where the line of sight meets it. With an orthographic view there can be no gaze. So one criterion does for all cuts of a view that
 // moves. Each fails where the display or the view is not valid, the gaze or a luminance of the scene is not finite, or
 // the tree is from a damaged file.
 
@@ -137,7 +138,7 @@ Result<vdtree::DistanceCriterion> error_distances(std::span<const TreeAsLit> as_
                                                   const FoldTestOptions& options);
 
 // Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside
-// folds.
+// folds. The same as vdtree's, but for the gaze. (For a stereo pair: vdtree::viewpoint_of_pair(), without a gaze.)
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 

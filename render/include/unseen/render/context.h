@@ -1,6 +1,7 @@
 // An OpenGL 4.5 core context: headless through EGL, or a GLFW window. Drawing code is the same under both.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,6 +23,13 @@ struct WindowOptions {
     int samples = 8;          // a pixel, wished for; 0: exact pixels
 };
 
+struct AdoptOptions {
+    // Makes the adopted context current on the thread that calls it, as by glfwMakeContextCurrent(). Called where a call
+    // of Unseen finds another one, or none. None: the caller sees to it that the context is current in every call, and
+    // where what lives in it ends.
+    std::function<void()> make_current = {};
+};
+
 // A handle: copies are the same context. All that lives in it on the GPU keeps one, so the context, and its window, end
 // with the last of them. Current on the thread that made it until another one is made or used there; stays on that
 // thread. GL debug output of severity medium and high is collected as errors, see take_errors(); remarks on performance
@@ -35,6 +43,13 @@ public:
     // A window of GLFW's, sRGB-capable and multisampled where there is such a thing. On the main thread only; the
     // caller polls events and swaps buffers. Fails where there is no display.
     static Result<Context> window(const WindowOptions& options = {});
+
+    // The context that is current on this thread, of whichever window system or toolkit. It stays its owner's, who keeps
+    // it for as long as handles to it and things in it are used, and it keeps its state: what a call of Unseen changes,
+    // it sets back. Errors are told by flags alone, and those that were raised before a call are kept for take_errors().
+    // Fails where none is current, or it is older than 4.5 or lost. From when on it is gone, or not current and not made
+    // so, calls fail with an error that says it, and nothing is deleted in another context that is current in its place.
+    static Result<Context> adopt(const AdoptOptions& options = {});
 
     // Makes the context current again after another one was. Cheap where it already is. Everything below does it
     // itself.
@@ -55,7 +70,7 @@ public:
 
 private:
     explicit Context(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
-    static Result<Context> adopt(std::unique_ptr<Platform> platform);
+    static Result<Context> take(std::unique_ptr<Platform> platform);
     std::shared_ptr<Impl> impl_;
 };
 

@@ -28,10 +28,11 @@ inline float unbounded_cost(float order) noexcept { return least_unbounded_cost 
 enum class Visibility : std::uint8_t { out, partly, wholly_in };
 using VisibilityTest = Callback<void(const VertexTree&, std::span<const NodeId> nodes, std::span<Visibility> seen)>;
 
-// The eye in the tree's own frame. Relative to VertexTree::origin().
+// The eye in the tree's own frame. Relative to VertexTree::origin(). Of an orthographic view the one that stands for it,
+// see viewpoint_of().
 glm::dvec3 eye_in_tree(const VertexTree& tree, const View& view, const Similarity& placement);
 
-// Frustum test of the ring spheres against the window's five planes (no far plane).
+// Frustum test of the ring spheres against the planes of frustum_of().
 class FrustumVisibility {
 public:
     FrustumVisibility(const VertexTree& tree, const View& view, const Similarity& placement = {});
@@ -41,7 +42,8 @@ private:
     Frustum frustum_;
 };
 
-// Projected size at the window's centre, in pixels, of an angle: pixels = angle * height / (2 tan(fov / 2)).
+// Projected size on the line of sight, in pixels, of an angle: pixels = angle * height / (2 tan(fov / 2)). Of an
+// orthographic view, for the eye that stands for it.
 double pixels_per_radian(const View& view);
 
 } // namespace unseen::vdtree

@@ -135,12 +135,16 @@ struct Frustum {
     std::vector<Plane> planes;
 };
 
-// Of a perspective view: the eye's plane and the window's four sides; no far plane.
+// The eye's plane and the window's four sides; no far plane. Of an orthographic view: the four sides.
 Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement = {});
 
 // Where a cut is looked at from, in the tree's frame (relative to its origin, mesh units).
 struct Viewpoint {
     glm::dvec3 eye = glm::dvec3(0);
+    // The cut does for all eyes within this distance (mesh units) of `eye`: what one of them needs stays. Half of the
+    // distance between two eyes, `eye` being in their middle. Costs triangles: everything counts as so much nearer, and
+    // as an outline where it might be one from there.
+    double eye_spread = 0;
     std::optional<glm::dvec3> gaze = {}; // unit direction from the eye; none: everything counts as looked at
     std::vector<Frustum> frusta = {};    // nodes outside all of them fold; none: everything counts as seen
     // Nodes wholly behind one of these fold, also where a frustum shows them: spheres that nothing can be seen through
@@ -153,6 +157,19 @@ struct Viewpoint {
     std::shared_ptr<const std::vector<std::uint64_t>> hidden = {};
     Lighting lighting = {}; // for criteria with lit classes; a valid one there
 };
+
+// Where a cut for the view is looked at from; with the view's frustum if `window_only`: what lies outside folds.
+//
+// An orthographic view is taken as that of eyes 2000 windows' heights away from the tree's far side, with a spread that
+// covers the whole tree. So nothing counts as smaller than it is drawn, and nothing as facing the eyes that does not.
+Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement = {},
+                       bool window_only = true);
+// One for the two views of a stereo pair: from between their eyes, with half of their distance for a spread, and what is
+// outside of both windows folds. One criterion does for both if they share field and window; else make it for the one of
+// more pixels to a degree. Fails where a view is not valid, or one is orthographic and the other is not, or of another
+// height.
+Result<Viewpoint> viewpoint_of_pair(const VertexTree& tree, const View& left, const View& right,
+                                    const Similarity& placement = {}, bool window_only = true);
 
 // Node extent, VDSlib's own measure: the support's sphere is seen under an angle of so many pixels at the window's
 // centre at most. Unfolds where the eye is inside.

@@ -22,18 +22,19 @@ struct Footprint {
 // Projects points of the world onto a view's window.
 class Projector {
 public:
-    explicit Projector(const View& view); // precondition: valid
+    explicit Projector(const View& view); // precondition: valid, and perspective
     Footprint operator()(glm::dvec3 point) const noexcept;
 
 private:
     glm::dvec3 eye_;
     CameraFrame camera_;
-    double middle_x_, middle_y_, focal_px_;
+    double middle_x_, middle_y_, focal_px_; // where the line of sight meets the window, and tangents in pixels
 };
 
 // By interior node: of the corners of all triangles that touch the support, of the node's proxy, and of those of all
 // nodes under it. So of what is there before and after the fold, as long as the neighbours are unfolded, or the same is
-// true of them. Fails where VertexTree::check() does. Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
+// true of them. Fails where VertexTree::check() does,
+// and for orthographic views. Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
 Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view);
 
 } // namespace unseen::vdtree

@@ -37,7 +37,8 @@ UNSEEN_INLINE void find_bounds_listed(const KernelView& view, const NodeArrays& 
     const Listed listed{arrays, nodes.data(), nodes.size() - 1};
     for (std::size_t i = 0; i < nodes.size(); i += width) {
         listed.prefetch(i);
-        const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(i + lane); });
+        const Nodes of =
+            load_nodes(view, arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(i + lane); });
         const Measures m = measures_of(view, of);
         const Costs inner = costs_of(view, tables, of.interior_row, m, of.length),
                     silhouette = silhouette_costs(view, tables, of, m, inner);
@@ -69,8 +70,8 @@ UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& a
         std::size_t asked_count = 0;
         for (std::size_t i = 0; i < size; i += width) {
             listed.prefetch(start + i);
-            const Nodes of =
-                load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
+            const Nodes of = load_nodes(
+                view, arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
             const Measures m = measures_of(view, of);
             const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
             const Costs silhouette = silhouette_costs(view, tables, of, m, inner);

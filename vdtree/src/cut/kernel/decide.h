@@ -82,7 +82,7 @@ UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, 
             for (std::size_t i = first; i < end; i += width) {
                 node_at.prefetch(start + i);
                 const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return node_at(start + i + lane); };
-                const Measures m = measures_of(view, load_nodes(arrays, at));
+                const Measures m = measures_of(view, load_nodes(view, arrays, at));
                 near_bits |= std::uint64_t{bits_of(m.is_near)} << (i - first);
                 seen_bits |= std::uint64_t{bits_of(m.is_near & m.is_inside)} << (i - first);
                 if (any(m.is_asked)) asked_bits |= std::uint64_t{bits_of(m.is_asked)} << (i - first);

@@ -161,7 +161,7 @@ UNSEEN_INLINE Sides sides_of(const KernelView& view, const NodeArrays& arrays, A
         Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return slabs[lane]; }, columns);
         std::memcpy(words.four, columns, sizeof columns);
     }
-    const Gaps gaps = find_gaps<true>(towards, ring[3], ~is_irregular,
+    const Gaps gaps = find_gaps<true>(towards, ring[3] + view.spread, ~is_irregular,
                                       [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
     // An irregular ring is a silhouette from everywhere; what has no triangle with an area faces everything.
     const Floats &shown = view.is_inside_out ? gaps.back : gaps.front,

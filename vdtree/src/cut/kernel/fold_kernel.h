@@ -27,6 +27,7 @@ inline constexpr float kept_length = 1e30f;
 // What all nodes are measured from, and by.
 struct KernelView {
     float eye_high[3], eye_low[3]; // the eye in two floats each: differences to it stay good near and far
+    float spread = 0;              // eyes may lie so far from there: spheres count as so much larger
     float gaze[3];                 // unit
     bool has_gaze = false;
     // Planes of the frusta, relative to the eye: normal . (p - eye) + offset; those of frustum f are

@@ -55,6 +55,8 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         view_.eye_high[k] = static_cast<float>(viewpoint.eye[k]);
         view_.eye_low[k] = static_cast<float>(viewpoint.eye[k] - static_cast<double>(view_.eye_high[k]));
     }
+    view_.spread = std::nextafter(static_cast<float>(viewpoint.eye_spread),
+                                  viewpoint.eye_spread > 0 ? infinity : 0.0f); // not less than it is
     view_.has_gaze = viewpoint.gaze.has_value() && criterion_.uses_gaze();
     if (view_.has_gaze)
         for (int k = 0; k < 3; ++k) view_.gaze[k] = static_cast<float>((*viewpoint.gaze)[k]);
@@ -309,7 +311,7 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
     constexpr Motion jump{.position = std::numeric_limits<double>::infinity(),
                           .facing = std::numeric_limits<double>::infinity()};
     if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size() ||
-        from.occluders != to.occluders)
+        from.eye_spread != to.eye_spread || from.occluders != to.occluders)
         return jump;
     const Sphere& root = tree.bounds()[VertexTree::root()].ring; // contains the centres of all spheres
     const glm::dvec3 centre(root.centre);

@@ -46,6 +46,7 @@ public:
 
     void look_from(const Viewpoint& viewpoint, double length_per_radian) {
         lights_ = KernelLights(tree_, viewpoint.lighting, viewpoint.eye);
+        lights_.eye_inexact += static_cast<float>(viewpoint.eye_spread * (1 + 1e-6)); // up, where it is rounded
         length_ = static_cast<float>(light_weight * length_per_radian);
     }
     // Most cones lie in two cache lines.

@@ -15,13 +15,14 @@ UNSEEN_INLINE Floats load_values(const float* from, At at) {
 
 // `at(lane)` is a lane's node.
 template <class At>
-UNSEEN_INLINE Nodes load_nodes(const NodeArrays& arrays, At at) {
+UNSEEN_INLINE Nodes load_nodes(const KernelView& view, const NodeArrays& arrays, At at) {
     Nodes nodes;
     if (arrays.support)
         load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.support[at(lane)]; }, nodes);
     else load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, nodes);
     nodes.length = arrays.lengths ? load_values(arrays.lengths, at) : nodes.radius;
     nodes.silhouette_length = arrays.silhouette_lengths ? load_values(arrays.silhouette_lengths, at) : nodes.length;
+    nodes.radius += view.spread; // the lengths are those of the node itself
     nodes.interior_row = nodes.silhouette_row = Ints{};
     if (arrays.classes) {
         nodes.interior_row = collect<Ints>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
@@ -41,7 +42,7 @@ struct Candidates {
 };
 
 template <class At>
-UNSEEN_INLINE Candidates load_candidates(At at) {
+UNSEEN_INLINE Candidates load_candidates(const KernelView& view, At at) {
     static_assert(offsetof(FoldCandidate, length) == 16 && offsetof(FoldCandidate, rows) == 24 &&
                   offsetof(FoldCandidate, ring) == 28 && offsetof(FoldCandidate, slabs) == 44 &&
                   offsetof(FoldCandidate, flags) == 58);
@@ -55,9 +56,9 @@ UNSEEN_INLINE Candidates load_candidates(At at) {
             c + 4 * quarter);
     const auto bits = [&](std::size_t column) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<Ints>(c[column]); };
     const Ints interior_row = bits(6) & 0xffff, silhouette_row = (bits(6) >> 16) & 0xffff;
-    return {{{c[0], c[1], c[2]}, c[3], c[4], c[5], interior_row, silhouette_row},
+    return {{{c[0], c[1], c[2]}, c[3] + view.spread, c[4], c[5], interior_row, silhouette_row},
             {c[7], c[8], c[9]},
-            c[10],
+            c[10] + view.spread,
             {{bits(11), bits(12), bits(13), bits(14)}}};
 }
 

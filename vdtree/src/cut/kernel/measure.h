@@ -19,7 +19,7 @@ UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const I
 
 // What is tested: spheres, lengths, and rows of the criterion's table.
 struct Nodes {
-    Floats centre[3], radius, length, silhouette_length;
+    Floats centre[3], radius, length, silhouette_length; // the radius with the eyes' spread
     Ints interior_row, silhouette_row;
 };
 // How that looks from the eye.
@@ -57,7 +57,7 @@ UNSEEN_INLINE Floats uncovered(const KernelView& view, const Measures& m, const 
         const Floats off = along - way;
         least = min_of(least, root_of(off * off + beside_squared) + way * sine - o.radius);
     }
-    return least;
+    return least + view.spread; // from the eye that sees most of it
 }
 
 // Of a point, by its vector to the eye: over the lowest plane of the best frustum.
@@ -97,11 +97,12 @@ UNSEEN_INLINE Measures measures_of(const KernelView& view, const Nodes& of) {
         view.nobody ? m.interior : max_of(m.interior, distances(view, of.silhouette_row, m.bin, of.silhouette_length));
 
     const Ints is_kept = of.silhouette_length >= all(kept_length); // wherever it is
-    m.height = is_kept ? all(huge) : height(view, m.to_eye) + of.radius;
+    const Floats own_radius = of.radius - view.spread;             // frusta are where they are
+    m.height = is_kept ? all(huge) : height(view, m.to_eye) + own_radius;
     m.uncovered = all(huge);
     // Far nodes fold anyway.
     if (!view.occluders.empty() && (view.everybody || any(m.gap < m.silhouette)))
-        m.uncovered = is_kept ? m.uncovered : uncovered(view, m, of.radius);
+        m.uncovered = is_kept ? m.uncovered : uncovered(view, m, own_radius);
 
     m.is_inside = (m.height >= 0) & (m.uncovered >= 0);
     m.is_near = m.gap < m.interior;

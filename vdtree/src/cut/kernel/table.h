@@ -3,8 +3,9 @@
 UNSEEN_INLINE void test_all(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) {
     tested.unfolded = 0;
     for (std::size_t first = 0; first < lanes.size(); first += width) {
-        const Candidates of = load_candidates(
-            [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return lanes[std::min(first + lane, lanes.size() - 1)]; });
+        const Candidates of = load_candidates(view, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
+            return lanes[std::min(first + lane, lanes.size() - 1)];
+        });
         const Measures m = measures_of(view, of.nodes);
         const Verdicts v = decided(view, of, m);
         store(slacks_of(view, of.nodes, m, v), tested, first);
@@ -16,8 +17,9 @@ UNSEEN_INLINE void verdicts_of(const KernelView& view, std::span<const FoldCandi
     batch.is_inside = batch.is_near = batch.unfolded = batch.is_silhouette = batch.by_silhouette = batch.is_away = 0;
     for (std::size_t first = 0; first < kernel_lanes; first += width) {
         // Unused lanes repeat the last candidate.
-        const Candidates of = load_candidates(
-            [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return lanes[std::min(first + lane, lanes.size() - 1)]; });
+        const Candidates of = load_candidates(view, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
+            return lanes[std::min(first + lane, lanes.size() - 1)];
+        });
         const Measures m = measures_of(view, of.nodes);
         const Verdicts v = decided(view, of, m);
         store(batch.radius + first, of.nodes.radius);

@@ -1,0 +1,68 @@
+// A stereo pair drawn from one cut, judged eye by eye.
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
+
+#include "measured.h"
+#include "oracle.h"
+#include "shapes.h"
+
+namespace unseen {
+namespace {
+
+using vdtree::Cut;
+using vdtree::View;
+
+// The eyes look ahead in parallel, 63 mm apart, and both see the same screen: windows off centre to both sides.
+TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
+    auto context = render::Context::headless();
+    if (!context) GTEST_SKIP() << context.error().message;
+    const vdtree::VertexTree tree =
+        support::measured(support::built(shapes::placed(shapes::bumpy_sphere(5, 0.02), 0.1, {0, 0, 0})), 0);
+    auto renderer = render::Renderer::create(*context, tree);
+    ASSERT_TRUE(renderer) << renderer.error().message;
+    for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = 320, .count = 4, .far_fill = 0.3})) {
+        const vdtree::CameraFrame frame = vdtree::camera_frame(look.view);
+        const double apart = 0.063, screen = glm::length(look.view.eye - look.view.target); // world units
+        const vdtree::WindowPlane window = vdtree::window_plane(look.view);
+        View eyes[2] = {look.view, look.view};
+        for (int i = 0; i < 2; ++i) {
+            const double aside = (i == 0 ? -0.5 : 0.5) * apart;
+            eyes[i].eye += aside * frame.right;
+            eyes[i].target += aside * frame.right;
+            eyes[i].shift.x = -aside / screen / window.half.x;
+        }
+        perception::FoldTestOptions options = look.options;
+        options.gaze_px = {};
+        const auto criterion = perception::error_distances(tree, eyes[0], options);
+        ASSERT_TRUE(criterion) << criterion.error().message;
+        const auto viewpoint = vdtree::viewpoint_of_pair(tree, eyes[0], eyes[1]);
+        ASSERT_TRUE(viewpoint) << viewpoint.error().message;
+        const vdtree::FollowOptions follow{.cull_back_faces = true};
+        Cut whole(tree), both(tree);
+        whole.unfold_all();
+        ASSERT_TRUE(both.follow(*criterion, *viewpoint, follow));
+        EXPECT_LT(both.triangle_count(), whole.triangle_count());
+        for (const View& eye : eyes) {
+            Cut one(tree);
+            ASSERT_TRUE(one.follow(*criterion, vdtree::viewpoint_of(tree, eye), follow));
+            for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+                ASSERT_TRUE(both.is_unfolded(node) || !one.is_unfolded(node)) << node;
+            const oracle::Look as_seen{eye, options};
+            const perception::Image before = oracle::draw(*renderer, whole, eye),
+                                    after = oracle::draw(*renderer, both, eye);
+            const auto judged = oracle::judge(before, after, as_seen, perception::CsfModel::castle);
+            EXPECT_EQ(judged.visible_pixels, 0u) << oracle::words(look) << ", largest V " << judged.max_ratio;
+
+            std::printf("%u of %u triangles for both eyes, %u for one; largest V %.2f\n",
+                        static_cast<unsigned>(both.triangle_count()), static_cast<unsigned>(whole.triangle_count()),
+                        static_cast<unsigned>(one.triangle_count()), static_cast<double>(judged.max_ratio));
+        }
+    }
+}
+
+} // namespace
+} // namespace unseen
