@@ -22,6 +22,7 @@
 #include "model_file.h"
 #include "option_names.h"
 #include "options.h"
+#include "other_libraries.h"
 #include "output_files.h"
 #include "paged_memory.h"
 #include "process_team.h"
@@ -35,12 +36,17 @@ namespace {
 
 struct BuildArguments {
     std::string mesh, out, json;
-    vdtree::ClustererKind clusterer = vdtree::ClustererKind::quadric;
+    std::string clusterer_name = "quadric";
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
     TextureOptions texture;
+
+    bool is_by_openmesh() const { return clusterer_name == "openmesh"; }
+    vdtree::ClustererKind clusterer() const {
+        return clusterer_name == "octree" ? vdtree::ClustererKind::octree : vdtree::ClustererKind::quadric;
+    }
 };
 
 constexpr int most_threads = 1024;
@@ -98,7 +104,7 @@ int threads(const BuildArguments& a, const ProcessTeam* team) {
 // Members of a team share the cores of their machine; the first one gets all of them when the others are done.
 vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     vdtree::BuildOptions options;
-    options.clusterer = a.clusterer;
+    options.clusterer = a.clusterer();
     options.threads = a.threads;
     options.prelit = a.texture.is_prelit;
     if (team && team->size() > 1) {
@@ -140,7 +146,7 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
         return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
     }
     if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
-    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer); !ok) return ok.error();
+    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer()); !ok) return ok.error();
     return read;
 }
 
@@ -161,7 +167,7 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
 }
 
 Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& read, ProcessTeam* team) {
-    auto tree = build_tree_of(std::move(read), building(a, team));
+    auto tree = build_tree_of(std::move(read), building(a, team), a.is_by_openmesh() ? build_by_openmesh : TreeMaker());
     if (team && tree) team->leave(); // else the others go when this one ends
     return tree;
 }
@@ -192,7 +198,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     auto source = open_source(a, team);
     if (team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
-        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer) : 0);
+        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer()) : 0);
         if (!ok) {
             print_error(ok.error().message); // before anybody leaves: mpirun ends all when the first one fails
             team->leave();
@@ -229,7 +235,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
     const auto read = read_source(a, &team, read_quietly);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
-    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer) : 0);
+    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer()) : 0);
     if (ok)
         if (const auto helped = vdtree::help_build_tree(read->mesh.view(), building(a, &team)); !helped)
             return helped.error();
@@ -247,10 +253,22 @@ void keep_freed_memory() {
 }
 
 Result<int> run(const BuildArguments& a) {
+    if (a.is_by_openmesh() && a.memory_gib > 0)
+        return Error{ErrorCode::invalid_argument,
+                     "--memory does not know how much --clusterer openmesh needs: leave one of them out."};
+    if (a.is_by_openmesh() && !has_openmesh()) return build_by_openmesh({}, {}).error();
     if (a.memory_gib == 0) keep_freed_memory();
     const auto team = ProcessTeam::join();
     if (!team) return team.error();
     ProcessTeam* members = team->get();
+    if (a.is_by_openmesh() && members && members->size() > 1) {
+        const bool is_first = members->rank() == 0;
+        members->leave();
+        if (!is_first) return exit_failed;
+        return Error{
+            ErrorCode::invalid_argument,
+            "Several processes help with --clusterer quadric only: start one, or leave out --clusterer openmesh."};
+    }
     return members && members->rank() != 0 ? help(a, *members) : lead(a, members);
 }
 
@@ -261,10 +279,10 @@ Command build_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
-    add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
-        *verb, "--clusterer", a->clusterer,
-        {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
-        "quadric (best; default) or octree (fast)");
+    add_choice<std::string, std::string>(*verb, "--clusterer", a->clusterer_name,
+                                         {{"quadric", "quadric"}, {"octree", "octree"}, {"openmesh", "openmesh"}},
+                                         "quadric (best; default), octree (fast), or openmesh (the decimater of that "
+                                         "library; manifold surfaces only)");
     add_choice<meshio::ColourEncoding, meshio::ColourEncoding>(
         *verb, "--colours", a->colours,
         {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
