@@ -40,6 +40,8 @@ struct BuildArguments {
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
+    bool repairs = false;
+    double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's diagonal
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
     TextureOptions texture;
 
@@ -64,8 +66,9 @@ Json peak_bytes() {
     return nullptr;
 }
 
-Json to_json(const vdtree::VertexTree& tree, double seconds) {
-    return {{"vertices", tree.leaf_count()},
+Json to_json(const vdtree::VertexTree& tree, double seconds, const Json& repair) {
+    return {{"repair", repair},
+            {"vertices", tree.leaf_count()},
             {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()},
             {"nodes", tree.node_count()},
@@ -134,9 +137,11 @@ Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const
                                        options);
 }
 
-// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
+// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words. What is repaired
+// is told in `repair`.
 template <class ReadFile>
-Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
+Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file,
+                                       Repaired& repair) {
     const auto limit = MemoryLimit::set(a.memory_gib, a.out,
                                         a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
     if (!limit) return limit.error();
@@ -144,6 +149,12 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
     if (!read) {
         const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
         return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
+    }
+    if (a.repairs) {
+        auto repaired = repair_by_cgal(std::move(read->mesh), a.gap, a.largest_hole);
+        if (!repaired) return Error{repaired.error().code, a.mesh + ": " + repaired.error().message};
+        read->mesh = std::move(repaired->mesh);
+        repair = std::move(*repaired);
     }
     if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
     if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer()); !ok) return ok.error();
@@ -154,6 +165,7 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
 struct Source {
     JsonReport report;
     meshio::ReadResult read;
+    Repaired repair; // without its mesh
 };
 
 Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
@@ -161,9 +173,10 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
-    auto read = read_source(a, team, read_textured_mesh);
+    Repaired repair;
+    auto read = read_source(a, team, read_textured_mesh, repair);
     if (!read) return read.error();
-    return Source{std::move(*report), std::move(*read)};
+    return Source{std::move(*report), std::move(*read), std::move(repair)};
 }
 
 Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& read, ProcessTeam* team) {
@@ -217,10 +230,11 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     JsonReport& report = source->report;
-    if (auto ok = report.prepare(to_json(*tree, seconds)); !ok) return ok.error();
+    if (auto ok = report.prepare(to_json(*tree, seconds, source->repair.json)); !ok) return ok.error();
     if (auto ok = write(a.out, *tree); !ok) return ok.error();
     if (auto ok = report.publish(); !ok) return ok.error();
     if (report.is_on_stdout()) return exit_done;
+    if (a.repairs) print_line(source->repair.sentence);
     const std::string dropped = tree->dropped_triangles() == 0 ? std::string()
                                                                : " (" + grouped(tree->dropped_triangles()) +
                                                                      " that use a vertex twice were dropped)";
@@ -233,7 +247,8 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 
 // The others: they write nothing, and print nothing unless they fail alone.
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
-    const auto read = read_source(a, &team, read_quietly);
+    Repaired repair;
+    const auto read = read_source(a, &team, read_quietly, repair);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
     const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer()) : 0);
     if (ok)
@@ -257,6 +272,7 @@ Result<int> run(const BuildArguments& a) {
         return Error{ErrorCode::invalid_argument,
                      "--memory does not know how much --clusterer openmesh needs: leave one of them out."};
     if (a.is_by_openmesh() && !has_openmesh()) return build_by_openmesh({}, {}).error();
+    if (a.repairs && !has_cgal()) return repair_by_cgal({}, a.gap, a.largest_hole).error();
     if (a.memory_gib == 0) keep_freed_memory();
     const auto team = ProcessTeam::join();
     if (!team) return team.error();
@@ -287,6 +303,19 @@ Command build_command(CLI::App& app) {
         *verb, "--colours", a->colours,
         {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
         "How the file's colours are encoded: srgb (default) or linear");
+    CLI::Option* repairs = verb->add_flag("--repair", a->repairs,
+                                          "Before building: give parts one orientation, close cracks, cap small holes");
+    verb->add_option(
+            "--stitch", a->gap,
+            "With --repair: borders up to so far apart are joined, a share of the mesh's diagonal (default: 1e-6)")
+        ->type_name("SHARE")
+        ->check(CLI::Range(0.0, 0.01))
+        ->needs(repairs);
+    verb->add_option("--largest-hole", a->largest_hole,
+                     "With --repair: holes up to so large are capped, a share of the mesh's diagonal (default: 0.1)")
+        ->type_name("SHARE")
+        ->check(CLI::Range(0.0, 1.0))
+        ->needs(repairs);
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, most_threads));
@@ -310,7 +339,8 @@ Command build_command(CLI::App& app) {
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"
-                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg" +
+                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
+                 "  unseen build parts.stl -o parts.vdt --repair --largest-hole 0.02" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));
     return {verb, [a] { return run(*a); }};
 }
