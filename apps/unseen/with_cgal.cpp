@@ -3,6 +3,7 @@
 #include <unseen/repair/repair.h>
 
 #include "other_libraries.h"
+#include "terminal.h"
 
 namespace unseen::app {
 
