@@ -33,9 +33,11 @@ Result<ExactCheck> verify_by_cgal(const vdtree::VertexTree& tree, const Progress
 }
 
 std::string licence_notes() {
-    return "With CGAL's Surface_mesh and Polygon_mesh_processing, which are under the GPL, version 3 or later: whoever "
-           "passes on this build\nhas to do so under that licence, too. Configured with -DUNSEEN_WITH_CGAL=OFF it is "
-           "under the MIT licence alone.";
+    return "With CGAL's Surface_mesh and Polygon_mesh_processing (--repair), which are under the GPL, version 3 or "
+           "later:\n"
+           "whoever passes on this program has to do so under that licence. Configured with -DUNSEEN_WITH_CGAL=OFF it "
+           "is\n"
+           "under the MIT licence, beside those of the libraries that it links.";
 }
 
 } // namespace unseen::app

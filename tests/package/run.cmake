@@ -30,7 +30,8 @@ foreach(folder IN LISTS modules)
     endforeach()
 endforeach()
 run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE_DIR} -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix
-    -DWITH_RENDER=${WITH_RENDER} -DWITH_SESSION=${WITH_SESSION} -DCMAKE_BUILD_TYPE=Release)
+    -DWITH_RENDER=${WITH_RENDER} -DWITH_SESSION=${WITH_SESSION}
+    -DWITH_OPENMESH=${WITH_OPENMESH} -DWITH_CGAL=${WITH_CGAL} -DCMAKE_BUILD_TYPE=Release)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${WORK_DIR}/build/consumer)
 

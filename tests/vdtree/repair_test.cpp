@@ -69,16 +69,18 @@ TEST(Repair, AnOpenPartKeepsTheDirectionOfMost) {
     EXPECT_EQ(repaired->report.turned_triangles, (sheet.triangles.size() + 3) / 4);
 }
 
-TEST(Repair, ClosedPartsFaceOutwardAndCavitiesInward) {
+TEST(Repair, ClosedPartsFaceOutwardButForCavities) {
     const auto turned = repair(shapes::inside_out(shapes::unwelded(shapes::cube(3))));
     ASSERT_TRUE(turned);
     EXPECT_EQ(closedness(turned->mesh), Closedness::closed_outward);
-    // A small sphere within a large one, both outward.
     const Mesh outer = shapes::icosphere(2), inner = shapes::placed(shapes::icosphere(2), 0.25);
-    const auto hollow = repair(shapes::together(outer, inner));
+    const auto hollow = repair(shapes::together(shapes::inside_out(outer), shapes::inside_out(inner)));
     ASSERT_TRUE(hollow);
-    EXPECT_EQ(hollow->report.turned_triangles, inner.triangles.size());
+    EXPECT_EQ(hollow->report.turned_triangles, outer.triangles.size());
     EXPECT_EQ(examined(hollow->mesh).inside_out_components, 1u);
+    const auto eye_in_head = repair(shapes::together(outer, inner));
+    ASSERT_TRUE(eye_in_head);
+    EXPECT_EQ(eye_in_head->report.turned_triangles, 0u);
 }
 
 TEST(Repair, TurnsNormalsThatPointIntoTheSurfaceThen) {

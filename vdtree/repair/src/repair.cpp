@@ -285,7 +285,7 @@ private:
         }
     }
 
-    // Closed parts bound a volume.
+    // Closed parts that face inward are turned, but for those that are the walls of cavities.
     void face_outward() {
         const auto component = surface_.add_property_map<Face, std::size_t>("f:component", 0).first;
         const std::size_t count = pmp::connected_components(surface_, component);
@@ -308,9 +308,21 @@ private:
             face_of.push_back(face);
         }
         if (face_of.empty() || !CGAL::is_closed(closed)) return;
+        // Six times the volume, about a vertex of the part, for the sign.
+        std::vector<double> volume(count, 0);
+        std::vector<std::optional<Point>> centre(count);
+        for (const Face face : face_of) {
+            const Halfedge h = surface_.halfedge(face);
+            std::optional<Point>& from = centre[component[face]];
+            if (!from) from = surface_.point(surface_.source(h));
+            volume[component[face]] += CGAL::to_double(CGAL::determinant(
+                surface_.point(surface_.source(h)) - *from, surface_.point(surface_.target(h)) - *from,
+                surface_.point(surface_.target(surface_.next(h))) - *from));
+        }
         pmp::orient_to_bound_a_volume(closed);
         outward_.resize(surface_.num_faces(), 0);
         for (std::size_t i = 0; i < face_of.size(); ++i) {
+            if (!(volume[component[face_of[i]]] < 0)) continue; // a solid in another one is no cavity
             const Halfedge h = surface_.halfedge(face_of[i]);
             const Vertex from = vertex(surface_.source(h)), to = vertex(surface_.target(h));
             Halfedge there = closed.halfedge(Face(static_cast<Surface::size_type>(i)));

@@ -40,8 +40,9 @@ struct Repaired {
 
 // Topology is that of positions: vertices at equal positions are one, so seams of attributes are neither cracks nor
 // holes, and keep their attributes.
-//   orient: parts that edges connect get one orientation, that of most of their triangles; closed ones face outward,
-//     and cavities in them inward (CGAL's orient_polygon_soup and orient_to_bound_a_volume).
+//   orient: parts that edges connect get one orientation, that of most of their triangles; closed ones that face inward
+//     are turned outward, unless they lie in another one, whose cavity they are then (CGAL's orient_polygon_soup and
+//     orient_to_bound_a_volume).
 //   stitch: vertices of borders nearer than the gap move to one position.
 //   cap: small holes are filled with triangles between their own vertices (CGAL's triangulate_hole), which lie in the
 //     ranges (materials, groups) of a triangle beside the hole.
