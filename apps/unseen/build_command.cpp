@@ -41,7 +41,7 @@ struct BuildArguments {
     int threads = 0;
     double memory_gib = 0; // 0: no limit
     bool repairs = false;
-    double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's diagonal
+    double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's and the part's diagonal
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
     TextureOptions texture;
 
@@ -312,7 +312,7 @@ Command build_command(CLI::App& app) {
         ->check(CLI::Range(0.0, 0.01))
         ->needs(repairs);
     verb->add_option("--largest-hole", a->largest_hole,
-                     "With --repair: holes up to so large are capped, a share of the mesh's diagonal (default: 0.1)")
+                     "With --repair: holes up to so large are capped, a share of their part's diagonal (default: 0.1)")
         ->type_name("SHARE")
         ->check(CLI::Range(0.0, 1.0))
         ->needs(repairs);

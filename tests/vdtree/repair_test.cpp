@@ -125,6 +125,14 @@ TEST(Repair, CapsSmallHolesInTheMaterialBesideThem) {
     EXPECT_EQ(repair(mesh, {.caps = false})->mesh.triangles, mesh.triangles);
 }
 
+TEST(Repair, GivesSheetsNoBacks) {
+    const Mesh leaves = shapes::together(shapes::single_triangle(), shapes::placed(shapes::grid(4), 0.01, {50, 0, 0}));
+    const auto repaired = repair(leaves);
+    ASSERT_TRUE(repaired);
+    EXPECT_EQ(repaired->report.holes, 2u);
+    EXPECT_EQ(repaired->mesh.triangles, leaves.triangles);
+}
+
 TEST(Repair, ClosesCracksWithinTheGap) {
     Mesh mesh = shapes::unwelded(shapes::bumpy_sphere(3)); // each corner a little elsewhere
     std::mt19937_64 random(5);

@@ -252,11 +252,31 @@ private:
         return mesh_.triangles[triangle][0]; // cannot be: faces have the places of their triangles
     }
 
+    // By face: the diagonal of the box of the connected part that it is in.
+    std::vector<double> find_part_diagonals() {
+        const auto component = surface_.add_property_map<Face, std::size_t>("f:part", 0).first;
+        const std::size_t count = pmp::connected_components(surface_, component);
+        const glm::dvec3 far(std::numeric_limits<double>::infinity());
+        std::vector<glm::dvec3> low(count, far), high(count, -far);
+        for (const Face face : surface_.faces())
+            for (const Vertex v : CGAL::vertices_around_face(surface_.halfedge(face), surface_)) {
+                const Point& p = surface_.point(v);
+                const std::size_t part = component[face];
+                low[part] = glm::min(low[part], glm::dvec3(p.x(), p.y(), p.z()));
+                high[part] = glm::max(high[part], glm::dvec3(p.x(), p.y(), p.z()));
+            }
+        std::vector<double> diagonals(surface_.num_faces(), 0);
+        for (const Face face : surface_.faces())
+            diagonals[face] = glm::length(high[component[face]] - low[component[face]]);
+        return diagonals;
+    }
+
     void cap_holes() {
         std::vector<Halfedge> borders;
         pmp::extract_boundary_cycles(surface_, std::back_inserter(borders));
         report_.holes = borders.size();
-        if (!options_.caps) return;
+        if (!options_.caps || borders.empty()) return;
+        const std::vector<double> part_diagonal = find_part_diagonals();
         for (const Halfedge border : borders) {
             glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
             std::map<Vertex, Index> corner_at; // a vertex of the mesh for each of the surface
@@ -269,7 +289,8 @@ private:
                 corner_at.try_emplace(v, vertex_at(face_triangle_[surface_.face(surface_.opposite(h))], v));
                 ++edges;
             }
-            if (edges > most_hole_edges || !(glm::length(high - low) <= options_.largest_hole * diagonal_)) continue;
+            const double part = part_diagonal[surface_.face(surface_.opposite(border))];
+            if (edges > most_hole_edges || !(glm::length(high - low) <= options_.largest_hole * part)) continue;
             const Index beside = face_triangle_[surface_.face(surface_.opposite(border))];
             std::vector<Face> patch;
             pmp::triangulate_hole(surface_, border, std::back_inserter(patch));
@@ -431,7 +452,7 @@ Result<Repaired> repair(Mesh mesh, const Options& options) {
                      "The gap to stitch is a share of the mesh's diagonal, from 0 to 0.01."};
     if (!(options.largest_hole >= 0 && options.largest_hole <= 1))
         return Error{ErrorCode::invalid_argument,
-                     "The largest hole to cap is a share of the mesh's diagonal, from 0 to 1."};
+                     "The largest hole to cap is a share of its part's diagonal, from 0 to 1."};
     try {
         return Repairer(std::move(mesh), options).run();
     } catch (const CGAL::Failure_exception& failure) {

@@ -19,8 +19,8 @@ struct Options {
     // Vertices of borders up to so far apart become one position: a share of the diagonal of the mesh's box, 0..0.01.
     // The default is what is lost where coordinates are written with six digits. 0: only equal positions.
     double gap = 1e-6;
-    // Holes whose box has at most this diagonal get a cap: a share of that of the mesh's box, 0..1. Larger ones are
-    // openings that are meant.
+    // Holes whose box has at most this diagonal get a cap: a share of that of the connected part that they are in, 0..1.
+    // Larger ones are openings that are meant, and rims of sheets, which are as large as their part.
     double largest_hole = 0.1;
 };
 
