@@ -133,6 +133,19 @@ TEST(Repair, GivesSheetsNoBacks) {
     EXPECT_EQ(repaired->mesh.triangles, leaves.triangles);
 }
 
+TEST(Repair, CapsNoBordersThatNonManifoldEdgesHaveMade) {
+    // A leaf of one triangle on an edge of a sphere, and another one on all three corners of a triangle of it.
+    Mesh mesh = shapes::bumpy_sphere(3);
+    const Triangle t = mesh.triangles[0];
+    mesh.positions.emplace_back(mesh.positions[t[0]] * 1.05);
+    mesh.triangles.push_back({t[0], t[1], static_cast<Index>(mesh.positions.size() - 1)});
+    mesh.triangles.push_back({t[0], t[2], t[1]});
+    const auto repaired = repair(mesh);
+    ASSERT_TRUE(repaired);
+    EXPECT_EQ(repaired->report.cap_triangles, 0u);
+    EXPECT_EQ(repaired->mesh.triangles.size(), mesh.triangles.size());
+}
+
 TEST(Repair, ClosesCracksWithinTheGap) {
     Mesh mesh = shapes::unwelded(shapes::bumpy_sphere(3)); // each corner a little elsewhere
     std::mt19937_64 random(5);

@@ -196,6 +196,7 @@ private:
             if (uses_a_vertex_twice(at)) continue;
             triangles_.push_back(static_cast<Index>(t));
             polygons_.push_back({at[0], at[1], at[2]});
+            for (std::size_t k = 0; k < 3; ++k) ++edge_uses_[std::minmax(at[k], at[(k + 1) % 3])];
         }
     }
 
@@ -290,7 +291,15 @@ private:
                 ++edges;
             }
             const double part = part_diagonal[surface_.face(surface_.opposite(border))];
-            if (edges > most_hole_edges || !(glm::length(high - low) <= options_.largest_hole * part)) continue;
+            // Where CGAL has cut a non-manifold edge there is a border, but no hole.
+            const auto place = [&](Vertex v) { return places_->of_vertex[corner_at.at(v)]; };
+            bool is_cut = false;
+            for (const Halfedge h : CGAL::halfedges_around_face(border, surface_)) {
+                const Index from = place(surface_.source(h)), to = place(surface_.target(h));
+                is_cut = is_cut || edge_uses_.at({std::min(from, to), std::max(from, to)}) > 1;
+            }
+            if (is_cut || edges > most_hole_edges || !(glm::length(high - low) <= options_.largest_hole * part))
+                continue;
             const Index beside = face_triangle_[surface_.face(surface_.opposite(border))];
             std::vector<Face> patch;
             pmp::triangulate_hole(surface_, border, std::back_inserter(patch));
@@ -435,6 +444,7 @@ private:
     std::vector<Index> triangles_; // by polygon
     std::vector<Point> points_;    // places, then CGAL's own
     std::vector<std::array<std::size_t, 3>> polygons_;
+    std::map<std::pair<Index, Index>, int> edge_uses_; // by places: how many triangles there are at the edge
     Surface surface_;
     std::vector<Index> face_triangle_; // by face; of caps: the triangle beside the hole
     std::size_t own_faces_ = 0;        // faces that are triangles of the mesh; caps follow

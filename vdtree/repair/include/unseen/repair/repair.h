@@ -44,7 +44,7 @@ struct Repaired {
 //     are turned outward, unless they lie in another one, whose cavity they are then (CGAL's orient_polygon_soup and
 //     orient_to_bound_a_volume).
 //   stitch: vertices of borders nearer than the gap move to one position.
-//   cap: small holes are filled with triangles between their own vertices (CGAL's triangulate_hole), which lie in the
+//   cap: small holes, whose edges have one triangle each, are filled with triangles between their own vertices (CGAL's triangulate_hole), which lie in the
 //     ranges (materials, groups) of a triangle beside the hole.
 // Triangles that use a vertex twice, and duplicates, are left out; every other triangle and vertex stays, with its
 // attributes. Normals that point into the surface after their triangles have been turned are turned, too. Non-manifold
