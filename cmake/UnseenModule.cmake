@@ -68,6 +68,26 @@ function(unseen_install_pkg_config name)
         COMPONENT ${name})
 endfunction()
 
+# unseen_add_adapter(name HEADERS ... DEPENDS ...)
+#
+# Headers alone, for those who use another library as well: an interface `unseen_<name>`, named and installed alike.
+function(unseen_add_adapter name)
+    cmake_parse_arguments(arg "" "" "HEADERS;DEPENDS" ${ARGN})
+    set(target unseen_${name})
+    add_library(${target} INTERFACE)
+    add_library(unseen::${name} ALIAS ${target})
+    target_sources(${target} INTERFACE FILE_SET HEADERS BASE_DIRS include FILES ${arg_HEADERS})
+    target_compile_features(${target} INTERFACE cxx_std_20)
+    target_link_libraries(${target} INTERFACE ${arg_DEPENDS})
+    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+    if(UNSEEN_INSTALL)
+        install(TARGETS ${target} EXPORT unseen_${name}_targets
+            FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${name})
+        install(EXPORT unseen_${name}_targets NAMESPACE unseen:: FILE unseen_${name}_targets.cmake
+            DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen COMPONENT ${name})
+    endif()
+endfunction()
+
 function(unseen_set_compile_options target)
     target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
     # Position-independent code must not keep a module's own functions from being inlined: nobody replaces them at load time.

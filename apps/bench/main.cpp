@@ -17,6 +17,7 @@
 #include "effects_bench.h"
 #include "engine_bench.h"
 #include "fit_bench.h"
+#include "libraries_bench.h"
 #include "make_scene.h"
 #include "options.h"
 #include "output_files.h"
@@ -344,6 +345,29 @@ Command requests_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct LibrariesArguments {
+    std::vector<std::string> meshes;
+    ReportArguments report;
+};
+
+Result<int> run(LibrariesArguments& a) {
+    auto bench = BenchRun::open(a.meshes, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_libraries(a.meshes);
+    if (!result) return result.error();
+    return bench->close({{"rows", result->rows}}, {result->table});
+}
+
+Command libraries_command(CLI::App& app) {
+    auto a = std::make_shared<LibrariesArguments>();
+    CLI::App* verb =
+        app.add_subcommand("libraries", "OpenMesh's clusterer beside ours, and what CGAL's repair does to meshes");
+    verb->add_option("MESH", a->meshes, "Meshes as they come")->required()->type_name("MESH");
+    add_report_options(*verb, a->report);
+    verb->footer("Examples:\n  unseen-bench libraries teapot.obj bunny.ply");
+    return {verb, [a] { return run(*a); }};
+}
+
 struct FitArguments {
     FitBenchOptions options;
     ReportArguments report;
@@ -589,9 +613,9 @@ constexpr const char* examples = R"(Examples:
 int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
-        return std::vector<Command>{engine_command(app),  perception_command(app), effects_command(app),
-                                    budget_command(app),  requests_command(app),   fit_command(app),
-                                    people_command(app),  scenes_command(app),     selection_command(app),
-                                    accuracy_command(app)};
+        return std::vector<Command>{engine_command(app),   perception_command(app), effects_command(app),
+                                    budget_command(app),   requests_command(app),   fit_command(app),
+                                    people_command(app),   scenes_command(app),     selection_command(app),
+                                    accuracy_command(app), libraries_command(app)};
     });
 }

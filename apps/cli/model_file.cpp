@@ -45,11 +45,12 @@ Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file,
     return session::read_textured_mesh(file, load_options(texture, bar), options);
 }
 
-Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options) {
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options,
+                                         const TreeMaker& build) {
     ProgressBar bar("building");
     options.progress = std::ref(bar);
     options.dropped_before = read.dropped_triangles;
-    return vdtree::build_tree(read.mesh.view(), options);
+    return build ? build(read.mesh.view(), options) : vdtree::build_tree(read.mesh.view(), options);
 }
 
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {

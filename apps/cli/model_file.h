@@ -19,8 +19,11 @@ Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, boo
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options,
                                               const TextureOptions& texture);
 
-// The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
-Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options);
+// The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones. `build` makes it, where that
+// is not vdtree::build_tree().
+using TreeMaker = Callback<Result<vdtree::VertexTree>(const vdtree::MeshView&, const vdtree::BuildOptions&)>;
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options,
+                                         const TreeMaker& build = {});
 
 // A tree file, or the tree of a mesh file as build_tree() makes it, built now and kept nowhere.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file);

@@ -22,6 +22,7 @@
 #include "model_file.h"
 #include "option_names.h"
 #include "options.h"
+#include "other_libraries.h"
 #include "output_files.h"
 #include "paged_memory.h"
 #include "process_team.h"
@@ -35,12 +36,19 @@ namespace {
 
 struct BuildArguments {
     std::string mesh, out, json;
-    vdtree::ClustererKind clusterer = vdtree::ClustererKind::quadric;
+    std::string clusterer_name = "quadric";
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
+    bool repairs = false;
+    double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's and the part's diagonal
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
     TextureOptions texture;
+
+    bool is_by_openmesh() const { return clusterer_name == "openmesh"; }
+    vdtree::ClustererKind clusterer() const {
+        return clusterer_name == "octree" ? vdtree::ClustererKind::octree : vdtree::ClustererKind::quadric;
+    }
 };
 
 constexpr int most_threads = 1024;
@@ -58,8 +66,9 @@ Json peak_bytes() {
     return nullptr;
 }
 
-Json to_json(const vdtree::VertexTree& tree, double seconds) {
-    return {{"vertices", tree.leaf_count()},
+Json to_json(const vdtree::VertexTree& tree, double seconds, const Json& repair) {
+    return {{"repair", repair},
+            {"vertices", tree.leaf_count()},
             {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()},
             {"nodes", tree.node_count()},
@@ -98,7 +107,7 @@ int threads(const BuildArguments& a, const ProcessTeam* team) {
 // Members of a team share the cores of their machine; the first one gets all of them when the others are done.
 vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     vdtree::BuildOptions options;
-    options.clusterer = a.clusterer;
+    options.clusterer = a.clusterer();
     options.threads = a.threads;
     options.prelit = a.texture.is_prelit;
     if (team && team->size() > 1) {
@@ -128,9 +137,11 @@ Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const
                                        options);
 }
 
-// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
+// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words. What is repaired
+// is told in `repair`.
 template <class ReadFile>
-Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
+Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file,
+                                       Repaired& repair) {
     const auto limit = MemoryLimit::set(a.memory_gib, a.out,
                                         a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
     if (!limit) return limit.error();
@@ -139,8 +150,14 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
         const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
         return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
     }
+    if (a.repairs) {
+        auto repaired = repair_by_cgal(std::move(read->mesh), a.gap, a.largest_hole);
+        if (!repaired) return Error{repaired.error().code, a.mesh + ": " + repaired.error().message};
+        read->mesh = std::move(repaired->mesh);
+        repair = std::move(*repaired);
+    }
     if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
-    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer); !ok) return ok.error();
+    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer()); !ok) return ok.error();
     return read;
 }
 
@@ -148,6 +165,7 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
 struct Source {
     JsonReport report;
     meshio::ReadResult read;
+    Repaired repair; // without its mesh
 };
 
 Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
@@ -155,13 +173,14 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
-    auto read = read_source(a, team, read_textured_mesh);
+    Repaired repair;
+    auto read = read_source(a, team, read_textured_mesh, repair);
     if (!read) return read.error();
-    return Source{std::move(*report), std::move(*read)};
+    return Source{std::move(*report), std::move(*read), std::move(repair)};
 }
 
 Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& read, ProcessTeam* team) {
-    auto tree = build_tree_of(std::move(read), building(a, team));
+    auto tree = build_tree_of(std::move(read), building(a, team), a.is_by_openmesh() ? build_by_openmesh : TreeMaker());
     if (team && tree) team->leave(); // else the others go when this one ends
     return tree;
 }
@@ -192,7 +211,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     auto source = open_source(a, team);
     if (team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
-        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer) : 0);
+        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer()) : 0);
         if (!ok) {
             print_error(ok.error().message); // before anybody leaves: mpirun ends all when the first one fails
             team->leave();
@@ -211,10 +230,11 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     JsonReport& report = source->report;
-    if (auto ok = report.prepare(to_json(*tree, seconds)); !ok) return ok.error();
+    if (auto ok = report.prepare(to_json(*tree, seconds, source->repair.json)); !ok) return ok.error();
     if (auto ok = write(a.out, *tree); !ok) return ok.error();
     if (auto ok = report.publish(); !ok) return ok.error();
     if (report.is_on_stdout()) return exit_done;
+    if (a.repairs) print_line(source->repair.sentence);
     const std::string dropped = tree->dropped_triangles() == 0 ? std::string()
                                                                : " (" + grouped(tree->dropped_triangles()) +
                                                                      " that use a vertex twice were dropped)";
@@ -227,9 +247,10 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 
 // The others: they write nothing, and print nothing unless they fail alone.
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
-    const auto read = read_source(a, &team, read_quietly);
+    Repaired repair;
+    const auto read = read_source(a, &team, read_quietly, repair);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
-    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer) : 0);
+    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer()) : 0);
     if (ok)
         if (const auto helped = vdtree::help_build_tree(read->mesh.view(), building(a, &team)); !helped)
             return helped.error();
@@ -247,10 +268,23 @@ void keep_freed_memory() {
 }
 
 Result<int> run(const BuildArguments& a) {
+    if (a.is_by_openmesh() && a.memory_gib > 0)
+        return Error{ErrorCode::invalid_argument,
+                     "--memory does not know how much --clusterer openmesh needs: leave one of them out."};
+    if (a.is_by_openmesh() && !has_openmesh()) return build_by_openmesh({}, {}).error();
+    if (a.repairs && !has_cgal()) return repair_by_cgal({}, a.gap, a.largest_hole).error();
     if (a.memory_gib == 0) keep_freed_memory();
     const auto team = ProcessTeam::join();
     if (!team) return team.error();
     ProcessTeam* members = team->get();
+    if (a.is_by_openmesh() && members && members->size() > 1) {
+        const bool is_first = members->rank() == 0;
+        members->leave();
+        if (!is_first) return exit_failed;
+        return Error{
+            ErrorCode::invalid_argument,
+            "Several processes help with --clusterer quadric only: start one, or leave out --clusterer openmesh."};
+    }
     return members && members->rank() != 0 ? help(a, *members) : lead(a, members);
 }
 
@@ -261,14 +295,27 @@ Command build_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
-    add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
-        *verb, "--clusterer", a->clusterer,
-        {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
-        "quadric (best; default) or octree (fast)");
+    add_choice<std::string, std::string>(*verb, "--clusterer", a->clusterer_name,
+                                         {{"quadric", "quadric"}, {"octree", "octree"}, {"openmesh", "openmesh"}},
+                                         "quadric (best; default), octree (fast), or openmesh (the decimater of that "
+                                         "library; manifold surfaces only)");
     add_choice<meshio::ColourEncoding, meshio::ColourEncoding>(
         *verb, "--colours", a->colours,
         {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
         "How the file's colours are encoded: srgb (default) or linear");
+    CLI::Option* repairs = verb->add_flag("--repair", a->repairs,
+                                          "Before building: give parts one orientation, close cracks, cap small holes");
+    verb->add_option(
+            "--stitch", a->gap,
+            "With --repair: borders up to so far apart are joined, a share of the mesh's diagonal (default: 1e-6)")
+        ->type_name("SHARE")
+        ->check(CLI::Range(0.0, 0.01))
+        ->needs(repairs);
+    verb->add_option("--largest-hole", a->largest_hole,
+                     "With --repair: holes up to so large are capped, a share of their part's diagonal (default: 0.1)")
+        ->type_name("SHARE")
+        ->check(CLI::Range(0.0, 1.0))
+        ->needs(repairs);
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, most_threads));
@@ -292,7 +339,8 @@ Command build_command(CLI::App& app) {
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"
-                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg" +
+                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
+                 "  unseen build parts.stl -o parts.vdt --repair --largest-hole 0.02" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));
     return {verb, [a] { return run(*a); }};
 }

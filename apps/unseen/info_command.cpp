@@ -1,8 +1,10 @@
 // unseen info: what a mesh or a tree is, and whether it is sound.
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include <unseen/meshio/examine.h>
 #include <unseen/meshio/mesh_io.h>
@@ -10,6 +12,7 @@
 
 #include "model_file.h"
 #include "options.h"
+#include "other_libraries.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "session_options.h"
@@ -21,7 +24,7 @@ namespace {
 
 struct InfoArguments {
     std::string file;
-    bool verify = false, json = false, is_verbose = false;
+    bool verify = false, is_exact = false, json = false, is_verbose = false;
     session::LoadAs as = session::LoadAs::automatic;
 };
 
@@ -150,6 +153,13 @@ Result<int> describe_tree(const InfoArguments& a) {
         if (auto sound = vdtree::verify(*tree); !sound)
             return Error{sound.error().code, a.file + ": " + sound.error().message};
     }
+    std::optional<ExactCheck> exact;
+    if (a.is_exact) {
+        ProgressBar bar("checking exactly");
+        auto checked = verify_by_cgal(*tree, std::ref(bar));
+        if (!checked) return Error{checked.error().code, a.file + ": " + checked.error().message};
+        exact = *checked;
+    }
     const auto arrays = arrays_of(*tree);
     if (!arrays) return Error{arrays.error().code, a.file + ": " + arrays.error().message};
     const std::uint64_t file_bytes = file_bytes_of(a.file);
@@ -167,6 +177,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                  {"arrays", arrays_json(*arrays)},
                  {"ranges", tree->ranges().size()}};
     if (a.verify) json["verified"] = true;
+    if (exact) json["verified_exactly"] = {{"comparisons", exact->comparisons}, {"in_rationals", exact->in_rationals}};
     Rows rows = {
         {"kind", "tree"},
         {"vertices", grouped(tree->leaf_count())},
@@ -181,6 +192,9 @@ Result<int> describe_tree(const InfoArguments& a) {
         {"texture", texture_text(*tree)},
         {"groups and materials", grouped(tree->ranges().size())}};
     if (a.verify) rows.push_back({"verified", "sound"});
+    if (exact)
+        rows.push_back({"in exact arithmetic", "sound: " + grouped(exact->comparisons) + " comparisons, " +
+                                                   grouped(exact->in_rationals) + " of them in rationals"});
     output(a.json, json, rows);
     if (!a.json) print_arrays(*arrays);
     return exit_done;
@@ -400,6 +414,10 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
 
 Result<int> run(const InfoArguments& a) {
     if (vdtree::is_tree_file(a.file)) return describe_tree(a);
+    if (a.is_exact)
+        return Error{ErrorCode::invalid_argument, a.file +
+                                                      " is no tree, and --exact checks the bounds of trees: build one "
+                                                      "of it, or leave --exact out."};
     if (a.as == session::LoadAs::scene && !meshio::is_gltf_file(a.file))
         return Error{ErrorCode::invalid_argument,
                      a.file + " is no glTF file (.glb, .gltf), and only these are scenes: leave --as out."};
@@ -421,7 +439,10 @@ Command info_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("info", "Say what a mesh, a tree or a scene holds, and what is wrong with it");
     verb->add_option("FILE", a->file, "A mesh, a tree or a scene")->required()->type_name("MESH|TREE.vdt|SCENE.glb");
     add_as_option(*verb, a->as);
-    verb->add_flag("--verify", a->verify, "Check everything: checksums, ranges, nesting of the bounds");
+    CLI::Option* verify =
+        verb->add_flag("--verify", a->verify, "Check everything: checksums, ranges, nesting of the bounds");
+    verb->add_flag("--exact", a->is_exact, "With --verify, of a tree: check the bounds in exact arithmetic, too")
+        ->needs(verify);
     verb->add_flag("--json", a->json, "JSON instead of a table");
     verb->add_flag("--verbose", a->is_verbose, "Of a mesh: counts of zero as well; of a scene: all meshes");
     verb->footer(

@@ -1,4 +1,7 @@
 // The command `unseen`.
+#include <string>
+
+#include "other_libraries.h"
 #include "program.h"
 #include "verbs.h"
 
@@ -20,8 +23,10 @@ constexpr const char* examples = R"(Examples:
 
 int main(int argc, char** argv) {
     using namespace unseen::app;
+    const std::string notes = licence_notes();
+    const std::string version = UNSEEN_VERSION + (notes.empty() ? notes : "\n" + notes);
     const Program program{
-        "unseen", about, examples, UNSEEN_VERSION, {{"bench", "measuring is a program of its own, unseen-bench."}}};
+        "unseen", about, examples, version.c_str(), {{"bench", "measuring is a program of its own, unseen-bench."}}};
     return run_program(argc, argv, program, [](CLI::App& app) {
         return std::vector<Command>{
             build_command(app),     info_command(app),    simplify_command(app), render_command(app),

@@ -55,7 +55,7 @@ TEST_F(UsageTest, EveryVerbHasHelpWithExamples) {
 TEST_F(UsageTest, SaysItsVersion) {
     const Outcome version = run({"--version"});
     EXPECT_EQ(version.status, 0);
-    EXPECT_THAT(version.out, ::testing::MatchesRegex("unseen [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+    EXPECT_THAT(version.out, ::testing::MatchesRegex("unseen [0-9]+\\.[0-9]+\\.[0-9]+\n(With CGAL's .* GPL.*\n)?"));
 }
 
 TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
@@ -263,6 +263,51 @@ TEST_F(BuildTest, ReportsATreeWithEitherClusterer) {
         EXPECT_EQ(verified.status, 0) << verified.err;
         EXPECT_EQ(verified.json()["closed"], true);
     }
+}
+
+bool is_missing(const Outcome& outcome) { return outcome.err.find("for it was made without") != std::string::npos; }
+
+TEST_F(BuildTest, TakesOpenMeshsDecimater) {
+    write_ball("ball.obj");
+    const Outcome built = run({"build", "ball.obj", "-o", "t.vdt", "--clusterer", "openmesh", "--json", "-"});
+    if (is_missing(built)) GTEST_SKIP() << built.err;
+    ASSERT_EQ(built.status, 0) << built.err;
+    EXPECT_EQ(built.json()["triangles"], ball_triangles);
+    EXPECT_EQ(run({"info", "t.vdt", "--verify"}).status, 0);
+    const Outcome limited = run({"build", "ball.obj", "-o", "u.vdt", "--clusterer", "openmesh", "--memory", "1"});
+    EXPECT_EQ(limited.status, 1);
+    EXPECT_THAT(limited.err, HasSubstr("--memory"));
+    write_text(path("pages.obj"), "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
+    const Outcome refused = run({"build", "pages.obj", "-o", "p.vdt", "--clusterer", "openmesh"});
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.err, HasSubstr("manifold"));
+    EXPECT_THAT(files(), Not(::testing::Contains("p.vdt")));
+}
+
+TEST_F(BuildTest, RepairsWhereAsked) {
+    // A cube of which one square faces inward and another one is not there.
+    write_text(path("box.obj"), "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+                                "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 2 6 7 3\n");
+    const Outcome built = run({"build", "box.obj", "-o", "box.vdt", "--repair", "--largest-hole", "1", "--json", "-"});
+    if (is_missing(built)) GTEST_SKIP() << built.err;
+    ASSERT_EQ(built.status, 0) << built.err;
+    const Json report = built.json();
+    EXPECT_EQ(report["triangles"], 12);
+    EXPECT_EQ(report["repair"]["turned_triangles"], 2);
+    EXPECT_EQ(report["repair"]["capped_holes"], 1);
+    const Outcome info = run({"info", "box.vdt", "--verify", "--exact", "--json"});
+    ASSERT_EQ(info.status, 0) << info.err;
+    const Json found = info.json();
+    EXPECT_EQ(found["closed"], true);
+    EXPECT_GT(found["verified_exactly"]["comparisons"], 0);
+    const Outcome plain = run({"build", "box.obj", "-o", "plain.vdt"});
+    EXPECT_THAT(plain.out, Not(HasSubstr("repaired")));
+    EXPECT_EQ(run({"build", "box.obj", "-o", "b.vdt", "--largest-hole", "0.5"}).status, 2) << "without --repair";
+    EXPECT_EQ(run({"build", "box.obj", "-o", "b.vdt", "--repair", "--stitch", "0.5"}).status, 2);
+    EXPECT_EQ(run({"info", "box.vdt", "--exact"}).status, 2) << "without --verify";
+    const Outcome no_tree = run({"info", "box.obj", "--verify", "--exact"});
+    EXPECT_EQ(no_tree.status, 1);
+    EXPECT_THAT(no_tree.err, HasSubstr("is no tree"));
 }
 
 TEST_F(BuildTest, TheTreeDoesNotDependOnTheThreads) {

@@ -91,7 +91,7 @@ foreach(compiler IN LISTS compilers)
     file(REMOVE_RECURSE ${WORK_DIR}/build)
     run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE_DIR} -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${prefix}
         -DCMAKE_CXX_COMPILER=${compiler} -DCMAKE_CXX_FLAGS=-Werror -DWITH_RENDER=${WITH_RENDER} -DWITH_SESSION=${WITH_SESSION}
-        -DCMAKE_BUILD_TYPE=Release)
+        -DWITH_OPENMESH=${WITH_OPENMESH} -DWITH_CGAL=${WITH_CGAL} -DCMAKE_BUILD_TYPE=Release)
     run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
     run(${WORK_DIR}/build/consumer)
     if(NOT pkg_config)

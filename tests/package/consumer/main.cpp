@@ -10,6 +10,15 @@
 #ifdef WITH_SESSION
 #include <unseen/session/session.h>
 #endif
+#ifdef WITH_OPENMESH
+#include <unseen/openmesh/openmesh.h>
+#endif
+#ifdef WITH_CGAL
+#include <CGAL/Simple_cartesian.h>
+#include <unseen/cgal/cgal.h>
+#include <unseen/exact/exact.h>
+#include <unseen/repair/repair.h>
+#endif
 #if defined(WITH_RENDER) && defined(WITH_SESSION)
 #include <unseen/session_gpu/session_gpu.h>
 #endif
@@ -41,6 +50,21 @@ int main() {
     if (!session) return std::printf("%s\n", session.error().message.c_str()), 1;
     const auto whole = session->simplify({.goal = session::Goal::full()});
     if (!whole || whole->mesh().triangles.size() != 4) return std::printf("the session lost a face\n"), 1;
+#endif
+#ifdef WITH_OPENMESH
+    cut.unfold_all();
+    const auto half = openmesh::extract_mesh<OpenMesh::TriMesh_ArrayKernelT<>>(cut);
+    if (!half || half->mesh.n_faces() != 4 || !openmesh::build_tree(half->mesh))
+        return std::printf("OpenMesh lost a face\n"), 1;
+#endif
+#ifdef WITH_CGAL
+    cut.unfold_all();
+    const auto surface = cgal::extract_mesh<CGAL::Surface_mesh<CGAL::Simple_cartesian<double>::Point_3>>(cut);
+    if (!surface || surface->mesh.number_of_faces() != 4 || !cgal::build_tree(surface->mesh))
+        return std::printf("CGAL lost a face\n"), 1;
+    const auto repaired = repair::repair(vdtree::extract_mesh(cut));
+    if (!repaired || repaired->mesh.triangles.size() != 4) return std::printf("the repair lost a face\n"), 1;
+    if (!exact::verify_exactly(*tree)) return std::printf("the tetrahedron's bounds are wrong\n"), 1;
 #endif
 #if defined(WITH_RENDER) && defined(WITH_SESSION)
     if (session::visibility_tables(*perception::judge_tables(64, 64, 1, 100, {})).bands.empty())
