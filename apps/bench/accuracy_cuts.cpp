@@ -274,7 +274,8 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
         if (!other) return other.error();
         auto renderer = session::SceneRenderer::create(subject.context, *other);
         if (!renderer) return renderer.error();
-        const auto frame = renderer->draw(session::drawn_cuts(session::whole_cuts(*other)), subject.view, pictures->drawing());
+        const auto frame =
+            renderer->draw(session::drawn_cuts(session::whole_cuts(*other)), subject.view, pictures->drawing());
         if (!frame) return frame.error();
         const auto seen = pictures->judge(*frame);
         if (!seen) return seen.error();
