@@ -55,7 +55,9 @@ TEST_F(LodCommandTest, OneFileHasAllLevelsAndOthersOneEach) {
     for (std::size_t i = 0; i < levels.size(); ++i) {
         const auto node = i == 0 ? root : ids[i - 1].get<std::size_t>();
         EXPECT_EQ(triangles_below(file, node), levels[i]["triangles"]) << i;
-        if (i > 0) EXPECT_EQ(coverages[i - 1], levels[i]["coverage"]) << i;
+        if (i > 0) {
+            EXPECT_EQ(coverages[i - 1], levels[i]["coverage"]) << i;
+        }
         const std::string name = "out_lod" + std::to_string(i) + ".glb";
         const Json alone = document(name);
         EXPECT_FALSE(alone.contains("extensionsUsed")) << name;
@@ -66,8 +68,6 @@ TEST_F(LodCommandTest, OneFileHasAllLevelsAndOthersOneEach) {
     const std::string csv = read_text(path("out.csv"));
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), levels.size() + 1);
     // Who does not know the extension sees the full mesh alone.
-    const Json seen = run({"info", "out.glb", "--json", "-"}).json();
-    EXPECT_FALSE(seen.is_discarded());
     EXPECT_EQ(run({"simplify", "out.glb", "-o", "x.ply", "--full", "--json", "-"}).json()["triangles"],
               levels[0]["triangles"]);
 }
