@@ -21,12 +21,12 @@ using namespace unseen::session;
 using ::testing::HasSubstr;
 using LodTest = render::testing::GlTest;
 
-Session bumpy(Observer observer = {}) {
+Session bumpy() {
     Scene scene;
     scene.objects.push_back(Object{support::measured(support::built(shapes::bumpy_sphere(5, 0.05)))});
     scene.objects[0].placement.translation = {3, 1, -2};
     scene.objects[0].placement.scale = 2;
-    auto session = Session::create(std::move(scene), std::move(observer));
+    auto session = Session::create(std::move(scene));
     EXPECT_TRUE(session) << session.error().message;
     return std::move(*session);
 }
@@ -96,16 +96,6 @@ TEST_F(LodTest, WhatHasNoUnseenLevelSaysSo) {
     EXPECT_EQ(lod->objects[0].levels.size(), 1u);
     ASSERT_FALSE(lod->objects[0].notes.empty());
     EXPECT_THAT(lod->objects[0].notes.back(), HasSubstr("no level below the full mesh"));
-}
-
-TEST_F(LodTest, LevelsThatCannotBeToldApartAreMerged) {
-    Observer observer; // of a display so small that several levels are unseen before the object fits on it
-    observer.display.width_px = observer.display.height_px = 130;
-    Session session = bumpy(std::move(observer));
-    const auto lod = make_levels(session, context(), {.chain = {.levels = 5}, .directions = 1, .samples = 4});
-    ASSERT_TRUE(lod) << lod.error().message;
-    EXPECT_LT(lod->objects[0].levels.size(), 5u);
-    EXPECT_THAT(lod->objects[0].notes, ::testing::Contains(HasSubstr("merged")));
 }
 
 TEST_F(LodTest, OptionsOutOfRangeAreErrors) {
