@@ -3,8 +3,9 @@
 
 #include <algorithm>
 
+#include <unseen/session_gpu/picture_judge.h>
+
 #include "bench_tools.h"
-#include "picture_judge.h"
 #include "terminal.h"
 #include "tree_walk.h"
 
@@ -30,7 +31,7 @@ Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyB
         return session::Gaze{session::gaze_aside(session.observer().display, subject.view, degrees), margin};
     };
     session.set_gaze(gaze_at(0, 0));
-    auto judge = PictureJudge::create(subject.context, session, subject.view, options.samples);
+    auto judge = session::PictureJudge::create(subject.context, session, subject.view, options.samples);
     if (!judge) return judge.error();
     AccuracyPoints points;
     const auto add = [&](const std::string& name, std::optional<session::Gaze> gaze, bool is_default) -> Result<void> {

@@ -9,13 +9,13 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 
 #include "bench_tools.h"
 #include "peer_simplify.h"
-#include "picture_judge.h"
 #include "surface_distance.h"
 #include "terminal.h"
 
@@ -246,7 +246,7 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
             return made.error();
         auto session = session_of(*tree);
         if (!session) return session.error();
-        auto pictures = PictureJudge::create(subject.context, *session, subject.view, options.samples);
+        auto pictures = session::PictureJudge::create(subject.context, *session, subject.view, options.samples);
         if (!pictures) return pictures.error();
         const auto verdict = pictures->judge(std::span(&cut, 1));
         if (!verdict) return verdict.error();
@@ -274,7 +274,8 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
         if (!other) return other.error();
         auto renderer = session::SceneRenderer::create(subject.context, *other);
         if (!renderer) return renderer.error();
-        const auto frame = renderer->draw(session::drawn_cuts(whole_cuts(*other)), subject.view, pictures->drawing());
+        const auto frame =
+            renderer->draw(session::drawn_cuts(session::whole_cuts(*other)), subject.view, pictures->drawing());
         if (!frame) return frame.error();
         const auto seen = pictures->judge(*frame);
         if (!seen) return seen.error();

@@ -13,12 +13,12 @@
 
 #include <unseen/session/level_chain.h>
 #include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/tradeoff.h>
 #include <unseen/vdtree/builder.h>
 
 #include "bench_tools.h"
 #include "peer_simplify.h"
-#include "picture_judge.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -47,7 +47,7 @@ TreeBytes bytes_a_triangle(const session::Session& session) {
 // What is drawn beside measure_tradeoff()'s own ways: the same columns.
 class Others {
 public:
-    Others(AccuracySubject& subject, const AccuracyBenchOptions& options, PictureJudge judge)
+    Others(AccuracySubject& subject, const AccuracyBenchOptions& options, session::PictureJudge judge)
         : subject_(subject), options_(options), judge_(std::move(judge)) {}
 
     Result<AccuracyPoint> point(const std::string& name, const std::vector<vdtree::Cut>& cuts, double preparation_s,
@@ -84,7 +84,7 @@ public:
 private:
     AccuracySubject& subject_;
     const AccuracyBenchOptions& options_;
-    PictureJudge judge_;
+    session::PictureJudge judge_;
 };
 
 // Discrete levels of each object, those of one tree made once.
@@ -238,7 +238,7 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
              .note = p.is_of_view ? "this view alone" : "",
              .is_default = p.name == "imperceptible"});
     }
-    auto judge = PictureJudge::create(subject.context, subject.session, subject.view, measured->samples);
+    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, measured->samples);
     if (!judge) return judge.error();
     Others others(subject, options, std::move(*judge));
     const auto add = [&](Result<AccuracyPoint> point) -> Result<void> {

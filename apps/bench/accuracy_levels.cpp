@@ -4,10 +4,10 @@
 #include <algorithm>
 
 #include <unseen/session_gpu/level_control.h>
+#include <unseen/session_gpu/picture_judge.h>
 
 #include "bench_tools.h"
 #include "level_cuts.h"
-#include "picture_judge.h"
 #include "terminal.h"
 #include "tree_walk.h"
 
@@ -20,7 +20,7 @@ Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenc
     vdtree::View first = subject.view;
     first.width = std::max(first.width / 2, 1), first.height = std::max(first.height / 2, 1);
     const vdtree::View last = view_on_walk(first, frames);
-    auto judge = PictureJudge::create(subject.context, subject.session, last, options.samples);
+    auto judge = session::PictureJudge::create(subject.context, subject.session, last, options.samples);
     if (!judge) return judge.error();
     AccuracyPoints points;
     const auto add = [&](const std::string& name, const LevelControlOptions& how, bool is_default) -> Result<void> {

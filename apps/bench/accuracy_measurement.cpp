@@ -6,11 +6,11 @@
 #include <optional>
 
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 
 #include "bench_tools.h"
-#include "picture_judge.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -31,7 +31,7 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
     constexpr vdtree::Index most_triangles = 200'000;
     const vdtree::VertexTree& tree = subject.session.tree();
     if (tree.triangle_count() > most_triangles || !tree.texture().empty()) return AccuracyPoints();
-    auto judge = PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
+    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
     if (!judge) return judge.error();
     AccuracyPoints points;
     const auto add = [&](const std::string& name, const std::function<Result<vdtree::VertexTree>()>& measure,

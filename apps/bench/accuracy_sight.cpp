@@ -17,10 +17,10 @@
 #include <unseen/render/visibility.h>
 #include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
 #include "bench_tools.h"
-#include "picture_judge.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -274,7 +274,7 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
     render::DrawOptions drawing;
     drawing.samples = std::min(options.samples, 16);
     drawing.background = subject.session.background();
-    const auto whole = whole_cuts(subject.session);
+    const auto whole = session::whole_cuts(subject.session);
     const auto frame = renderer->draw(session::drawn_cuts(whole), subject.view, drawing);
     if (!frame) return frame.error();
     const perception::Image picture = session::luminance_image(*frame, observer.display);

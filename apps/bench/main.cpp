@@ -18,6 +18,7 @@
 #include "engine_bench.h"
 #include "fit_bench.h"
 #include "libraries_bench.h"
+#include "lod_bench.h"
 #include "make_scene.h"
 #include "options.h"
 #include "output_files.h"
@@ -368,6 +369,32 @@ Command libraries_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct LodBenchArguments {
+    std::vector<std::string> models;
+    int levels = 5;
+    ReportArguments report;
+};
+
+Result<int> run(LodBenchArguments& a) {
+    auto bench = BenchRun::open(a.models, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_lod(a.models, a.levels);
+    if (!result) return result.error();
+    return bench->close({{"rows", result->rows}}, {result->table});
+}
+
+Command lod_bench_command(CLI::App& app) {
+    auto a = std::make_shared<LodBenchArguments>();
+    CLI::App* verb = app.add_subcommand("lod", "What levels of detail show at their distances, beside meshoptimizer's");
+    verb->add_option("MODEL", a->models, "Meshes or trees")->required()->type_name("TREE.vdt|MESH");
+    verb->add_option("--levels", a->levels, "At most, with the full mesh (default: 5)")
+        ->type_name("N")
+        ->check(whole(2, session::most_levels));
+    add_report_options(*verb, a->report);
+    verb->footer("Examples:\n  unseen-bench lod bunny.ply horse.ply --markdown");
+    return {verb, [a] { return run(*a); }};
+}
+
 struct FitArguments {
     FitBenchOptions options;
     ReportArguments report;
@@ -613,9 +640,9 @@ constexpr const char* examples = R"(Examples:
 int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
-        return std::vector<Command>{engine_command(app),   perception_command(app), effects_command(app),
-                                    budget_command(app),   requests_command(app),   fit_command(app),
-                                    people_command(app),   scenes_command(app),     selection_command(app),
-                                    accuracy_command(app), libraries_command(app)};
+        return std::vector<Command>{engine_command(app),    perception_command(app), effects_command(app),
+                                    budget_command(app),    requests_command(app),   lod_bench_command(app),
+                                    fit_command(app),       people_command(app),     scenes_command(app),
+                                    selection_command(app), accuracy_command(app),   libraries_command(app)};
     });
 }

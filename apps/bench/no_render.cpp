@@ -2,6 +2,7 @@
 #include "accuracy_bench.h"
 #include "budget_bench.h"
 #include "fit_bench.h"
+#include "lod_bench.h"
 #include "perception_bench.h"
 #include "requests_bench.h"
 #include "scenes_bench.h"
@@ -20,6 +21,7 @@ Error no_pictures() {
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { return no_pictures(); }
 Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
+Result<LodBenchResult> bench_lod(const std::vector<std::string>&, int) { return no_pictures(); }
 Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }

@@ -10,11 +10,11 @@
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/level_control.h>
+#include <unseen/session_gpu/picture_judge.h>
 
 #include "bench_tools.h"
 #include "level_cuts.h"
 #include "made_scenes.h"
-#include "picture_judge.h"
 #include "terminal.h"
 #include "tree_walk.h"
 
@@ -104,9 +104,9 @@ private:
     Result<void> prepare() {
         const session::Request request{.purpose = session::Purpose::picture};
         if (const auto prepared = session_->prepare(view_, request); !prepared) return prepared.error();
-        auto judge = PictureJudge::create(context_, *session_, view_, options_.samples);
+        auto judge = session::PictureJudge::create(context_, *session_, view_, options_.samples);
         if (!judge) return judge.error();
-        judge_ = std::make_unique<PictureJudge>(std::move(*judge));
+        judge_ = std::make_unique<session::PictureJudge>(std::move(*judge));
         return {};
     }
 
@@ -115,7 +115,7 @@ private:
     std::unique_ptr<session::Session> session_;
     vdtree::View view_;
     const ScenesBenchOptions& options_;
-    std::unique_ptr<PictureJudge> judge_;
+    std::unique_ptr<session::PictureJudge> judge_;
 };
 
 // ---- triangles and what shows

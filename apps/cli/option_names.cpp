@@ -44,6 +44,9 @@ constexpr OptionName option_names[] = {
     {"session::measured()", "unseen build"},
     {"session::measured_under_lights()", "unseen build --lit-fold-errors"},
     {"session::TreeCache", "unseen cache"},
+    {"lod.directions", "--directions"},
+    {"lod.samples", "--samples"},
+    {"lod.fov_y_degrees", "--fov"},
 };
 
 } // namespace

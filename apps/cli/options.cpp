@@ -316,26 +316,7 @@ void add_as_option(CLI::App& verb, session::LoadAs& as) {
         "what is background");
 }
 
-void add_view_options(CLI::App& verb, ViewOptions& o) {
-    CLI::App& group = *verb.add_option_group("VIEW", "Where from (world units are metres; see --unit)");
-    add_vector(group, "--eye", o.eye, "The eye");
-    add_vector(group, "--target", o.target, "What it looks at (default: the model's centre)");
-    add_vector(group, "--up", o.up, "Up in the picture (default: 0 1 0)");
-    add_vector(group, "--direction", o.direction, "Instead of --eye: from the model towards the eye (default: 0 0 1)");
-    add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
-               "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
-    add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
-               "Vertical field of view (default: that of a scene's camera, else the field that the window fills on the "
-               "display)");
-    group
-        .add_option_function<std::string>(
-            "--size",
-            [&o](const std::string& text) {
-                if (const auto complaint = parse_size(text, o.width, o.height); !complaint.empty())
-                    refuse("--size: " + complaint);
-            },
-            "The window in pixels (default: 1024x1024)")
-        ->type_name("WxH");
+static void add_surroundings(CLI::App& group, ViewOptions& o) {
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6)");
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
     add_number(group, "--fill-light", o.fill_light, within(0, 1), "F",
@@ -358,6 +339,35 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     add_texture_options(group, o.texture);
     group.add_flag("--no-cache", o.no_cache,
                    "Of a mesh: build and measure its tree anew, and do not keep it (default: see unseen cache)");
+}
+
+void add_view_options(CLI::App& verb, ViewOptions& o) {
+    CLI::App& group = *verb.add_option_group("VIEW", "Where from (world units are metres; see --unit)");
+    add_vector(group, "--eye", o.eye, "The eye");
+    add_vector(group, "--target", o.target, "What it looks at (default: the model's centre)");
+    add_vector(group, "--up", o.up, "Up in the picture (default: 0 1 0)");
+    add_vector(group, "--direction", o.direction, "Instead of --eye: from the model towards the eye (default: 0 0 1)");
+    add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
+               "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
+    add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
+               "Vertical field of view (default: that of a scene's camera, else the field that the window fills on the "
+               "display)");
+    group
+        .add_option_function<std::string>(
+            "--size",
+            [&o](const std::string& text) {
+                if (const auto complaint = parse_size(text, o.width, o.height); !complaint.empty())
+                    refuse("--size: " + complaint);
+            },
+            "The window in pixels (default: 1024x1024)")
+        ->type_name("WxH");
+    add_surroundings(group, o);
+    group.callback([&o] { check(o); });
+}
+
+void add_surroundings_options(CLI::App& verb, ViewOptions& o) {
+    CLI::App& group = *verb.add_option_group("MODEL", "How it is read, and what is around it");
+    add_surroundings(group, o);
     group.callback([&o] { check(o); });
 }
 

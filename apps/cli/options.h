@@ -96,6 +96,8 @@ using session::GazeSource;
 // Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
 // the parse with an error that names the option.
 void add_view_options(CLI::App& verb, ViewOptions& options);
+// Of those, what does not say where one looks from: of verbs that choose their views.
+void add_surroundings_options(CLI::App& verb, ViewOptions& options);
 // Of verbs that take scenes: --as. Files that look like scenes are, from now on.
 void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);

@@ -28,10 +28,11 @@ int main(int argc, char** argv) {
     const Program program{
         "unseen", about, examples, version.c_str(), {{"bench", "measuring is a program of its own, unseen-bench."}}};
     return run_program(argc, argv, program, [](CLI::App& app) {
-        return std::vector<Command>{
-            build_command(app),     info_command(app),    simplify_command(app), render_command(app),
-            sheet_command(app),     compare_command(app), tradeoff_command(app), csf_command(app),
-            calibrate_command(app), view_command(app),    demo_command(app),     make_command(app),
-            scene_command(app),     select_command(app),  study_command(app),    cache_command(app)};
+        return std::vector<Command>{build_command(app),     info_command(app),  simplify_command(app),
+                                    render_command(app),    sheet_command(app), compare_command(app),
+                                    tradeoff_command(app),  lod_command(app),   csf_command(app),
+                                    calibrate_command(app), view_command(app),  demo_command(app),
+                                    make_command(app),      scene_command(app), select_command(app),
+                                    study_command(app),     cache_command(app)};
     });
 }

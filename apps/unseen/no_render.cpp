@@ -49,6 +49,7 @@ Result<GpuComparison> compare_on_gpu(const perception::Image&, const perception:
 
 Command demo_command(CLI::App& app) { return absent(app, "demo"); }
 Command render_command(CLI::App& app) { return absent(app, "render"); }
+Command lod_command(CLI::App& app) { return absent(app, "lod"); }
 Command select_command(CLI::App& app) { return absent(app, "select"); }
 Command sheet_command(CLI::App& app) { return absent(app, "sheet"); }
 Command study_command(CLI::App& app) { return absent(app, "study"); }

@@ -10,6 +10,7 @@ Command demo_command(CLI::App& app);
 Command info_command(CLI::App& app);
 Command make_command(CLI::App& app);
 Command scene_command(CLI::App& app);
+Command lod_command(CLI::App& app);
 Command select_command(CLI::App& app);
 Command simplify_command(CLI::App& app);
 Command render_command(CLI::App& app);

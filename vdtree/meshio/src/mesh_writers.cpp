@@ -354,9 +354,9 @@ Result<void> write_gltf(const fs::path& file, const MeshView& mesh) {
 
     GltfFile out;
     json attributes = {{"POSITION", out.add_positions(positions)}};
-    if (!normals.empty()) attributes["NORMAL"] = out.add_vectors(floats_of(normals), 3);
-    if (!mesh.colours.empty()) attributes["COLOR_0"] = out.add_vectors(floats_of(mesh.colours), 4);
-    if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = out.add_vectors(floats_of(mesh.uvs), 2);
+    if (!normals.empty()) attributes["NORMAL"] = out.add_attribute("NORMAL", floats_of(normals), 3);
+    if (!mesh.colours.empty()) attributes["COLOR_0"] = out.add_attribute("COLOR_0", floats_of(mesh.colours), 4);
+    if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = out.add_attribute("TEXCOORD_0", floats_of(mesh.uvs), 2);
     const GltfMaterials materials = gltf_materials(mesh);
     const std::size_t view = out.add_indices(mesh.triangles);
     json primitives = json::array();

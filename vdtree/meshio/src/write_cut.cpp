@@ -17,6 +17,7 @@
 #include "file_output.h"
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "gltf_parts.h"
 #include "gltf_writer.h"
 #include "kept_arrays.h"
 #include "material_formats.h"
@@ -34,10 +35,6 @@ namespace {
 
 using File = SourceDocument::File;
 
-Error failed_to_write(const fs::path& file, const std::string& why) {
-    return {ErrorCode::io_failure, "Cannot write '" + file.string() + "': " + why};
-}
-
 // ---- files beside the mesh
 
 // Nothing but images and libraries is written, and nothing hidden: the names come from a file that nobody vouches for.
@@ -50,7 +47,20 @@ bool may_be_written(const fs::path& path) {
     return !is_hidden && std::find(std::begin(endings), std::end(endings), lower_ending(path)) != std::end(endings);
 }
 
-// Writes what lay beside the mesh beside this file. What is there already must be the same.
+// ---- glTF
+
+std::string media_type(std::string_view bytes) {
+    if (bytes.starts_with("\x89PNG")) return "image/png";
+    if (bytes.starts_with("\xFF\xD8\xFF")) return "image/jpeg";
+    return "application/octet-stream";
+}
+
+} // namespace
+
+Error failed_to_write(const fs::path& file, const std::string& why) {
+    return {ErrorCode::io_failure, "Cannot write '" + file.string() + "': " + why};
+}
+
 Result<void> write_beside(const fs::path& file, const SourceDocument& document, std::vector<std::string>& notes) {
     std::map<fs::path, const std::string*> missing;
     for (const File& beside : document.files) {
@@ -85,14 +95,6 @@ Result<void> write_beside(const fs::path& file, const SourceDocument& document, 
     return {};
 }
 
-// ---- glTF
-
-std::string media_type(std::string_view bytes) {
-    if (bytes.starts_with("\x89PNG")) return "image/png";
-    if (bytes.starts_with("\xFF\xD8\xFF")) return "image/jpeg";
-    return "application/octet-stream";
-}
-
 void add_images(json& out, const SourceDocument& document, GltfFile& file) {
     if (!out.contains("images")) return;
     json& images = out["images"];
@@ -104,16 +106,29 @@ void add_images(json& out, const SourceDocument& document, GltfFile& file) {
     }
 }
 
-json gltf_primitive(const RestoredPart& restored, const SourceDocument& document, GltfFile& file) {
-    json attributes = {{"POSITION", file.add_positions(restored.positions)}};
+json gltf_primitive(RestoredPart& restored, const SourceDocument& document, GltfFile& file, const GltfGrid& grid) {
+    if (file.reorders()) {
+        GltfOrder order = optimized(restored.triangles, restored.positions.size());
+        const auto sorted = [&](auto& values, std::size_t components) {
+            auto old = std::move(values);
+            values.clear();
+            for (const Index v : order.vertices)
+                values.insert(values.end(), old.begin() + static_cast<std::ptrdiff_t>(v * components),
+                              old.begin() + static_cast<std::ptrdiff_t>((v + 1) * components));
+        };
+        restored.triangles = std::move(order.triangles);
+        sorted(restored.positions, 1), sorted(restored.vertices, 1);
+        for (std::size_t c = 0; c < restored.channels.size(); ++c)
+            if (!restored.channels[c].empty()) sorted(restored.channels[c], document.channels[c].components);
+    }
+    json attributes = {{"POSITION", file.add_positions(restored.positions, grid)}};
     for (std::size_t c = 0; c < restored.channels.size(); ++c)
         if (!restored.channels[c].empty())
             attributes[document.channels[c].name] =
-                file.add_vectors(restored.channels[c], document.channels[c].components);
+                file.add_attribute(document.channels[c].name, restored.channels[c], document.channels[c].components);
     return file.primitive(attributes, file.add_indices(restored.triangles), 0, restored.triangles.size());
 }
 
-// The node of a part, or a new one beside all others, where there is none or its frame cannot be turned back.
 std::size_t node_for(json& out, const SourceDocument::Part& part, const RestoredPart& restored,
                      std::vector<std::string>& notes) {
     json& nodes = out["nodes"];
@@ -133,6 +148,8 @@ std::size_t node_for(json& out, const SourceDocument::Part& part, const Restored
     return nodes.size() - 1;
 }
 
+namespace {
+
 Result<void> write_gltf(const fs::path& name, const SourceDocument& document, std::vector<RestoredPart>& parts,
                         std::vector<std::string>& notes) {
     GltfFile file;
@@ -151,7 +168,7 @@ Result<void> write_gltf(const fs::path& name, const SourceDocument& document, st
     json written = json::array();
     std::map<std::pair<std::int32_t, std::int32_t>, std::size_t> numbers; // by mesh and node
     std::map<std::int32_t, std::size_t> copies;
-    for (const RestoredPart& restored : parts) {
+    for (RestoredPart& restored : parts) {
         const SourceDocument::Part& part = document.parts[restored.part];
         const json& mesh = meshes.at(static_cast<std::size_t>(part.mesh));
         const auto [number, is_new] = numbers.try_emplace({part.mesh, part.node}, written.size());
@@ -327,24 +344,6 @@ Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocum
     return write_mesh_with(file, extracted.mesh.view(), *arrays, notes);
 }
 
-// Runs what believes what a document says.
-template <class Write>
-Result<void> guarded_writing(Write&& write) {
-    const auto damaged = [](const std::string& why) {
-        return Error{ErrorCode::malformed_data,
-                     "The source document of the tree cannot be used: " + why + " Build the tree again from its mesh."};
-    };
-    try {
-        return write();
-    } catch (const gltf::Broken& broken) {
-        return damaged(broken.what);
-    } catch (const json::exception& error) {
-        return damaged(std::string("its JSON is wrong: ") + error.what() + ".");
-    } catch (const std::out_of_range&) {
-        return damaged("texture coordinates are missing.");
-    }
-}
-
 // ---- scenes
 
 // Whether nothing is folded, not even what leaves no triangle out.
@@ -418,7 +417,7 @@ private:
         });
         json mesh = meshes_.at(static_cast<std::size_t>(cut.mesh));
         json primitives = json::array();
-        for (const RestoredPart& part : parts_.back()) {
+        for (RestoredPart& part : parts_.back()) {
             json primitive = mesh.at("primitives").at(static_cast<std::size_t>(document->parts[part.part].primitive));
             primitive.update(gltf_primitive(part, *document, file_));
             primitives.push_back(std::move(primitive));

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <unseen/meshio/examine.h>
+#include <unseen/meshio/level_file.h>
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/meshio/scene_file.h>
 #include <unseen/meshio/source_document.h>

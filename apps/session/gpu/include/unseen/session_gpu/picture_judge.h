@@ -10,41 +10,46 @@
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
-namespace unseen::app {
+namespace unseen::session {
 
 struct PictureVerdict {
-    std::uint64_t visible = 0, second_visible = 0; // pixels
+    std::uint64_t visible = 0, second_visible = 0; // pixels, by the judge and by second_judge_options()
     double v = 0, second_v = 0;                    // the largest difference, in thresholds
     double ssim = 1;                               // of code values; NaN: the window is too small for it
+
+    bool shows_nothing() const { return visible == 0 && second_visible == 0 && v < 1 && second_v < 1; }
 };
 
-// Refers to the session; keeps a handle to the context. Move-only.
+// Refers to the session. Move-only.
 class PictureJudge {
 public:
     // Draws the full model, with so many samples a pixel. The judges are of the session's observer and gaze.
-    static Result<PictureJudge> create(const render::Context& context, const session::Session& session,
+    static Result<PictureJudge> create(const render::Context& context, const Session& session, const vdtree::View& view,
+                                       int samples);
+    // By a renderer of that session, which several may share: its trees are uploaded once for all views.
+    static Result<PictureJudge> create(std::shared_ptr<SceneRenderer> renderer, const Session& session,
                                        const vdtree::View& view, int samples);
 
-    // Others' cuts or frames of the same view and window.
+    // Others' cuts or frames of the same view and window. The judges work side by side.
     Result<PictureVerdict> judge(std::span<const vdtree::Cut> cuts);
     Result<PictureVerdict> judge(const render::Frame& frame) const;
 
     const perception::Image& full() const { return full_; } // luminance, cd/m2
-    session::SceneRenderer& renderer() { return *renderer_; }
+    SceneRenderer& renderer() { return *renderer_; }
     render::DrawOptions drawing() const; // what judged pictures are drawn with
 
 private:
-    PictureJudge(const session::Session& session, const vdtree::View& view, int samples,
-                 session::SceneRenderer renderer);
+    PictureJudge(const Session& session, const vdtree::View& view, int samples,
+                 std::shared_ptr<SceneRenderer> renderer);
 
-    const session::Session* session_;
+    const Session* session_;
     vdtree::View view_;
     int samples_;
-    std::unique_ptr<session::SceneRenderer> renderer_;
+    std::shared_ptr<SceneRenderer> renderer_;
     perception::Image full_ = {}, full_codes_ = {};
     std::unique_ptr<perception::Judge> judge_ = {}, second_ = {};
 };
 
-std::vector<vdtree::Cut> whole_cuts(const session::Session& session); // the full model, by object
+std::vector<vdtree::Cut> whole_cuts(const Session& session); // the full model, by object
 
-} // namespace unseen::app
+} // namespace unseen::session

@@ -1,0 +1,83 @@
+#include <unseen/session_gpu/picture_judge.h>
+
+#include <future>
+#include <limits>
+#include <utility>
+
+#include <unseen/session_gpu/frame_image.h>
+
+namespace unseen::session {
+
+std::vector<vdtree::Cut> whole_cuts(const Session& session) {
+    std::vector<vdtree::Cut> whole;
+    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) whole.emplace_back(session.tree(i)).unfold_all();
+    return whole;
+}
+
+PictureJudge::PictureJudge(const Session& session, const vdtree::View& view, int samples,
+                           std::shared_ptr<SceneRenderer> renderer)
+    : session_(&session), view_(view), samples_(samples), renderer_(std::move(renderer)) {}
+
+render::DrawOptions PictureJudge::drawing() const {
+    render::DrawOptions drawing;
+    drawing.samples = samples_;
+    drawing.background = session_->background();
+    return drawing;
+}
+
+Result<PictureJudge> PictureJudge::create(const render::Context& context, const Session& session,
+                                          const vdtree::View& view, int samples) {
+    auto renderer = SceneRenderer::create(context, session);
+    if (!renderer) return renderer.error();
+    return create(std::make_shared<SceneRenderer>(std::move(*renderer)), session, view, samples);
+}
+
+Result<PictureJudge> PictureJudge::create(std::shared_ptr<SceneRenderer> renderer, const Session& session,
+                                          const vdtree::View& view, int samples) {
+    PictureJudge made(session, view, samples, std::move(renderer));
+    const auto whole = whole_cuts(session);
+    const auto frame = made.renderer_->draw(drawn_cuts(whole), view, made.drawing());
+    if (!frame) return frame.error();
+    const Observer& observer = session.observer();
+    made.full_ = luminance_image(*frame, observer.display);
+    made.full_codes_ = code_image(*frame, observer.display);
+    std::optional<glm::dvec2> gaze;
+    if (observer.gaze) gaze = observer.gaze->px;
+    auto other = std::async(std::launch::async, [&] {
+        return perception::Judge::create(made.full_,
+                                         perception::second_judge_options(observer.person, observer.display, gaze));
+    });
+    auto judge = perception::Judge::create(made.full_, judge_options(observer));
+    auto second = other.get();
+    if (!judge) return judge.error();
+    if (!second) return second.error();
+    made.judge_ = std::make_unique<perception::Judge>(std::move(*judge));
+    made.second_ = std::make_unique<perception::Judge>(std::move(*second));
+    return made;
+}
+
+Result<PictureVerdict> PictureJudge::judge(std::span<const vdtree::Cut> cuts) {
+    const auto frame = renderer_->draw(drawn_cuts(cuts), view_, drawing());
+    if (!frame) return frame.error();
+    return judge(*frame);
+}
+
+Result<PictureVerdict> PictureJudge::judge(const render::Frame& frame) const {
+    const perception::Display& display = session_->observer().display;
+    const perception::Image luminance = luminance_image(frame, display);
+    auto other = std::async(std::launch::async, [&] {
+        auto judgement = second_->judge(luminance);
+        return std::pair(std::move(judgement), perception::ssim(full_codes_, code_image(frame, display)));
+    });
+    const auto verdict = judge_->judge(luminance);
+    const auto [second, similarity] = other.get();
+    if (!verdict) return verdict.error();
+    if (!second) return second.error();
+    return PictureVerdict{.visible = verdict->visible_pixels,
+                          .second_visible = second->visible_pixels,
+                          .v = verdict->max_ratio,
+                          .second_v = second->max_ratio,
+                          .ssim = similarity ? *similarity : std::numeric_limits<double>::quiet_NaN()};
+}
+
+} // namespace unseen::session
