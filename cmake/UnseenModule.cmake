@@ -1,10 +1,11 @@
-# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ... [PACKAGES ...])
+# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ... [PACKAGES ...] [LIBRARIES ...])
 #
 # One module of the house: a library `unseen_<name>`, static or by BUILD_SHARED_LIBS shared, alias and export name
 # `unseen::<name>`, whose public headers lie in include/unseen/<name> and are installed alike. DEPENDS is what its headers
-# need, PRIVATE_DEPENDS what only its sources need. PACKAGES: the latter as pkg-config names them.
+# need, PRIVATE_DEPENDS what only its sources need. PACKAGES: the latter as pkg-config names them; LIBRARIES: those of them
+# that pkg-config does not know.
 function(unseen_add_library name)
-    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS;PACKAGES" ${ARGN})
+    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS;PACKAGES;LIBRARIES" ${ARGN})
     set(target unseen_${name})
     add_library(${target} ${arg_SOURCES})
     add_library(unseen::${name} ALIAS ${target})
@@ -26,7 +27,8 @@ function(unseen_add_library name)
             FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${name})
         install(EXPORT unseen_${name}_targets NAMESPACE unseen:: FILE unseen_${name}_targets.cmake
             DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen COMPONENT ${name})
-        unseen_install_pkg_config(${name} DEPENDS ${arg_DEPENDS} PACKAGES ${arg_PACKAGES})
+        unseen_install_pkg_config(${name} DEPENDS ${arg_DEPENDS} PACKAGES ${arg_PACKAGES}
+            LIBRARIES ${arg_LIBRARIES})
     endif()
 endfunction()
 
@@ -35,7 +37,7 @@ set(UNSEEN_PKG_CONFIG_FILE ${CMAKE_CURRENT_LIST_DIR}/unseen.pc.in)
 
 # unseen-<name>.pc, with - for _. Where libraries are static, a client links what is inside, too, without asking for it.
 function(unseen_install_pkg_config name)
-    cmake_parse_arguments(arg "" "" "DEPENDS;PACKAGES" ${ARGN})
+    cmake_parse_arguments(arg "" "" "DEPENDS;PACKAGES;LIBRARIES" ${ARGN})
     set(needed)
     foreach(depends IN LISTS arg_DEPENDS)
         string(REGEX REPLACE "^glm::glm$" "glm" depends ${depends})
@@ -47,6 +49,11 @@ function(unseen_install_pkg_config name)
     if(NOT BUILD_SHARED_LIBS)
         list(APPEND needed ${inside})
         set(inside)
+    endif()
+    set(PC_LIBRARIES)
+    if(NOT BUILD_SHARED_LIBS)
+        list(TRANSFORM arg_LIBRARIES PREPEND " -l")
+        list(JOIN arg_LIBRARIES "" PC_LIBRARIES)
     endif()
     list(JOIN needed ", " PC_REQUIRES)
     list(JOIN inside ", " PC_REQUIRES_PRIVATE)
