@@ -221,7 +221,7 @@ Result<PeerScene> peer_scene(const AccuracySubject& subject, const std::vector<v
 Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     session::TradeoffOptions tradeoff;
     tradeoff.seconds = options.seconds;
-    tradeoff.samples = options.samples;
+    tradeoff.samples = tradeoff.least_samples = options.samples; // what is seen must not depend on what else runs
     const auto measured = session::measure_tradeoff(subject.session, subject.context, subject.view, tradeoff);
     if (!measured) return measured.error();
     const TreeBytes bytes = bytes_a_triangle(subject.session);

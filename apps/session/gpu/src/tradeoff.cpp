@@ -96,8 +96,8 @@ public:
             sample_ms = frame->draw_ms / tried;
         }
         const double allowed_ms = 1e3 * options_.seconds / 2 / static_cast<double>(pictures);
-        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(sample_ms, 1e-3)),
-                              std::min(least_judged_samples, options_.samples), options_.samples);
+        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(sample_ms, 1e-3)), options_.least_samples,
+                              options_.samples);
         return samples_;
     }
 
@@ -218,6 +218,8 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     if (!(options.seconds > 0)) return invalid_argument("The seconds of a trade-off must be above 0.");
     if (options.samples < 1 || options.samples > most_samples)
         return invalid_argument("The samples of a trade-off must be 1 to 256.");
+    if (options.least_samples < 1 || options.least_samples > options.samples)
+        return invalid_argument("The least samples of a trade-off must be 1 to its samples.");
     const auto start = Clock::now();
     const auto prepared = session.prepare(view, {.purpose = Purpose::picture});
     if (!prepared) return prepared.error();
