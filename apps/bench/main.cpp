@@ -9,6 +9,7 @@
 #include <memory>
 
 #include <unseen/perception/csf.h>
+#include <unseen/session/level_chain.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 #include "accuracy_bench.h"
