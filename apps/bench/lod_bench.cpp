@@ -18,6 +18,9 @@
 namespace unseen::app {
 namespace {
 
+// The seed of directions that making the levels had nothing to do with.
+constexpr std::uint64_t other_directions = 77'000'000'000;
+
 struct LodSeen {
     std::uint64_t pixels = 0; // of all sides: the larger count of the two judges
     double v = 0;             // the largest of either
@@ -66,13 +69,15 @@ Result<LodBenchResult> bench_lod(const std::vector<std::string>& models, int lev
         const auto shared = std::make_shared<session::SceneRenderer>(std::move(*renderer));
         const vdtree::Mesh full = vdtree::extract_mesh(session::whole_cuts(*session)[0]);
         const std::string name = std::filesystem::path(model).filename().string();
-        for (std::size_t i = 1; i < object.levels.size(); ++i) {
+        // Level 0 is the control: what the peer's way of being drawn shows by itself, where the first level begins.
+        for (std::size_t i = 0; i < object.levels.size() && object.levels.size() > 1; ++i) {
             const session::LodLevel& level = object.levels[i];
+            const double distance = object.levels[std::max<std::size_t>(i, 1)].distance;
             LodSeen ours{.triangles = level.triangles}, theirs;
             std::optional<session::Session> peer;
             std::optional<session::SceneRenderer> peer_renderer;
             if (has_meshoptimizer()) {
-                const vdtree::Mesh simple = simplified_by_meshoptimizer(full, level.triangles);
+                const vdtree::Mesh simple = i == 0 ? full : simplified_by_meshoptimizer(full, level.triangles);
                 theirs.triangles = static_cast<vdtree::Index>(simple.triangles.size());
                 if (!simple.triangles.empty()) {
                     auto made = session_of_peer(*session, simple);
@@ -85,8 +90,9 @@ Result<LodBenchResult> bench_lod(const std::vector<std::string>& models, int lev
             }
             std::vector<vdtree::Cut> cuts;
             cuts.push_back(object.cut(i));
-            for (const session::LodCheck& check : level.checks) {
-                const vdtree::View seen = session::lod_view(*lod, object.sphere, check.direction, level.distance);
+            for (const glm::dvec3& direction :
+                 session::lod_directions(session::usual_lod_directions, other_directions + i)) {
+                const vdtree::View seen = session::lod_view(*lod, object.sphere, direction, distance);
                 auto judge = session::PictureJudge::create(shared, *session, seen, lod->samples);
                 if (!judge) return judge.error();
                 const auto verdict = judge->judge(cuts);
@@ -101,14 +107,14 @@ Result<LodBenchResult> bench_lod(const std::vector<std::string>& models, int lev
                 add(theirs, *other);
             }
             const bool has_peer = peer_renderer.has_value();
-            result.table.rows.push_back({i == 1 ? name : "", std::to_string(i), grouped(ours.triangles),
-                                         rounded(level.distance, 4), grouped(ours.pixels), rounded(ours.v, 2),
+            result.table.rows.push_back({i == 0 ? name : "", std::to_string(i), grouped(ours.triangles),
+                                         rounded(distance, 4), grouped(ours.pixels), rounded(ours.v, 2),
                                          grouped(theirs.triangles), has_peer ? grouped(theirs.pixels) : "-",
                                          has_peer ? rounded(theirs.v, 2) : "-"});
             result.rows.push_back({{"model", name},
                                    {"level", i},
                                    {"triangles", ours.triangles},
-                                   {"distance_m", level.distance},
+                                   {"distance_m", distance},
                                    {"visible_pixels", ours.pixels},
                                    {"v", number_or_null(ours.v)},
                                    {"peer_triangles", theirs.triangles},
