@@ -14,7 +14,7 @@ namespace unseen::session {
 
 struct TradeoffOptions {
     double seconds = 45; // of wall-clock time for all points, about; those that do not fit are left out. Above 0
-    // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but least_samples or more.
+    // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but not below least_samples.
     // Fewer show steps of samples, so V is larger than it is of a finer picture.
     int samples = 64, least_samples = 8;
     std::function<void(double)> progress = {}; // hears what share of the points is done
