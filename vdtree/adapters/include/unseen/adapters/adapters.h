@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -21,6 +22,24 @@ enum class ColourEncoding : std::uint8_t { srgb, linear };
 
 struct Options {
     ColourEncoding colours = ColourEncoding::srgb; // as image files and most mesh files have them
+};
+
+// A soup, and what each of its elements was in the other library's mesh.
+template <class VertexHandle, class FaceHandle>
+struct Soup {
+    vdtree::Mesh mesh;
+    std::vector<VertexHandle> vertices; // by vertex of the soup
+    std::vector<FaceHandle> faces;      // by triangle
+};
+
+// A mesh of the other library, and what each of its vertices was.
+template <class M>
+struct Made {
+    M mesh;
+    std::vector<vdtree::Index> sources; // by vertex: the soup's vertex, or the tree's node
+    // Where the surface is not manifold, halfedges cannot hold it as it is: so many triangles have got vertices of their
+    // own, at the same positions. No triangle is left out but those that use a vertex twice.
+    std::size_t loose_triangles = 0;
 };
 
 // One channel, 0..1 both ways.

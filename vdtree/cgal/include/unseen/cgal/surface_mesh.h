@@ -24,23 +24,9 @@ namespace unseen::cgal {
 using adapters::ColourEncoding;
 using adapters::Options;
 
-// A soup, and what each of its elements was.
 template <class M>
-struct Soup {
-    vdtree::Mesh mesh;
-    std::vector<typename M::Vertex_index> vertices; // by vertex of the soup
-    std::vector<typename M::Face_index> faces;      // by triangle
-};
-
-// A surface mesh, and what each of its vertices was.
-template <class M>
-struct Made {
-    M mesh;
-    std::vector<vdtree::Index> sources; // by vertex: the soup's vertex, or the tree's node
-    // Where the surface is not manifold, halfedges cannot hold it as it is: so many triangles have got vertices of their
-    // own, at the same positions. No triangle is left out but those that use a vertex twice.
-    std::size_t loose_triangles = 0;
-};
+using Soup = adapters::Soup<typename M::Vertex_index, typename M::Face_index>;
+using adapters::Made;
 
 namespace detail {
 

@@ -21,24 +21,9 @@ namespace unseen::openmesh {
 using adapters::ColourEncoding;
 using adapters::Options;
 
-// A soup, and what each of its elements was.
 template <class M>
-struct Soup {
-    vdtree::Mesh mesh;
-    std::vector<typename M::VertexHandle> vertices; // by vertex of the soup
-    std::vector<typename M::FaceHandle> faces;      // by triangle
-};
-
-// An OpenMesh mesh, and what each of its vertices was.
-template <class M>
-struct Made {
-    M mesh;
-    std::vector<vdtree::Index> sources; // by vertex: the soup's vertex, or the tree's node
-    // Where the surface is not manifold, OpenMesh cannot hold it as it is: so many triangles have got vertices of their
-    // own, at the same positions, as OpenMesh's readers do it. No triangle is left out but those that use a vertex
-    // twice.
-    std::size_t loose_triangles = 0;
-};
+using Soup = adapters::Soup<typename M::VertexHandle, typename M::FaceHandle>;
+using adapters::Made;
 
 namespace detail {
 
