@@ -1,5 +1,5 @@
 // The command's own operator new and delete: large blocks are paged where that is asked for, else they get large pages.
-// The forms for arrays, and those that do not throw, use these.
+// The forms for arrays use these.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -60,6 +60,23 @@ void* operator new(std::size_t size, std::align_val_t alignment) {
     const std::size_t rounded = (std::max<std::size_t>(size, 1) + align - 1) / align * align;
     if (rounded < size) throw std::bad_alloc();
     return from_memory([=] { return with_large_pages(std::aligned_alloc(align, rounded), rounded); });
+}
+
+// The standard library's own would do, but a sanitizer's stand in their place, whose memory `delete` cannot give back.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    try {
+        return operator new(size);
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+}
+
+void* operator new(std::size_t size, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+    try {
+        return operator new(size, alignment);
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
 }
 
 void operator delete(void* block) noexcept { give_back(block); }

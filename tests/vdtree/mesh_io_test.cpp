@@ -13,6 +13,8 @@
 #include <fstream>
 #include <limits>
 #include <random>
+#include <stop_token>
+#include <thread>
 
 #include <glm/geometric.hpp>
 #include <gmock/gmock.h>
@@ -973,6 +975,21 @@ TEST_F(MeshFiles, AnAbandonedAtomicFileLeavesNothing) {
     }
     EXPECT_EQ(files(), 0u);
     EXPECT_FALSE(AtomicFile::create("/dev/null"));
+}
+
+// A file that is being renamed is not what a killed writer has left.
+TEST_F(MeshFiles, AreNotTakenForOrphansWhileTheyAreWritten) {
+    const fs::path target = folder_ / "a.bin";
+    std::jthread remover([&](const std::stop_token& stop) {
+        while (!stop.stop_requested()) AtomicFile::remove_orphans(target);
+    });
+    for (int i = 0; i < 200; ++i) {
+        Result<AtomicFile> file = AtomicFile::create(target);
+        ASSERT_TRUE(file) << file.error().message;
+        ASSERT_TRUE(file->write("whole"));
+        const Result<void> committed = file->commit();
+        ASSERT_TRUE(committed) << "round " << i << ": " << committed.error().message;
+    }
 }
 
 // ---- checks and repairs ----

@@ -209,10 +209,11 @@ Result<void> AtomicFile::commit() {
     }
     // The data must be on the disk before the name is, or a power cut could leave the name with an empty file.
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) return failed("write");
-    if (::close(std::exchange(descriptor_, -1)) != 0) return failed("write");
+    // Closed only under its final name: the lock goes with it, and what is not locked others take for left behind.
     if (::rename(temporary_.c_str(), target_.c_str()) != 0) return failed("replace");
     temporary_.clear();
     unlist(std::exchange(place_, -1));
+    if (::close(std::exchange(descriptor_, -1)) != 0) return io_error(target_, "write", errno);
     return {};
 }
 
