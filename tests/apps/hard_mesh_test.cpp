@@ -31,6 +31,8 @@ using vdtree::VertexTree;
 struct Direction {
     glm::dvec3 towards_eye;
     double fill; // of the window's height
+
+    bool operator==(const Direction&) const = default;
 };
 
 VertexTree built(const HardMesh& hard) {
@@ -63,13 +65,11 @@ public:
         if (!criterion) throw std::runtime_error(criterion.error().message);
         vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree_, look.view, look.options);
         if (lighting_) viewpoint.lighting = *lighting_;
-        vdtree::Cut whole(tree_), cut(tree_);
-        whole.unfold_all();
+        vdtree::Cut cut(tree_);
         EXPECT_TRUE(cut.follow(*criterion, viewpoint));
         triangles_ = cut.triangle_count();
-        return oracle::judge(oracle::draw(renderer_, whole, look.view, samples, lighting_),
-                             oracle::draw(renderer_, cut, look.view, samples, lighting_), look,
-                             perception::CsfModel::castle);
+        return oracle::judge(whole_from(from, look.view), oracle::draw(renderer_, cut, look.view, samples, lighting_),
+                             look, perception::CsfModel::castle);
     }
 
     template <class MakeCriterion>
@@ -87,11 +87,22 @@ public:
 private:
     static constexpr int samples = 64;
 
+    // Drawn once for all gazes.
+    const perception::Image& whole_from(const Direction& from, const vdtree::View& view) {
+        if (!whole_ || whole_->first != from) {
+            vdtree::Cut whole(tree_);
+            whole.unfold_all();
+            whole_.emplace(from, oracle::draw(renderer_, whole, view, samples, lighting_));
+        }
+        return whole_->second;
+    }
+
     VertexTree tree_;
     std::optional<vdtree::Lighting> lighting_;
     render::Context context_;
     render::Renderer renderer_;
-    vdtree::Index triangles_ = 0; // of the last cut
+    std::optional<std::pair<Direction, perception::Image>> whole_; // and from where
+    vdtree::Index triangles_ = 0;                                  // of the last cut
 };
 
 class OpenSheets : public testing::TestWithParam<std::size_t> {

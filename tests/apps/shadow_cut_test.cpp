@@ -1,12 +1,16 @@
 // Cuts of scenes whose lights cast shadows: nobody tells their pictures from those of the full scene, with the shadows in
 // both.
 #include <cmath>
+#include <map>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
 #include <unseen/perception/judge.h>
+#include <unseen/session/model_file.h>
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
@@ -116,6 +120,18 @@ std::vector<Setting> settings() {
     return all;
 }
 
+// Measured under lights once: that takes longer than all else here.
+vdtree::VertexTree ball_of(float grey) {
+    static std::map<float, vdtree::VertexTree> measured;
+    const auto found = measured.find(grey);
+    if (found != measured.end()) return found->second.share();
+    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(grey), 1));
+    auto tree = session::measured_under_lights(support::built(mesh));
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return measured.emplace(grey, std::move(*tree)).first->second.share();
+}
+
 class ShadowCut : public render::testing::GlTest, public ::testing::WithParamInterface<std::size_t> {
 protected:
     static session::Scene scene_of(const Setting& setting, const vdtree::VertexTree& ball,
@@ -158,9 +174,7 @@ protected:
 
 TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     const Setting setting = settings()[GetParam()];
-    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
-    mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(setting.grey), 1));
-    const vdtree::VertexTree ball = support::built(mesh), ground = support::built(floor(6, 48));
+    const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
     const vdtree::View view = view_of(setting);
     auto session = session::Session::create(scene_of(setting, ball, ground, true));
     ASSERT_TRUE(session) << session.error().message;
@@ -231,9 +245,7 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
 TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
     Setting setting = settings()[6];
     ASSERT_STREQ(setting.name, "EdgeOfUnseen");
-    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
-    mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(setting.grey), 1));
-    const vdtree::VertexTree ball = support::built(mesh), ground = support::built(floor(6, 48));
+    const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
     auto session = session::Session::create(scene_of(setting, ball, ground, true));
     ASSERT_TRUE(session) << session.error().message;
     auto renderer = session::SceneRenderer::create(context(), *session);
