@@ -10,6 +10,7 @@ fetch_npm "$npm" gltf-validator@2.0.0-dev.3.10 three@0.180.0 "$models_package" |
 
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
+export UNSEEN_CACHE=$out/cache # each tree is built once
 # A headset's controllers: several parts, materials and images.
 for model in htc-vive/none oculus-touch-v3/left; do
     name=$out/$(dirname "$model")
