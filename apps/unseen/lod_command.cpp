@@ -5,7 +5,6 @@
 #include <memory>
 
 #include <unseen/session_gpu/lod.h>
-#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "cut_report.h"
 #include "level_sheet.h"
@@ -133,12 +132,8 @@ Result<int> run(LodArguments& a) {
                                              "meshoptimizer: install libmeshoptimizer-dev and build again."};
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    std::optional<vdtree::AtomicFile> csv;
-    if (!a.csv.empty()) {
-        auto file = vdtree::AtomicFile::create(a.csv);
-        if (!file) return file.error();
-        csv = std::move(*file);
-    }
+    auto csv = open_if_named(a.csv);
+    if (!csv) return csv.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -206,9 +201,9 @@ Result<int> run(LodArguments& a) {
                                    {"files", std::move(sizes)}});
         !ok)
         return ok.error();
-    if (csv) {
-        if (auto ok = csv->write(to_csv(*lod)); !ok) return ok.error();
-        if (auto ok = csv->commit(); !ok) return ok.error();
+    if (*csv) {
+        if (auto ok = (*csv)->write(to_csv(*lod)); !ok) return ok.error();
+        if (auto ok = (*csv)->commit(); !ok) return ok.error();
     }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
