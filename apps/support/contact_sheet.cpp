@@ -8,8 +8,8 @@
 #include <unseen/session_gpu/frame_image.h>
 #include <unseen/vdtree/internal/number_format.h>
 
-#include "drawing.h"
 #include "fold_map.h"
+#include "picture_columns.h"
 
 namespace unseen::app {
 namespace {
@@ -142,63 +142,26 @@ private:
     const SheetOptions& o_;
 };
 
-// The lines above a column of pictures.
-struct Caption {
-    std::string name, verdict;
-
-    explicit Caption(const SheetCut& cut) : name(cut.name + ": " + grouped(cut.report.stats.triangles) + " triangles") {
+// Columns beside each other: those that have pictures of the kind.
+Result<Image> compose(std::vector<Column>& columns, Pictures Column::*kind, const session::Session& session,
+                      const vdtree::View& view, const std::string& model) {
+    std::vector<PictureColumn> shown;
+    for (Column& column : columns) {
+        if ((column.*kind).empty()) continue;
+        const SheetCut& cut = column.cut;
+        PictureColumn& made = shown.emplace_back();
+        made.name = cut.name + ": " + grouped(cut.report.stats.triangles) + " triangles";
         const double from = cut.report.imperceptible_from_m;
         if (cut.judgement)
-            verdict = grouped(cut.judgement->visible_pixels) + " pixels visible; from " + rounded(from, 3) +
-                      (std::isfinite(from) ? " m none" : " none");
+            made.verdict = grouped(cut.judgement->visible_pixels) + " pixels visible; from " + rounded(from, 3) +
+                           (std::isfinite(from) ? " m none" : " none");
+        made.pictures = std::move(column.*kind);
     }
-};
-
-// Columns beside each other: those that have pictures of the kind.
-Result<Image> compose(const std::vector<Column>& columns, Pictures Column::*kind, const session::Session& session,
-                      const vdtree::View& view, const std::string& model) {
-    constexpr int gap = 12, text_height = 17, line_height = 22; // pixels
-    constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
-    struct Shown {
-        Caption caption;
-        const Pictures& pictures;
-    };
-    int height = 0, cell_width = 0; // of the tallest column, and of the widest picture or line of text
-    std::vector<Shown> shown;
-    for (const Column& column : columns) {
-        if ((column.*kind).empty()) continue;
-        const Caption& caption = shown.emplace_back(Shown{Caption(column.cut), column.*kind}).caption;
-        for (const std::string& line : {caption.name, caption.verdict})
-            cell_width = std::max(cell_width, static_cast<int>(std::ceil(Drawing::text_width(line, text_height))));
-        int below = 0;
-        for (const Image& picture : column.*kind) {
-            cell_width = std::max(cell_width, picture.width);
-            below += picture.height + gap;
-        }
-        height = std::max(height, below);
-    }
-    const int count = static_cast<int>(shown.size());
-    const int header = 2 * gap + line_height, above = 2 * line_height + gap;
-    auto drawing = Drawing::create(gap + count * (cell_width + gap), header + above + height, paper);
-    if (!drawing) return drawing.error();
-
     const perception::Display& display = session.observer().display;
-    const std::string title = model + "   " + std::to_string(view.width) + "x" + std::to_string(view.height) +
-                              " pixels, " + rounded(perception::pixels_per_degree(display).value(), 4) +
-                              " per degree, seen from " + rounded(display.distance.value(), 3) + " m";
-    drawing->text({gap, gap}, title, ink, Drawing::fitting_height(title, text_height, drawing->width() - 2 * gap));
-    for (int i = 0; i < count; ++i) {
-        const int left = gap + i * (cell_width + gap);
-        const Shown& column = shown[static_cast<std::size_t>(i)];
-        drawing->text({left, header}, column.caption.name, ink, text_height);
-        drawing->text({left, header + line_height}, column.caption.verdict, weak, text_height);
-        int top = header + above;
-        for (const Image& picture : column.pictures) {
-            drawing->picture({left, top}, picture);
-            top += picture.height + gap;
-        }
-    }
-    return drawing->image();
+    return compose_columns(model + "   " + std::to_string(view.width) + "x" + std::to_string(view.height) +
+                               " pixels, " + rounded(perception::pixels_per_degree(display).value(), 4) +
+                               " per degree, seen from " + rounded(display.distance.value(), 3) + " m",
+                           shown);
 }
 
 // The first is the full model.

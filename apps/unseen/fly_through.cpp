@@ -401,13 +401,9 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
     if (!report) return report.error();
-    std::optional<vdtree::AtomicFile> csv;
-    if (!options.csv.empty()) {
-        auto file = vdtree::AtomicFile::create(options.csv);
-        if (!file) return file.error();
-        vdtree::AtomicFile::remove_orphans(options.csv);
-        csv = std::move(*file);
-    }
+    auto opened = open_if_named(options.csv);
+    if (!opened) return opened.error();
+    std::optional<vdtree::AtomicFile> csv = std::move(*opened);
     std::optional<render::Context> context;
     if (draws_frames(options) || options.what.visibility != Visibility::spheres) {
         auto made = render::Context::headless();

@@ -5,9 +5,9 @@
 #include <memory>
 
 #include <unseen/session_gpu/lod.h>
-#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "cut_report.h"
+#include "level_sheet.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
@@ -19,7 +19,7 @@ namespace unseen::app {
 namespace {
 
 struct LodArguments {
-    std::string model, out, json, csv;
+    std::string model, out, json, csv, sheet;
     bool is_separate = false;
     ViewOptions view;
     DisplayOptions display;
@@ -124,7 +124,7 @@ Result<int> run(LodArguments& a) {
     std::vector<std::string> files;
     if (a.is_separate)
         for (int i = 0; i < a.options.chain.levels; ++i) files.push_back(level_file(a.out, i));
-    std::vector<std::string> outputs = {a.out, a.csv, a.json};
+    std::vector<std::string> outputs = {a.out, a.csv, a.json, a.sheet};
     outputs.insert(outputs.end(), files.begin(), files.end());
     if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), outputs); !ready) return ready.error();
     if (a.gltf.meshopt && !meshio::has_meshoptimizer())
@@ -132,12 +132,8 @@ Result<int> run(LodArguments& a) {
                                              "meshoptimizer: install libmeshoptimizer-dev and build again."};
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    std::optional<vdtree::AtomicFile> csv;
-    if (!a.csv.empty()) {
-        auto file = vdtree::AtomicFile::create(a.csv);
-        if (!file) return file.error();
-        csv = std::move(*file);
-    }
+    auto csv = open_if_named(a.csv);
+    if (!csv) return csv.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -164,6 +160,13 @@ Result<int> run(LodArguments& a) {
     for (std::size_t i = 0; i < files.size(); ++i)
         if (const auto one = session::write_level(files[i], session->scene(), *lod, i, a.gltf); !one)
             return one.error();
+
+    if (!a.sheet.empty()) {
+        const auto sheet =
+            draw_level_sheet(*session, *context, *lod, std::filesystem::path(a.model).filename().string());
+        if (!sheet) return sheet.error();
+        if (auto ok = perception::write_image(a.sheet, *sheet); !ok) return ok.error();
+    }
 
     Json objects = Json::array();
     for (const session::LodObject& object : lod->objects) {
@@ -198,9 +201,9 @@ Result<int> run(LodArguments& a) {
                                    {"files", std::move(sizes)}});
         !ok)
         return ok.error();
-    if (csv) {
-        if (auto ok = csv->write(to_csv(*lod)); !ok) return ok.error();
-        if (auto ok = csv->commit(); !ok) return ok.error();
+    if (*csv) {
+        if (auto ok = (*csv)->write(to_csv(*lod)); !ok) return ok.error();
+        if (auto ok = (*csv)->commit(); !ok) return ok.error();
     }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
@@ -208,7 +211,7 @@ Result<int> run(LodArguments& a) {
     print(*lod, *written);
     std::vector<std::string> all = {a.out};
     all.insert(all.end(), files.begin(), files.end());
-    all.insert(all.end(), {a.csv, a.json});
+    all.insert(all.end(), {a.csv, a.json, a.sheet});
     print_written(all);
     return exit_done;
 }
@@ -248,6 +251,9 @@ Command lod_command(CLI::App& app) {
     verb->add_flag("--quantize", a->gltf.quantize, "Numbers of 16 bits: KHR_mesh_quantization");
     verb->add_flag("--meshopt", a->gltf.meshopt, "Compressed: EXT_meshopt_compression");
     verb->add_option("--csv", a->csv, "One line a level")->type_name("FILE.csv");
+    verb->add_option("--sheet", a->sheet, "A picture of the levels: where each begins, and from near by")
+        ->type_name("SHEET.png")
+        ->check(ending_in({".png"}));
     add_json_option(*verb, a->json);
     add_as_option(*verb, a->view.as);
     add_surroundings_options(*verb, a->view);

@@ -4,7 +4,6 @@
 #include <memory>
 
 #include <unseen/session_gpu/tradeoff.h>
-#include <unseen/vdtree/internal/atomic_file.h>
 
 #include "cut_report.h"
 #include "output_files.h"
@@ -113,12 +112,8 @@ Result<int> run(TradeoffArguments& a) {
         return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    std::optional<vdtree::AtomicFile> csv;
-    if (!a.csv.empty()) {
-        auto file = vdtree::AtomicFile::create(a.csv);
-        if (!file) return file.error();
-        csv = std::move(*file);
-    }
+    auto csv = open_if_named(a.csv);
+    if (!csv) return csv.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -139,9 +134,9 @@ Result<int> run(TradeoffArguments& a) {
                                    {"left_out", tradeoff->left_out}});
         !ok)
         return ok.error();
-    if (csv) {
-        if (auto ok = csv->write(to_csv(*tradeoff)); !ok) return ok.error();
-        if (auto ok = csv->commit(); !ok) return ok.error();
+    if (*csv) {
+        if (auto ok = (*csv)->write(to_csv(*tradeoff)); !ok) return ok.error();
+        if (auto ok = (*csv)->commit(); !ok) return ok.error();
     }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;

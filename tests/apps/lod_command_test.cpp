@@ -135,6 +135,19 @@ TEST_F(LodCommandTest, SmallFilesNameWhatTheyNeed) {
     EXPECT_EQ(small["buffers"][1]["extensions"]["EXT_meshopt_compression"]["fallback"], true);
 }
 
+TEST_F(LodCommandTest, ASheetShowsEachLevel) {
+    const Outcome made = lod({"--sheet", "levels.png", "--json", "-"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    const std::size_t levels = made.json()["objects"][0]["levels"].size();
+    const auto sheet = unseen::perception::read_image(path("levels.png"));
+    ASSERT_TRUE(sheet) << sheet.error().message;
+    EXPECT_GT(sheet->image.width, 280 * static_cast<int>(levels - 1));
+    EXPECT_GT(sheet->image.height, 4 * 280);
+    // Its cells are no empty ones.
+    const auto [least, most] = std::ranges::minmax(sheet->image.values);
+    EXPECT_GT(most - least, 0.5f);
+}
+
 TEST_F(LodCommandTest, WrongUsageIsNamed) {
     EXPECT_THAT(run({"lod", "ball.vdt", "-o", "out.ply"}).err, HasSubstr("out.ply"));
     EXPECT_THAT(run({"lod", "missing.glb", "-o", "out.glb"}).err, HasSubstr("missing.glb"));

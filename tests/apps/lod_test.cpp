@@ -98,6 +98,20 @@ TEST_F(LodTest, WhatHasNoUnseenLevelSaysSo) {
     EXPECT_THAT(lod->objects[0].notes.back(), HasSubstr("no level below the full mesh"));
 }
 
+// So many that some begin at nearly the same distance.
+TEST_F(LodTest, LevelsThatCannotBeToldApartBecomeOne) {
+    Session session = bumpy();
+    LodOptions options{.chain = {.levels = most_levels}, .directions = 1, .samples = 4};
+    options.chain.least_share = 0.3;
+    const auto lod = make_levels(session, context(), options);
+    ASSERT_TRUE(lod) << lod.error().message;
+    const LodObject& object = lod->objects[0];
+    EXPECT_LT(object.levels.size(), static_cast<std::size_t>(object.chain.size()));
+    EXPECT_THAT(object.notes, ::testing::Contains(HasSubstr("was merged with that of")));
+    for (std::size_t i = 2; i < object.levels.size(); ++i)
+        EXPECT_GE(object.levels[i].distance, lod_step * object.levels[i - 1].distance);
+}
+
 TEST_F(LodTest, OptionsOutOfRangeAreErrors) {
     Session session = bumpy();
     EXPECT_THAT(make_levels(session, context(), {.directions = 0}).error().message, HasSubstr("lod.directions"));

@@ -16,6 +16,7 @@
 #include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
+#include "compressed_glb.h"
 #include "shapes.h"
 #include "vtk_files.h"
 
@@ -51,6 +52,8 @@ void make_meshes(const fs::path& folder) {
         write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
         fs::remove(plain);
     }
+    if (const std::string levels = mesh_files::compressed_glb(); !levels.empty())
+        write(folder / "levels.glb", '\5' + levels);
     const std::string text_ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
                                  "y\nproperty float z\nelement face 1\n"
                                  "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";

@@ -1,18 +1,24 @@
 // Files that lie, end early or were damaged: one clear sentence, no crash, no allocation out of proportion.
 #include <unseen/meshio/mesh_io.h>
 
+#include "compressed_glb.h"
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 #include "vtk_files.h"
 
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <new>
 #include <random>
+#include <set>
+
+#include <nlohmann/json.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -601,6 +607,50 @@ TEST(MalformedMesh, GlbChunksAreChecked) {
             EXPECT_FALSE(is_read_or_refused(changed.replace(at, 4, mesh_files::little(value)), "a.glb"))
                 << at << " " << value;
         }
+    }
+}
+
+TEST(MalformedMesh, CompressedGltfIsChecked) {
+    const std::string file = mesh_files::compressed_glb();
+    if (file.empty()) GTEST_SKIP() << "this build is without meshoptimizer";
+    const Result<meshio::ReadResult> whole = meshio::read_mesh_bytes(file, "levels.glb");
+    ASSERT_TRUE(whole) << whole.error().message;
+    EXPECT_EQ(whole->mesh.triangles.size(), 80u);
+    std::uint32_t json_size = 0;
+    std::memcpy(&json_size, file.data() + 12, 4);
+    const auto document = nlohmann::json::parse(file.substr(20, json_size));
+    const std::string bin = file.substr(20 + json_size + 8);
+    // All numbers of the first view of each mode.
+    std::set<std::string> modes;
+    for (std::size_t i = 0; i < document["bufferViews"].size(); ++i) {
+        const auto at =
+            nlohmann::json::json_pointer("/bufferViews/" + std::to_string(i) + "/extensions/EXT_meshopt_compression");
+        if (!document.contains(at) || !modes.insert(document[at]["mode"]).second) continue;
+        for (const char* key : {"buffer", "byteOffset", "byteLength", "byteStride", "count", "mode", "filter"})
+            for (const nlohmann::json& value :
+                 {nlohmann::json(-1), nlohmann::json(std::int64_t{1} << 53), nlohmann::json(1e300), nlohmann::json(7),
+                  nlohmann::json("EXPONENTIAL"), nlohmann::json(nullptr), nlohmann::json::array()}) {
+                auto changed = document;
+                changed[at][key] = value;
+                largest_allocation = 0;
+                const bool is_read = is_read_or_refused(mesh_files::glb(changed.dump(), bin), "levels.glb");
+                EXPECT_LT(largest_allocation, 100 * file.size()) << key << " " << value;
+                const bool is_filter = std::string(key) == "filter";
+                EXPECT_TRUE(!is_read || is_filter) << i << " " << key << " " << value;
+            }
+    }
+    EXPECT_GE(modes.size(), 2u);
+    // Many views of the same bytes.
+    auto many = document;
+    for (int i = 0; i < 200'000; ++i) many["bufferViews"].push_back(document["bufferViews"][0]);
+    EXPECT_FALSE(is_read_or_refused(mesh_files::glb(many.dump(), bin), "levels.glb"));
+    std::mt19937 random(1234);
+    for (int round = 0; round < 4000; ++round) {
+        std::string damaged = file;
+        for (int k = 0; k < 3; ++k)
+            damaged[20 + json_size + random() % (damaged.size() - 20 - json_size)] ^=
+                static_cast<char>(1 << random() % 8);
+        is_read_or_refused(damaged, "levels.glb");
     }
 }
 

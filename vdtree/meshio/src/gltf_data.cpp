@@ -38,6 +38,14 @@ std::optional<std::string> decode_base64(std::string_view text) {
     return bytes;
 }
 
+// Of views that are compressed: stands for what they hold uncompressed, and may have no data.
+bool is_fallback(const json& buffer) {
+    const json* extensions = member(buffer, "extensions");
+    const json* extension = extensions && extensions->is_object() ? member(*extensions, meshopt_extension) : nullptr;
+    const json* fallback = extension && extension->is_object() ? member(*extension, "fallback") : nullptr;
+    return fallback != nullptr && *fallback == true;
+}
+
 } // namespace
 
 std::string decode_percent(std::string_view text) {
@@ -70,13 +78,21 @@ Buffers::Buffers(const MeshSource& source, const json& document, std::optional<s
         std::string_view bytes;
         if (uri != nullptr && uri->is_string()) bytes = resolve(uri->get_ref<const std::string&>(), where);
         else if (i == 0 && bin) bytes = *bin;
-        else fail(where + " names no file and has no data of its own; correct the JSON.");
+        else if (is_fallback(array[i])) {
+            buffers_.emplace_back();
+            continue;
+        } else fail(where + " names no file and has no data of its own; correct the JSON.");
         if (size > bytes.size()) {
             fail(where + " claims " + std::to_string(size) + " bytes, but there are " + std::to_string(bytes.size()) +
                  "; the data are cut short.");
         }
         buffers_.push_back(bytes.substr(0, size));
     }
+}
+
+std::size_t Buffers::add(std::string bytes) {
+    buffers_.push_back(added_.emplace_back(std::move(bytes)));
+    return buffers_.size() - 1;
 }
 
 std::string Buffers::decode_data(std::string_view uri, const std::string& where) {

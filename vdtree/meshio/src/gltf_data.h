@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -30,6 +31,9 @@ public:
     // Beside the mesh file; fails where it cannot be read.
     std::string read_beside(const std::string& uri, const std::string& where) const;
 
+    // A buffer that no file has; its number.
+    std::size_t add(std::string bytes);
+
     std::size_t count() const { return buffers_.size(); }
     std::string_view operator[](std::size_t i) const { return buffers_[i]; }
     std::uint64_t external_bytes() const { return external_bytes_; }
@@ -39,9 +43,15 @@ private:
 
     const MeshSource& source_;
     std::map<std::string, std::string> loaded_;
+    std::deque<std::string> added_;
     std::vector<std::string_view> buffers_;
     std::uint64_t external_bytes_ = 0;
 };
+
+// Decodes the buffer views that are compressed, and has them name the buffers with the result. Without the library
+// meshoptimizer nothing: files that need the extension have been refused then (check_kept()).
+inline constexpr const char* meshopt_extension = "EXT_meshopt_compression";
+void unpack_views(json& document, Buffers& buffers);
 
 class Accessors {
 public:

@@ -35,6 +35,9 @@ Container split_glb(std::string_view bytes);
 // Not deeper and not of more values than scenes are.
 json parse_json(std::string_view text);
 
+// Names of nodes with coarser meshes, which stand in no scene.
+inline constexpr const char* lod_extension = "MSFT_lod";
+
 const json* member(const json& object, const char* key);   // null: it has none
 const json& array_of(const json& object, const char* key); // empty: it has none
 std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const std::string& where); // from 0 on

@@ -4,6 +4,9 @@
 #include <string>
 #include <string_view>
 
+#include <unseen/meshio/level_file.h>
+
+#include "gltf_data.h"
 #include "gltf_document.h"
 #include "mesh_readers.h"
 
@@ -12,8 +15,8 @@ namespace unseen::meshio::gltf {
 namespace {
 
 // Extensions without which the positions or triangles cannot be read.
-constexpr std::string_view unsupported_extensions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
-                                                       "KHR_meshopt_compression", "EXT_mesh_gpu_instancing"};
+constexpr std::string_view unsupported_extensions[] = {"KHR_draco_mesh_compression", "KHR_meshopt_compression",
+                                                       "EXT_mesh_gpu_instancing"};
 // Only of how vertices are stored, which is done otherwise when they are written.
 constexpr std::string_view quantization = "KHR_mesh_quantization";
 
@@ -46,7 +49,13 @@ std::set<std::string> unknown_required(const json& document) {
             std::end(unsupported_extensions)) {
             fail("it needs the extension " + required + ", which is not read; export it without.");
         }
-        if (!is_kept(required) && required != quantization) unknown.insert(required);
+        if (required == meshopt_extension && !has_meshoptimizer())
+            fail("it needs the extension " + required +
+                 ", and this build is without the library meshoptimizer; install "
+                 "libmeshoptimizer-dev and build again, or export it without.");
+        if (!is_kept(required) && required != quantization && required != meshopt_extension &&
+            required != lod_extension)
+            unknown.insert(required);
     }
     return unknown;
 }
@@ -152,6 +161,9 @@ json without_geometry(json document, std::vector<std::string>& warnings) {
     std::set<std::string> stripped;
     strip_extensions(document, stripped);
     stripped.erase(std::string(quantization));
+    stripped.erase(meshopt_extension);
+    if (stripped.erase(lod_extension) > 0)
+        warnings.push_back("of its levels of detail (MSFT_lod) the finest were read.");
     if (!stripped.empty())
         warnings.push_back("what extensions say that are not known was left out: " + listed(stripped) + ".");
     for (const char* key : {"extensionsUsed", "extensionsRequired"}) keep_names(document, key);

@@ -131,12 +131,32 @@ std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t nod
     return static_cast<std::size_t>(mesh);
 }
 
-std::uint64_t hidden_meshes(const tinygltf::Model& model, const std::vector<ShownNode>& shown) {
-    const auto has_mesh = [](const tinygltf::Node& node) { return node.mesh >= 0; };
-    const auto all = std::count_if(model.nodes.begin(), model.nodes.end(), has_mesh);
-    const auto seen =
-        std::count_if(shown.begin(), shown.end(), [&](const ShownNode& n) { return has_mesh(model.nodes[n.node]); });
-    return static_cast<std::uint64_t>(all - seen);
+std::uint64_t hidden_meshes(const json& document, const tinygltf::Model& model, const std::vector<ShownNode>& shown) {
+    const std::size_t count = model.nodes.size();
+    std::vector<bool> is_known(count, false);
+    for (const ShownNode& node : shown) is_known[node.node] = true;
+    // Other levels of detail, with what is below them.
+    std::vector<std::size_t> open;
+    const auto meet = [&](std::size_t node) {
+        if (node < count && !is_known[node]) open.push_back(node);
+    };
+    for (const json& node : array_of(document, "nodes")) {
+        const json* extensions = member(node, "extensions");
+        const json* levels = extensions && extensions->is_object() ? member(*extensions, lod_extension) : nullptr;
+        if (levels == nullptr || !levels->is_object()) continue;
+        for (const json& id : array_of(*levels, "ids"))
+            if (id.is_number_unsigned()) meet(id.get<std::size_t>());
+    }
+    while (!open.empty()) {
+        const std::size_t node = open.back();
+        open.pop_back();
+        if (is_known[node]) continue;
+        is_known[node] = true;
+        for (const int child : model.nodes[node].children) meet(static_cast<std::size_t>(child));
+    }
+    std::uint64_t hidden = 0;
+    for (std::size_t i = 0; i < count; ++i) hidden += model.nodes[i].mesh >= 0 && !is_known[i];
+    return hidden;
 }
 
 } // namespace unseen::meshio::gltf

@@ -28,7 +28,7 @@ std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, cons
 // The mesh of a node; fails where there is no such mesh.
 std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t node);
 
-// Nodes with a mesh that are not shown.
-std::uint64_t hidden_meshes(const tinygltf::Model& model, const std::vector<ShownNode>& shown);
+// Nodes with a mesh that are not shown, and are no other level of detail of one.
+std::uint64_t hidden_meshes(const json& document, const tinygltf::Model& model, const std::vector<ShownNode>& shown);
 
 } // namespace unseen::meshio::gltf

@@ -268,7 +268,7 @@ glm::vec3 placed_normal(const Placement& placement, const glm::dvec3& normal) {
 class SceneReader {
 public:
     SceneReader(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
-        : source_(source), model_(model), accessors_(model, buffers),
+        : source_(source), whole_(document), model_(model), accessors_(model, buffers),
           bytes_left_(
               std::max(min_bytes_out, max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
         for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
@@ -291,7 +291,7 @@ public:
                 add_mesh(*mesh, static_cast<std::int32_t>(node.node), placement_of(node.to_world));
         }
         tell_of_parts();
-        if (const std::uint64_t hidden = hidden_meshes(model_, *shown); hidden > 0)
+        if (const std::uint64_t hidden = hidden_meshes(whole_, model_, *shown); hidden > 0)
             result_.warnings.push_back(counted_were(hidden, "node") + " not in the scene that is shown and left out.");
         keep_channels();
         return std::move(result_);
@@ -541,6 +541,7 @@ private:
     }
 
     const MeshSource& source_;
+    const json& whole_;
     const tinygltf::Model& model_;
     Accessors accessors_;
     ReadResult result_;
@@ -556,15 +557,16 @@ private:
 Result<ReadResult> read_document(const MeshSource& source) {
     Container container{source.bytes, std::nullopt};
     if (source.bytes.starts_with("glTF")) container = split_glb(source.bytes);
-    const json document = parse_json(container.json_text);
+    json document = parse_json(container.json_text);
     if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
 
     std::vector<std::string> warnings;
-    const Reduced reduced = reduce(document);
     check_kept(document, source.options.drop, warnings);
+    Buffers buffers(source, document, container.bin);
+    unpack_views(document, buffers);
+    const Reduced reduced = reduce(document);
     if (reduced.has_tangents) warnings.push_back("tangents were left out; they follow from normals and coordinates.");
     if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
-    const Buffers buffers(source, document, container.bin);
     SceneReader scene(source, document, reduced.model, buffers);
     std::optional<ReadResult> result = scene.read();
     if (!result) return cancelled(source);

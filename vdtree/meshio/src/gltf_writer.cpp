@@ -28,7 +28,6 @@ constexpr int array_buffer = 34962, element_array_buffer = 34963, no_target = 0;
 constexpr int float_component = 5126, unsigned_int_component = 5125, triangles_mode = 4;
 constexpr int short_component = 5122, unsigned_short_component = 5123;
 constexpr double grid_steps = 65535; // of 16 bits
-constexpr const char* meshopt_extension = "EXT_meshopt_compression";
 
 constexpr std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 3) / 4 * 4; }
 
@@ -108,12 +107,12 @@ std::size_t GltfFile::add_view(std::string_view bytes, std::size_t component_byt
         const bool is_index = target == element_array_buffer;
         packed_.push_back(is_index ? compressed_indices(bytes) : compressed_vertices(bytes, stride));
         const std::size_t element = is_index ? sizeof(vdtree::Index) : stride;
-        view["extensions"][meshopt_extension] = {{"buffer", 0},
-                                                 {"byteOffset", bytes_},
-                                                 {"byteLength", packed_.back().size()},
-                                                 {"byteStride", element},
-                                                 {"count", bytes.size() / element},
-                                                 {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
+        view["extensions"][gltf::meshopt_extension] = {{"buffer", 0},
+                                                       {"byteOffset", bytes_},
+                                                       {"byteLength", packed_.back().size()},
+                                                       {"byteStride", element},
+                                                       {"count", bytes.size() / element},
+                                                       {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
         // Where the bytes would lie for readers that do not know the extension.
         view["buffer"] = 1;
         view["byteOffset"] = unpacked_bytes_;
@@ -280,9 +279,9 @@ Result<void> GltfFile::write(const fs::path& file, json document) const {
     };
     if (is_quantized_) require("KHR_mesh_quantization");
     if (options_.meshopt) {
-        require(meshopt_extension);
+        require(gltf::meshopt_extension);
         document["buffers"].push_back(
-            {{"byteLength", unpacked_bytes_}, {"extensions", {{meshopt_extension, {{"fallback", true}}}}}});
+            {{"byteLength", unpacked_bytes_}, {"extensions", {{gltf::meshopt_extension, {{"fallback", true}}}}}});
     }
     std::string text = document.dump(is_binary ? -1 : 1, ' ', false, json::error_handler_t::replace);
     if (!is_binary) {

@@ -30,7 +30,6 @@ using nlohmann::json;
 
 namespace {
 
-constexpr const char* lod_extension = "MSFT_lod";
 constexpr const char* screen_coverage = "MSFT_screencoverage";
 
 Result<void> check(const fs::path& file, const LevelCuts& levels) {
@@ -76,10 +75,10 @@ void show(json& nodes, std::size_t node, const WrittenMesh& mesh) {
 void tell_levels(json& out, std::size_t node, const std::vector<std::size_t>& ids,
                  const std::vector<double>& coverages) {
     json& first = out["nodes"].at(node);
-    first["extensions"][lod_extension] = {{"ids", ids}};
+    first["extensions"][gltf::lod_extension] = {{"ids", ids}};
     first["extras"][screen_coverage] = coverages;
     json& used = out["extensionsUsed"];
-    if (std::find(used.begin(), used.end(), lod_extension) == used.end()) used.push_back(lod_extension);
+    if (std::find(used.begin(), used.end(), gltf::lod_extension) == used.end()) used.push_back(gltf::lod_extension);
 }
 
 // Without scenes all nodes are shown, which those of further levels must not be.

@@ -35,7 +35,7 @@ constexpr double usual_outer_radians = std::numbers::pi / 4; // as the extension
 constexpr double brightest = 1e12;                           // lux or candela: beyond is a mistake
 constexpr const char* lights_extension = "KHR_lights_punctual";
 
-bool is_finite(const glm::dmat4& m) {
+bool is_finite_matrix(const glm::dmat4& m) {
     for (int c = 0; c < 4; ++c)
         for (int r = 0; r < 4; ++r)
             if (!std::isfinite(m[c][r])) return false;
@@ -105,7 +105,7 @@ public:
                                is_background_name(name_in(node)) || is_marked(node, where);
             contents_.is_scene = contents_.is_scene || is_background[i];
             const auto mesh = gltf::mesh_of(model_, placed.node);
-            if ((mesh || has_camera(node) || light_of(node)) && !is_finite(placed.to_world))
+            if ((mesh || has_camera(node) || light_of(node)) && !is_finite_matrix(placed.to_world))
                 fail(where + ": its transform, with those above it, is NaN or infinite; correct it.");
             if (mesh) {
                 add(placed, *mesh, name_in(node), is_background[i]);
@@ -118,7 +118,7 @@ public:
             for (std::size_t i = 0; i < model_.meshes.size(); ++i)
                 contents_.nodes.push_back({model_.meshes[i].name.empty() ? numbered("mesh", i) : model_.meshes[i].name,
                                            -1, static_cast<std::int32_t>(i), glm::dmat4(1), false});
-        if (const std::uint64_t hidden = gltf::hidden_meshes(model_, *shown); hidden > 0)
+        if (const std::uint64_t hidden = gltf::hidden_meshes(document_, model_, *shown); hidden > 0)
             contents_.warnings.push_back(counted_were(hidden, "node") +
                                          " not in the scene that is shown and left out.");
         contents_.is_scene = contents_.is_scene || contents_.camera || !contents_.lights.empty();
@@ -316,12 +316,13 @@ struct SceneFile::Impl {
         document = gltf::parse_json(container.json_text);
         if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
         std::vector<std::string> warnings;
-        reduced = gltf::reduce(document);
         gltf::check_kept(document, options.drop, warnings);
+        buffers.emplace(source, document, container.bin);
+        gltf::unpack_views(document, *buffers);
+        reduced = gltf::reduce(document);
         if (reduced.has_tangents)
             warnings.push_back("tangents were left out; they follow from normals and coordinates.");
         if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
-        buffers.emplace(source, document, container.bin);
         auto read = Contents(source, document, reduced.model).read();
         if (!read) return cancelled(source);
         contents = std::move(*read);

@@ -112,9 +112,9 @@ public:
         for (std::size_t i = 0; i < open.size(); ++i) {
             first_share_ = static_cast<double>(i) / static_cast<double>(open.size());
             step_ = 1.0 / static_cast<double>(open.size());
-            const auto is_unseen = settle(made, open[i]);
-            if (!is_unseen) return is_unseen.error();
-            if (*is_unseen) seen_through.push_back(std::move(open[i]));
+            const auto settled = settle(made, open[i]);
+            if (!settled) return settled.error();
+            if (*settled) seen_through.push_back(std::move(open[i]));
             else
                 made.notes.push_back("a level of " + std::to_string(open[i].triangles) +
                                      " triangles shows from anywhere, and was left out.");
@@ -182,21 +182,34 @@ private:
             const double share = static_cast<double>(level.checks.size()) / options_.directions;
             if (goes_on_ && !goes_on_(first_share_ + step_ * share))
                 return Error{ErrorCode::cancelled, "Making levels of detail was stopped."};
-            const vdtree::View view = lod_view(lod_, made.sphere, direction, level.distance);
-            PictureVerdict verdict;
-            for (const int samples : {std::min(quick_samples, options_.samples), options_.samples}) {
-                auto judge = PictureJudge::create(renderer_, session_, view, samples);
-                if (!judge) return judge.error();
-                const auto judged = judge->judge(cuts);
-                if (!judged) return judged.error();
-                verdict = *judged;
-                ++lod_.looks;
-                if (verdict.shows_nothing()) break;
-            }
-            level.checks.push_back({direction, verdict.visible, verdict.second_visible, verdict.v, verdict.second_v});
-            if (!verdict.shows_nothing()) return true;
+            const auto verdict = look_from(made, direction, level.distance, cuts);
+            if (!verdict) return verdict.error();
+            level.checks.push_back(
+                {direction, verdict->visible, verdict->second_visible, verdict->v, verdict->second_v});
+            if (!is_unseen(*verdict)) return true;
         }
         return false;
+    }
+
+    static bool is_unseen(const PictureVerdict& verdict) {
+        return verdict.shows_nothing() && std::max(verdict.v, verdict.second_v) <= lod_most;
+    }
+
+    // With few samples where these show nothing.
+    Result<PictureVerdict> look_from(const LodObject& made, const glm::dvec3& direction, double distance,
+                                     const std::vector<vdtree::Cut>& cuts) {
+        const vdtree::View view = lod_view(lod_, made.sphere, direction, distance);
+        PictureVerdict verdict;
+        for (const int samples : {std::min(quick_samples, options_.samples), options_.samples}) {
+            auto judge = PictureJudge::create(renderer_, session_, view, samples);
+            if (!judge) return judge.error();
+            const auto judged = judge->judge(cuts);
+            if (!judged) return judged.error();
+            verdict = *judged;
+            ++lod_.looks;
+            if (is_unseen(verdict)) break;
+        }
+        return verdict;
     }
 
     Session& session_;

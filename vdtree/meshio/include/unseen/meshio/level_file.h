@@ -15,7 +15,7 @@
 
 namespace unseen::meshio {
 
-// How numbers are stored. Readers must know the extensions then, and this library's own does not.
+// How numbers are stored. Readers must know the extensions then, as this library's own does.
 struct GltfOptions {
     // KHR_mesh_quantization: positions on a grid of 65,535 steps along the mesh's longest side, normals, colours and texture
     // coordinates within 0..1 in 16 bits. Half to two thirds of the bytes.

@@ -78,9 +78,9 @@ struct Lod {
 
 // Levels of each object of the session's scene, alone before its background, under the scene's lights. LevelChain chooses
 // them: evenly spaced in visibility, the same from all sides. Each is then looked at from its distance, full mesh beside
-// level, from sides that are spread at random and off the axes, by both judges. Where either sees a pixel, the distance
-// grows by a fifth, and the level is looked at from other sides; so what is reported was never chosen by. No distance is
-// so near that the object does not fit on the display.
+// level, from sides that are spread at random and off the axes, by both judges. Where either finds more than lod_most,
+// the distance grows by a fifth, and the level is looked at from other sides; so what is reported was never chosen by. No
+// distance is so near that the object does not fit on the display.
 //
 // Levels that another one with fewer triangles replaces from the same distance on, up to lod_step, are left out, and so
 // are those that are seen from everywhere; notes say so. Objects that share a tree, and are as large, share the looks
@@ -91,6 +91,9 @@ Result<Lod> make_levels(Session& session, const render::Context& context, const 
 
 // By how much a distance grows where the level shows, and by how much those of levels differ at least.
 inline constexpr double lod_growth = 1.2, lod_step = 1.05;
+// In thresholds: what a level may come to where it is looked at. From 1 on it is seen; sides that nobody looked from may
+// come to somewhat more than those that somebody did.
+inline constexpr double lod_most = 0.75;
 
 // The view that level and full mesh are compared in: the display's pixels, cut to what the sphere takes and a margin.
 vdtree::View lod_view(const Lod& lod, const WorldSphere& sphere, glm::dvec3 direction, double distance);
