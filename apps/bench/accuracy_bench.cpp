@@ -1,3 +1,5 @@
+#include <unseen/vdtree/internal/csv.h>
+
 #include "accuracy_bench.h"
 
 #include <algorithm>
@@ -295,12 +297,6 @@ Json to_json(const AccuracyBenchResult& result) {
     return {{"axes", std::move(axes)}, {"points", std::move(points)}};
 }
 
-std::string csv_quoted(const std::string& text) {
-    std::string out = "\"";
-    for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return out + "\"";
-}
-
 } // namespace
 
 std::vector<std::string> accuracy_axis_keys() {
@@ -392,10 +388,10 @@ std::string to_csv(const AccuracyBenchResult& result) {
         for (std::size_t i = 2; i < p.values.size(); ++i)
             if (std::isfinite(p.values[i]))
                 more += (more.empty() ? "" : "; ") + axis->columns[i] + " = " + shortest(p.values[i]);
-        text += p.axis + "," + csv_quoted(p.subject) + "," + csv_quoted(p.name) + "," + (p.is_default ? "1" : "0") +
-                "," + (p.is_on_front ? "1" : "0") + "," + number(p.cost()) + "," + csv_quoted(axis->columns[0]) + "," +
-                number(p.error()) + "," + csv_quoted(axis->columns[1]) + "," + csv_quoted(more) + "," +
-                csv_quoted(p.note) + "\n";
+        text += p.axis + "," + csv_field(p.subject) + "," + csv_field(p.name) + "," + (p.is_default ? "1" : "0") + "," +
+                (p.is_on_front ? "1" : "0") + "," + number(p.cost()) + "," + csv_field(axis->columns[0]) + "," +
+                number(p.error()) + "," + csv_field(axis->columns[1]) + "," + csv_field(more) + "," +
+                csv_field(p.note) + "\n";
     }
     return text;
 }

@@ -491,6 +491,8 @@ Command scenes_command(CLI::App& app) {
 
 struct SelectionArguments {
     SelectionBenchOptions options;
+    std::string csv;
+    std::vector<std::string> qualities;
     std::vector<int> size;
     ReportArguments report;
     bool quick = false;
@@ -500,16 +502,17 @@ Result<int> run(SelectionArguments& a) {
     std::vector<std::string> inputs = a.options.scenes;
     inputs.insert(inputs.end(), a.options.selections.begin(), a.options.selections.end());
     inputs.insert(inputs.end(), a.options.statues.begin(), a.options.statues.end());
-    auto bench = BenchRun::open(inputs, {}, a.report);
+    auto bench = BenchRun::open(inputs, {a.csv}, a.report);
     if (!bench) return bench.error();
-    const auto result = bench_selection(a.options);
+    auto result = bench_selection(a.options);
     if (!result) return result.error();
-    return bench->close({{"budget", a.options.budget},
-                         {"width", a.options.width},
-                         {"height", a.options.height},
-                         {"samples", a.options.samples},
-                         {"scenes", result->scenes}},
-                        result->tables);
+    if (!a.csv.empty())
+        if (auto ok = write_text(a.csv, to_csv(result->frames)); !ok) return ok.error();
+    result->json["budget"] = a.options.budget;
+    result->json["width"] = a.options.width;
+    result->json["height"] = a.options.height;
+    result->json["samples"] = a.options.samples;
+    return bench->close(std::move(result->json), result->tables);
 }
 
 Command selection_command(CLI::App& app) {
@@ -520,9 +523,31 @@ Command selection_command(CLI::App& app) {
                      "tree's budget");
     verb->add_option("SCENE", o.scenes, "Scenes (default: spheres, bunnies and models of 'unseen scene make')")
         ->type_name("SCENE.glb");
-    verb->add_option("--selection", o.selections, "Of each scene, in their order (default: made here)")
-        ->type_name("FILE.sel")
-        ->allow_extra_args(false);
+    CLI::Option* selections =
+        verb->add_option("--selection", o.selections, "Of each scene, in their order (default: made here)")
+            ->type_name("FILE.sel")
+            ->allow_extra_args(false);
+    verb->add_option("--quality", a->qualities,
+                     "What selected levels lose least of: ssim (default), pixels or contrast; may be given again, and "
+                     "each is flown")
+        ->type_name("NAME")
+        ->allow_extra_args(false)
+        ->check(one_of({"ssim", "pixels", "contrast"}))
+        ->excludes(selections);
+    verb->add_option("--spacing", o.spacing,
+                     "Of the search's corners, world units (default: a tenth of the scene's longer side)")
+        ->type_name("X")
+        ->check(positive())
+        ->excludes(selections);
+    verb->add_option("--window", o.window_px, "Of the search's cameras, a side (default: 256)")
+        ->type_name("PIXELS")
+        ->check(whole(11, 8192))
+        ->excludes(selections);
+    verb->add_flag_function(
+            "--no-growth", [a](std::int64_t) { a->options.measures_growth = false; },
+            "Do not search the first scene again with other numbers of objects, levels and cameras: minutes")
+        ->excludes(selections);
+    verb->add_option("--csv", a->csv, "One line a judged frame")->type_name("FILE.csv");
     verb->add_option("--mesh", o.statues, "A statue of the default scenes; may be given again")
         ->type_name("FILE")
         ->allow_extra_args(false);
@@ -546,12 +571,22 @@ Command selection_command(CLI::App& app) {
     verb->add_flag("--quick", a->quick, "Few frames, one sample a pixel");
     add_report_options(*verb, a->report);
     verb->callback([a] {
-        if (a->quick) a->options.judged_every = 100, a->options.samples = 1, a->options.gap_cameras = 2;
+        if (a->quick)
+            a->options.judged_every = 100, a->options.samples = 1, a->options.gap_cameras = 2,
+            a->options.measures_growth = false;
+        if (!a->qualities.empty()) {
+            using session::SelectionQuality;
+            a->options.qualities.clear();
+            for (const auto quality : {SelectionQuality::ssim, SelectionQuality::pixels, SelectionQuality::contrast})
+                if (std::ranges::find(a->qualities, name_of(quality)) != a->qualities.end())
+                    a->options.qualities.push_back(quality);
+        }
         if (!a->size.empty()) a->options.width = a->size[0], a->options.height = a->size[1];
     });
     verb->footer(
         "Examples:\n  unseen-bench selection --quick\n"
         "  unseen-bench selection --mesh bunny.ply --mesh dragon.ply --mesh armadillo.ply --plots plots\n"
+        "  unseen-bench selection --quality ssim --quality pixels --csv frames.csv\n"
         "  unseen-bench selection mine.glb --selection mine.sel --every 1 --size 1920 1080 --json flight.json");
     return {verb, [a] { return run(*a); }};
 }

@@ -22,6 +22,8 @@
 #include <unseen/session_gpu/level_pictures.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/csv.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
 #include "made_scenes.h"
@@ -39,6 +41,22 @@ using session::SelectionFollower;
 constexpr double field_degrees = 60; // vertical
 // Share of the window's height that an object has at least, by level: the source's.
 constexpr std::array<double, 4> height_shares = {0.5, 0.25, 0.125, 0.075};
+
+// Tables 4.2 to 4.4 and 5.1 of the source: means at 1920 x 1080, of meshes of its own.
+struct Thesis {
+    const char* scene;
+    int cameras;
+    const char* precompute;
+    double ssim_by_area, ssim_selected, pixels_by_area, pixels_selected, correlation;
+};
+constexpr std::array<Thesis, 3> thesis = {{{"spheres", 404, "13 h 25 min", 0.999579, 0.999916, 354, 346, -0.746},
+                                           {"bunnies", 378, "30 h 11 min", 0.995292, 0.989877, 11483, 29134, -0.761},
+                                           {"models", 284, "15 h 39 min", 0.988967, 0.988706, 31668, 32052, -0.854}}};
+
+const Thesis* thesis_of(const std::string& scene) {
+    const auto found = std::ranges::find(thesis, scene, &Thesis::scene);
+    return found != thesis.end() ? &*found : nullptr;
+}
 
 // ---- the way ----------------------------------------------------------------------------------------------------------
 
@@ -66,11 +84,16 @@ std::vector<vdtree::View> flight(const session::Selections& selections, const Se
 // ---- what is measured ---------------------------------------------------------------------------------------------------
 
 struct FrameFigures {
+    int number = 0; // of the flight
     std::uint64_t triangles = 0, visible = 0;
     double ssim = 0;
 };
 
+// What is told apart by more than its name.
+enum class Way { selected, selected_otherwise, nearest, thresholds, area, distance, tree, masked_tree };
+
 struct MethodFigures {
+    Way way;
     std::string name;
     std::vector<FrameFigures> frames = {};                         // those that were judged
     double triangles = 0, changes = 0;                             // of all frames, sums
@@ -87,12 +110,18 @@ struct MethodFigures {
         }
         return r;
     }
+    double mean_ssim() const {
+        return range([](auto& f) { return f.ssim; })[2];
+    }
+    double mean_visible() const {
+        return range([](auto& f) { return static_cast<double>(f.visible); })[2];
+    }
+    bool is_tree() const { return way == Way::tree || way == Way::masked_tree; }
 };
 
 // Pearson's, of SSIM and visible pixels.
 double correlation(const MethodFigures& m) {
-    const double ssim = m.range([](auto& f) { return f.ssim; })[2];
-    const double pixels = m.range([](auto& f) { return static_cast<double>(f.visible); })[2];
+    const double ssim = m.mean_ssim(), pixels = m.mean_visible();
     double both = 0, a = 0, b = 0;
     for (const FrameFigures& f : m.frames) {
         const double x = f.ssim - ssim, y = static_cast<double>(f.visible) - pixels;
@@ -105,7 +134,7 @@ double correlation(const MethodFigures& m) {
 
 class Scene {
 public:
-    static Result<Scene> create(const render::Context& context, const std::string& file) {
+    static Result<Scene> create(const render::Context& context, const std::string& file, int levels) {
         session::LoadOptions load;
         load.as = session::LoadAs::scene;
         auto scene = session::Scene::load(file, load);
@@ -115,7 +144,7 @@ public:
         Scene made;
         made.name = fs::path(file).stem().string();
         made.session = std::make_unique<session::Session>(std::move(*session));
-        auto pictures = LevelPictures::create(context, *made.session);
+        auto pictures = LevelPictures::create(context, *made.session, levels);
         if (!pictures) return pictures.error();
         made.pictures = std::make_unique<LevelPictures>(std::move(*pictures));
         for (const session::Object& object : made.session->scene().objects)
@@ -167,50 +196,66 @@ public:
 
 class Flight {
 public:
-    Flight(const render::Context& context, Scene& scene, const session::Selections& selections,
+    // The first selections are those that others are held against.
+    Flight(const render::Context& context, Scene& scene, const std::vector<session::Selections>& selections,
            const SelectionBenchOptions& options)
         : context_(context), scene_(scene), selections_(selections), options_(options) {}
 
     Result<std::vector<MethodFigures>> run() {
         const auto& triangles = scene_.pictures->triangles();
-        const auto follower = [&](session::SelectionBlend blend) {
-            return SelectionFollower::create(selections_, scene_.session->scene(), triangles,
-                                             {.budget = options_.budget, .blend = blend});
-        };
-        auto selected = follower(session::SelectionBlend::costs), nearest = follower(session::SelectionBlend::nearest);
-        if (!selected) return selected.error();
-        if (!nearest) return nearest.error();
-        const auto by = [&](SelectionFollower& f) {
-            return [&f](const vdtree::View& view) -> Result<std::vector<int>> {
-                auto chosen = f.choose(view);
+        std::vector<MethodFigures> methods;
+        using Choose = std::function<Result<std::vector<int>>(const vdtree::View&)>;
+        std::vector<Choose> ways;
+        std::vector<std::unique_ptr<SelectionFollower>> followers;
+        const auto follow = [&](Way way, const std::string& name, const session::Selections& selections,
+                                session::SelectionBlend blend) -> Result<void> {
+            auto follower = SelectionFollower::create(selections, scene_.session->scene(), triangles,
+                                                      {.budget = options_.budget, .blend = blend});
+            if (!follower) return follower.error();
+            followers.push_back(std::make_unique<SelectionFollower>(std::move(*follower)));
+            methods.push_back({way, name});
+            ways.push_back([&own = *followers.back()](const vdtree::View& view) -> Result<std::vector<int>> {
+                auto chosen = own.choose(view);
                 if (!chosen) return chosen.error();
                 return std::move(chosen->levels);
-            };
+            });
+            return {};
         };
-        using Choose = std::function<Result<std::vector<int>>(const vdtree::View&)>;
-        const std::vector<std::pair<std::string, Choose>> ways = {
-            {"selected", by(*selected)},
-            {"selected, combined as in the thesis", by(*nearest)},
-            {"by area, the thesis's thresholds", [&](const vdtree::View& v) { return scene_.switched(v, false, 1); }},
-            {"by area, within the budget",
-             [&](const vdtree::View& v) { return scene_.switched_within(v, false, options_.budget); }},
-            {"by distance, within the budget",
-             [&](const vdtree::View& v) { return scene_.switched_within(v, true, options_.budget); }}};
-        std::vector<MethodFigures> methods;
-        for (const auto& [name, choose] : ways) methods.push_back({name});
-        methods.push_back({"the tree's budget"});
-        if (options_.has_masked_tree) methods.push_back({"the tree's budget, masked"});
+        for (const session::Selections& selections : selections_) {
+            const bool is_first = &selections == &selections_.front();
+            if (auto ok =
+                    follow(is_first ? Way::selected : Way::selected_otherwise,
+                           "selected, by " + name_of(selections.quality), selections, session::SelectionBlend::costs);
+                !ok)
+                return ok.error();
+        }
+        if (auto ok = follow(Way::nearest, "selected, combined as in the thesis", selections_.front(),
+                             session::SelectionBlend::nearest);
+            !ok)
+            return ok.error();
+        const auto switching = [&](Way way, const std::string& name, Choose choose) {
+            methods.push_back({way, name});
+            ways.push_back(std::move(choose));
+        };
+        switching(Way::thresholds, "by area, the thesis's thresholds",
+                  [&](const vdtree::View& v) { return scene_.switched(v, false, 1); });
+        switching(Way::area, "by area, within the budget",
+                  [&](const vdtree::View& v) { return scene_.switched_within(v, false, options_.budget); });
+        switching(Way::distance, "by distance, within the budget",
+                  [&](const vdtree::View& v) { return scene_.switched_within(v, true, options_.budget); });
+        methods.push_back({Way::tree, "the tree's budget"});
+        if (options_.has_masked_tree) methods.push_back({Way::masked_tree, "the tree's budget, masked"});
         std::vector<std::vector<int>> last(ways.size());
         auto renderer = session::SceneRenderer::create(context_, *scene_.session);
         if (!renderer) return renderer.error();
-        const auto views = flight(selections_, options_);
+        const auto views = flight(selections_.front(), options_);
         for (std::size_t number = 0; number < views.size(); ++number) {
             const vdtree::View& view = views[number];
             const bool is_judged = number % static_cast<std::size_t>(options_.judged_every) == 0;
             if (is_judged)
                 if (auto begun = begin(view); !begun) return begun.error();
             for (std::size_t w = 0; w < ways.size(); ++w) {
-                const auto levels = ways[w].second(view);
+                const auto levels = ways[w](view);
                 if (!levels) return levels.error();
                 MethodFigures& method = methods[w];
                 const std::uint64_t triangles_now = scene_.triangles(*levels);
@@ -228,12 +273,14 @@ public:
                 if (!frame) return frame.error();
                 auto figures = judge(*frame);
                 if (!figures) return figures.error();
+                figures->number = static_cast<int>(number);
                 figures->triangles = triangles_now;
                 method.frames.push_back(*figures);
             }
             for (std::size_t m = ways.size(); is_judged && m < methods.size(); ++m) {
-                auto figures = of_tree(*renderer, view, m > ways.size());
+                auto figures = of_tree(*renderer, view, methods[m].way == Way::masked_tree);
                 if (!figures) return figures.error();
+                figures->number = static_cast<int>(number);
                 methods[m].frames.push_back(*figures);
                 ++methods[m].count;
                 methods[m].triangles += static_cast<double>(figures->triangles);
@@ -286,7 +333,7 @@ private:
 
     const render::Context& context_;
     Scene& scene_;
-    const session::Selections& selections_;
+    const std::vector<session::Selections>& selections_;
     const SelectionBenchOptions& options_;
     perception::Image codes_;
     std::unique_ptr<perception::Judge> judge_;
@@ -340,11 +387,10 @@ BenchTable table_of(const std::string& scene, const std::vector<MethodFigures>& 
         const auto ssim = m.range([](auto& f) { return f.ssim; });
         const auto visible = m.range([](auto& f) { return static_cast<double>(f.visible); });
         const auto frames = static_cast<double>(std::max<std::uint64_t>(m.count, 1));
-        const bool is_tree = m.name.starts_with("the tree");
         table.rows.push_back({m.name, count(m.triangles / frames), grouped(m.most_triangles), rounded(ssim[0], 6),
                               rounded(ssim[1], 6), rounded(ssim[2], 6), count(visible[0]), count(visible[1]),
-                              count(visible[2]), is_tree ? "" : rounded(m.changes / frames, 2),
-                              is_tree ? "" : grouped(m.most_changes)});
+                              count(visible[2]), m.is_tree() ? "" : rounded(m.changes / frames, 2),
+                              m.is_tree() ? "" : grouped(m.most_changes)});
     }
     return table;
 }
@@ -354,7 +400,8 @@ Json to_json(const std::vector<MethodFigures>& methods) {
     for (const MethodFigures& m : methods) {
         Json frames = Json::array();
         for (const FrameFigures& f : m.frames)
-            frames.push_back({{"triangles", f.triangles}, {"ssim", f.ssim}, {"visible_pixels", f.visible}});
+            frames.push_back(
+                {{"frame", f.number}, {"triangles", f.triangles}, {"ssim", f.ssim}, {"visible_pixels", f.visible}});
         json.push_back({{"levels", m.name},
                         {"correlation", number_or_null(correlation(m))},
                         {"changes", m.changes},
@@ -364,10 +411,14 @@ Json to_json(const std::vector<MethodFigures>& methods) {
     return json;
 }
 
+const MethodFigures& figures_of(const std::vector<MethodFigures>& methods, Way way) {
+    return *std::ranges::find(methods, way, &MethodFigures::way);
+}
+
 // Of these methods, one panel each.
 Result<void> write_plots(const std::string& folder, const std::string& scene,
                          const std::vector<MethodFigures>& methods) {
-    constexpr std::array<std::size_t, 4> shown = {0, 2, 3, 5};
+    constexpr std::array<Way, 4> shown = {Way::selected, Way::thresholds, Way::area, Way::tree};
     constexpr std::array<glm::vec3, 4> colours = {glm::vec3(0.1F, 0.4F, 0.8F), glm::vec3(0.75F, 0.45F, 0.1F),
                                                   glm::vec3(0.8F, 0.2F, 0.2F), glm::vec3(0.1F, 0.55F, 0.25F)};
     for (const bool is_ssim : {true, false}) {
@@ -375,16 +426,82 @@ Result<void> write_plots(const std::string& folder, const std::string& scene,
         plot.title = scene + (is_ssim ? ": what SSIM is below 1, thousandths" : ": visible pixels");
         plot.x_label = "judged frame";
         for (std::size_t i = 0; i < shown.size(); ++i) {
+            const MethodFigures& method = figures_of(methods, shown[i]);
             Panel& panel = plot.panels.emplace_back();
-            panel.label = methods[shown[i]].name;
+            panel.label = method.name;
             panel.colour = colours[i];
-            for (const FrameFigures& f : methods[shown[i]].frames)
+            for (const FrameFigures& f : method.frames)
                 panel.values.push_back(is_ssim ? 1e3 * std::max(1 - f.ssim, 0.0) : static_cast<double>(f.visible));
         }
         const auto file = fs::path(folder) / ("selection_" + scene + (is_ssim ? "_ssim.svg" : "_pixels.svg"));
         if (auto written = write_plot(file, plot); !written) return written;
     }
     return {};
+}
+
+// ---- what the search costs ----------------------------------------------------------------------------------------------
+
+// The first objects of a scene; others are left out.
+Result<session::Session> session_of(const std::string& file, std::size_t objects) {
+    session::LoadOptions load;
+    load.as = session::LoadAs::scene;
+    auto scene = session::Scene::load(file, load);
+    if (!scene) return scene.error();
+    if (scene->objects.size() > objects)
+        scene->objects.erase(scene->objects.begin() + static_cast<std::ptrdiff_t>(objects), scene->objects.end());
+    return session::Session::create(std::move(*scene));
+}
+
+// One thing is changed at a time. Fewer objects: the first ones. The ground of cameras is always that of all.
+Result<BenchTable> growth(const render::Context& context, const Scene& scene, const std::string& file,
+                          const session::Selections& selections, const SelectionBenchOptions& options,
+                          const std::string& out) {
+    struct Case {
+        std::size_t objects;
+        int levels, depth;
+    };
+    const std::size_t all = scene.spheres.size();
+    constexpr int usual = session::default_selected_levels;
+    const std::vector<Case> cases = {{(all + 3) / 4, usual, 0},
+                                     {(all + 1) / 2, usual, 0},
+                                     {all, usual, 0},
+                                     {all, 2, 0},
+                                     {all, 3, 0},
+                                     {all, 8, 0},
+                                     {all, usual, 1},
+                                     {all, usual, 2}};
+    const session::SelectionGrid& grid = selections.grid;
+    const std::int32_t side = grid.cell_size();
+    BenchTable table;
+    table.title = scene.name + ": what the search costs, by objects, levels and cameras";
+    table.rows.push_back({"objects", "levels", "halvings", "cameras", "s", "ms a camera", "of it drawing",
+                          "reading back", "searching, all threads", "drawings", "evaluations"});
+    for (const Case& c : cases) {
+        auto session = session_of(file, c.objects);
+        if (!session) return session.error();
+        const auto done =
+            session::precompute_selections(context, *session, out,
+                                           {.budget = options.budget,
+                                            .quality = selections.quality,
+                                            .levels = c.levels,
+                                            .window_px = selections.window_px,
+                                            .spacing = grid.step * side,
+                                            .depth = c.depth,
+                                            .eye_height = grid.origin.y,
+                                            .low = grid.place({0, 0, 0}),
+                                            .high = grid.place({grid.cells.x * side, 0, grid.cells.z * side})});
+        if (!done) return done.error();
+        const double per_camera = 1e3 / static_cast<double>(std::max<std::size_t>(done->cameras, 1));
+        table.rows.push_back({grouped(c.objects), std::to_string(c.levels), std::to_string(c.depth),
+                              grouped(done->cameras), rounded(done->seconds - done->load_seconds, 3),
+                              rounded(per_camera * (done->seconds - done->load_seconds), 3),
+                              rounded(per_camera * done->draw_seconds, 3), rounded(per_camera * done->read_seconds, 3),
+                              rounded(per_camera * done->search_seconds, 3), grouped(done->drawings),
+                              grouped(done->evaluations)});
+    }
+    table.notes.push_back(
+        "Without loading and levels. At level 0 of the grid's halvings all cameras stand at its corners.");
+    return table;
 }
 
 } // namespace
@@ -402,41 +519,87 @@ Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& option
     auto context = render::Context::headless();
     if (!context) return context.error();
     SelectionBenchResult result;
-    BenchTable before, correlations, gaps;
-    before.title =
-        "Before the flight (the thesis: 404, 378 and 284 cameras in 13 h 25 min, 30 h 11 min and 15 h 39 min)";
-    before.rows.push_back({"scene", "objects", "triangles", "cameras", "s", "of it levels", "drawing", "reading back",
-                           "searching, all threads", "drawings", "evaluations"});
-    correlations.title = "Correlation of SSIM and visible pixels, levels selected (the thesis: -0.746, -0.761, -0.854)";
-    correlations.rows.push_back({"scene", "Pearson's"});
+    result.json["scenes"] = Json::array();
+    BenchTable before, means, correlations, gaps;
+    before.title = "Before the flight";
+    before.rows.push_back({"scene", "by", "objects", "triangles", "cameras", "s", "of it levels", "drawing",
+                           "reading back", "searching, all threads", "drawings", "evaluations", "the thesis"});
+    means.title = "Means, beside the thesis's (1920 x 1080 pixels, its own judge and meshes)";
+    means.rows.push_back({"scene", "SSIM, by area: thesis", "its selection", "here, thresholds", "within the budget",
+                          "selected", "tree", "visible pixels, by area: thesis", "its selection", "here, thresholds",
+                          "within the budget", "selected", "tree"});
+    correlations.title = "Correlation of SSIM and visible pixels, levels selected";
+    correlations.rows.push_back({"scene", "Pearson's", "the thesis"});
     gaps.title = "What the search loses, against the best of all choices";
     gaps.rows.push_back({"scene", "cameras", "times the best"});
+    std::optional<BenchTable> grown;
     for (std::size_t i = 0; i < files.size(); ++i) {
-        auto scene = Scene::create(*context, files[i]);
+        const bool are_given = !options.selections.empty();
+        std::vector<session::Selections> selections;
+        if (are_given) {
+            auto read = session::read_selections(options.selections[i]);
+            if (!read) return read.error();
+            selections.push_back(std::move(*read));
+        }
+        auto scene =
+            Scene::create(*context, files[i], are_given ? selections.front().levels : session::default_selected_levels);
         if (!scene) return scene.error();
+        const Thesis* const there = thesis_of(scene->name);
         Json json = {{"scene", scene->name}};
-        std::string file = options.selections.empty() ? made.file(scene->name + ".sel") : options.selections[i];
-        if (options.selections.empty()) {
-            const auto done =
-                session::precompute_selections(*context, *scene->session, file, {.budget = options.budget});
+        for (const session::SelectionQuality quality : options.qualities) {
+            if (are_given) break;
+            const std::string file = made.file(scene->name + ".sel");
+            const auto done = session::precompute_selections(*context, *scene->session, file,
+                                                             {.budget = options.budget,
+                                                              .quality = quality,
+                                                              .window_px = options.window_px,
+                                                              .spacing = options.spacing});
             if (!done) return done.error();
             before.rows.push_back(
-                {scene->name, grouped(scene->spheres.size()), grouped(scene->session->triangle_count()),
-                 grouped(done->cameras), rounded(done->seconds, 3), rounded(done->load_seconds, 3),
-                 rounded(done->draw_seconds, 3), rounded(done->read_seconds, 3), rounded(done->search_seconds, 3),
-                 grouped(done->drawings), grouped(done->evaluations)});
-            json["precompute"] = {{"cameras", done->cameras},           {"seconds", done->seconds},
-                                  {"load_seconds", done->load_seconds}, {"draw_seconds", done->draw_seconds},
-                                  {"read_seconds", done->read_seconds}, {"search_seconds", done->search_seconds}};
+                {scene->name, name_of(quality), grouped(scene->spheres.size()),
+                 grouped(scene->session->triangle_count()), grouped(done->cameras), rounded(done->seconds, 3),
+                 rounded(done->load_seconds, 3), rounded(done->draw_seconds, 3), rounded(done->read_seconds, 3),
+                 rounded(done->search_seconds, 3), grouped(done->drawings), grouped(done->evaluations),
+                 there ? std::to_string(there->cameras) + " cameras in " + there->precompute : ""});
+            json["precompute"].push_back({{"quality", name_of(quality)},
+                                          {"cameras", done->cameras},
+                                          {"seconds", done->seconds},
+                                          {"load_seconds", done->load_seconds},
+                                          {"draw_seconds", done->draw_seconds},
+                                          {"read_seconds", done->read_seconds},
+                                          {"search_seconds", done->search_seconds}});
+            auto read = session::read_selections(file);
+            if (!read) return read.error();
+            selections.push_back(std::move(*read));
         }
-        const auto selections = session::read_selections(file);
-        if (!selections) return selections.error();
-        const auto methods = Flight(*context, *scene, *selections, options).run();
+        if (i == 0 && !are_given && options.measures_growth) {
+            auto table = growth(*context, *scene, files[i], selections.front(), options, made.file("growth.sel"));
+            if (!table) return table.error();
+            grown = std::move(*table);
+        }
+        const auto methods = Flight(*context, *scene, selections, options).run();
         if (!methods) return methods.error();
         result.tables.push_back(table_of(scene->name, *methods));
+        for (const MethodFigures& m : *methods)
+            for (const FrameFigures& f : m.frames)
+                result.frames.push_back({scene->name, m.name, f.number, f.triangles, f.ssim, f.visible});
         json["methods"] = to_json(*methods);
-        correlations.rows.push_back({scene->name, rounded(correlation(methods->front()), 3)});
-        const auto gap = gap_of(*scene, *selections, options.gap_cameras);
+        std::vector<std::string> row = {scene->name};
+        for (const bool is_ssim : {true, false}) {
+            const auto text = [&](double v) {
+                return is_ssim ? rounded(v, 6) : grouped(static_cast<std::uint64_t>(std::llround(v)));
+            };
+            row.push_back(there ? text(is_ssim ? there->ssim_by_area : there->pixels_by_area) : "");
+            row.push_back(there ? text(is_ssim ? there->ssim_selected : there->pixels_selected) : "");
+            for (const Way way : {Way::thresholds, Way::area, Way::selected, Way::tree}) {
+                const MethodFigures& m = figures_of(*methods, way);
+                row.push_back(text(is_ssim ? m.mean_ssim() : m.mean_visible()));
+            }
+        }
+        means.rows.push_back(std::move(row));
+        correlations.rows.push_back(
+            {scene->name, rounded(correlation(methods->front()), 3), there ? rounded(there->correlation, 3) : ""});
+        const auto gap = gap_of(*scene, selections.front(), options.gap_cameras);
         if (!gap) return gap.error();
         if (gap->cameras > 0 && gap->best > 0) {
             gaps.rows.push_back({scene->name, std::to_string(gap->cameras), rounded(gap->greedy / gap->best, 3)});
@@ -444,12 +607,25 @@ Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& option
         }
         if (!options.plots.empty())
             if (auto written = write_plots(options.plots, scene->name, *methods); !written) return written.error();
-        result.scenes.push_back(std::move(json));
+        result.json["scenes"].push_back(std::move(json));
     }
+    result.tables.push_back(std::move(means));
     result.tables.push_back(std::move(correlations));
-    if (gaps.rows.size() > 1) result.tables.push_back(std::move(gaps));
-    if (before.rows.size() > 1) result.tables.push_back(std::move(before));
+    for (BenchTable* const table : {&gaps, &before})
+        if (table->rows.size() > 1) result.tables.push_back(std::move(*table));
+    if (grown) {
+        result.json["growth"] = grown->rows;
+        result.tables.push_back(std::move(*grown));
+    }
     return result;
+}
+
+std::string to_csv(const std::vector<SelectionFrame>& frames) {
+    std::string text = "scene,levels,frame,triangles,ssim,visible_pixels\n";
+    for (const SelectionFrame& f : frames)
+        text += csv_field(f.scene) + "," + csv_field(f.levels) + "," + std::to_string(f.number) + "," +
+                std::to_string(f.triangles) + "," + number_text(f.ssim) + "," + std::to_string(f.visible_pixels) + "\n";
+    return text;
 }
 
 } // namespace unseen::app

@@ -331,10 +331,8 @@ void print_summary(const LevelFlightOptions& options, const Records& records, co
 }
 
 // Of the file of selected levels, for the levels that are drawn.
-Result<SelectionFollower> follower_of(const session::Session& session, const LevelControl& control,
-                                      const LevelFlightOptions& options) {
-    auto selections = session::read_selections(options.selection);
-    if (!selections) return selections.error();
+Result<SelectionFollower> follower_of(session::Selections selections, const session::Session& session,
+                                      const LevelControl& control, const LevelFlightOptions& options) {
     std::vector<std::vector<std::uint32_t>> triangles;
     for (std::size_t i = 0; i < session.scene().objects.size(); ++i) {
         auto& counts = triangles.emplace_back();
@@ -343,7 +341,7 @@ Result<SelectionFollower> follower_of(const session::Session& session, const Lev
     }
     const bool has_budget = options.what.budget.is_given();
     auto follower = SelectionFollower::create(
-        std::move(*selections), session.scene(), triangles,
+        std::move(selections), session.scene(), triangles,
         {.budget = has_budget ? std::uint64_t{options.what.budget.of(session.triangle_count())} : 0});
     if (!follower) return Error{follower.error().code, "'" + options.selection + "': " + follower.error().message};
     return follower;
@@ -373,7 +371,15 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
     vdtree::View view = make_view(*session, view_options);
     if (options.what.gaze_px) session->set_gaze(session::Gaze{*options.what.gaze_px});
     session::Request request = options.what.request_for(session->triangle_count());
-    auto control = LevelControl::create(*context, *session, view, options.control, request);
+    session::LevelControlOptions control_options = options.control;
+    std::optional<session::Selections> selections;
+    if (control_options.method == LevelMethod::given) {
+        auto read = session::read_selections(options.selection);
+        if (!read) return read.error();
+        selections = std::move(*read);
+        control_options.chain.levels = selections->levels;
+    }
+    auto control = LevelControl::create(*context, *session, view, control_options, request);
     if (!control) return control.error();
     int levels = 1;
     for (std::size_t i = 0; i < session->scene().objects.size(); ++i)
@@ -391,8 +397,8 @@ Result<void> draw_levels(const std::string& model, const ViewOptions& view_optio
         if (pose.gaze_px) session->set_gaze(session::Gaze{*pose.gaze_px});
     };
     std::optional<SelectionFollower> follower;
-    if (options.control.method == LevelMethod::given) {
-        auto made = follower_of(*session, *control, options);
+    if (selections) {
+        auto made = follower_of(std::move(*selections), *session, *control, options);
         if (!made) return made.error();
         follower = std::move(*made);
     }

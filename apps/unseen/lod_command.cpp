@@ -5,6 +5,7 @@
 #include <memory>
 
 #include <unseen/session_gpu/lod.h>
+#include <unseen/vdtree/internal/csv.h>
 
 #include "cut_report.h"
 #include "level_sheet.h"
@@ -75,9 +76,7 @@ std::string to_csv(const session::Lod& lod) {
         for (std::size_t i = 0; i < object.levels.size(); ++i) {
             const session::LodLevel& level = object.levels[i];
             const Worst worst = worst_of(level);
-            std::string name;
-            for (const char c : object.name) name += c == '"' ? "\"\"" : std::string(1, c);
-            text += "\"" + name + "\"," + std::to_string(i) + "," + std::to_string(level.triangles) + "," +
+            text += csv_field(object.name) + "," + std::to_string(i) + "," + std::to_string(level.triangles) + "," +
                     shortest(level.distance) + "," + shortest(level.coverage) + "," + shortest(level.shift) + "," +
                     shortest(level.pixel_error) + "," + std::to_string(level.checks.size()) + "," +
                     std::to_string(worst.visible) + "," + shortest(worst.v) + "," +

@@ -152,9 +152,9 @@ Result<int> info(SelectArguments& a) {
     const auto read = session::read_selections(a.file);
     if (!read) return read.error();
     const Selections& s = *read;
-    std::size_t cameras = 0, levels = 0;
+    std::size_t cameras = 0;
+    const auto levels = static_cast<std::size_t>(s.levels);
     double in_sight = 0, loss = 0;
-    for (const auto& counts : s.triangles) levels = std::max(levels, counts.size());
     std::vector<std::uint64_t> by_level(levels, 0);
     for (const session::SelectionCorner& corner : s.corners)
         for (const session::SelectionCamera& camera : corner.cameras) {
@@ -191,6 +191,7 @@ Result<int> info(SelectArguments& a) {
         {"budget, triangles a frame", grouped(s.budget)},
         {"cameras' windows, pixels a side", grouped(static_cast<std::uint64_t>(s.window_px))},
         {"objects", grouped(s.triangles.size())},
+        {"levels of an object", grouped(levels)},
         {"corners", grouped(s.corners.size())},
         {"cells", grouped(s.cells.size())},
         {"cameras with objects in sight", grouped(cameras)},
@@ -238,6 +239,10 @@ CLI::App* add_precompute(CLI::App& verb, const std::shared_ptr<SelectArguments>&
     add_number(*sub, "--height", a->eye_height, finite_numbers(1), "Y",
                "Of eyes, world units (default: that of the scene's camera, or 1.7 above the lowest object)");
     sub->add_flag("--space", o.is_in_space, "A grid in space, cameras in six directions; else on the ground, in four");
+    sub->add_option("--levels", o.levels,
+                    "Of each object, full detail among them, each of half of the triangles (default: 5)")
+        ->type_name("N")
+        ->check(whole(2, session::most_levels));
     sub->add_option("--window", o.window_px, "Of the cameras, a side (default: 256)")
         ->type_name("PIXELS")
         ->check(whole(11, 8192));

@@ -35,6 +35,8 @@ struct StudyArguments {
     std::optional<StudyTask> task;
     bool levels = false;
     std::optional<double> views, degrees, samples, repeats, seed;
+    std::vector<double> distances;
+    session::LevelControlOptions control;
     ViewOptions view;
     DisplayOptions display;
     // run
@@ -115,24 +117,21 @@ Result<int> make_study(StudyArguments& a) {
         // All around a model; a scene is looked at from about where its camera is.
         options.degrees = a.degrees.value_or(is_scene ? 3 : 360.0 / options.views);
         options.samples = static_cast<int>(a.samples.value_or(64));
+        if (!a.distances.empty()) options.distances = a.distances;
         options.pairs_original = study.task == StudyTask::differ;
         ProgressBar bar("drawing " + a.models[i]);
         options.progress = [&](double share) { bar(share, "pictures"); };
         const vdtree::View view = make_view(*session, a.view);
         Result<std::vector<calibration::StudyPair>> pairs = std::vector<calibration::StudyPair>();
         if (a.levels) {
-            pairs = session::draw_level_pairs(*session, *context, view, {}, options);
+            pairs = session::draw_level_pairs(*session, *context, view, a.control, options);
         } else {
             const auto conditions = conditions_of(a, session->triangle_count());
             if (!conditions) return conditions.error();
             pairs = session::draw_study_pairs(*session, *context, view, *conditions, options);
         }
         if (!pairs) return pairs.error();
-        for (calibration::StudyPair& pair : *pairs) {
-            if (a.models.size() > 1 && a.levels)
-                pair.condition = fs::path(a.models[i]).stem().string() + ", " + pair.condition;
-            study.pairs.push_back(std::move(pair));
-        }
+        std::ranges::move(*pairs, std::back_inserter(study.pairs));
     }
     if (const auto written = calibration::write_study(folder / study_file, study); !written) return written.error();
     print_line(std::to_string(study.pairs.size()) + " pairs, " +
@@ -237,6 +236,14 @@ Json to_json(const calibration::Share& share) {
             {"high", share.high()}};
 }
 
+Json to_json(std::span<const calibration::StepResult> steps) {
+    Json json = Json::array();
+    for (const calibration::StepResult& result : steps)
+        json.push_back(
+            {{"level", result.kept}, {"step", calibration::name(result.step)}, {"agreed", to_json(result.agreed)}});
+    return json;
+}
+
 Json to_json(const calibration::StudyAnalysis& analysis) {
     Json conditions = Json::array();
     for (const calibration::ConditionResult& result : analysis.conditions) {
@@ -251,11 +258,34 @@ Json to_json(const calibration::StudyAnalysis& analysis) {
             {"careless", analysis.careless},
             {"false_alarms", analysis.false_alarms ? to_json(*analysis.false_alarms) : Json()},
             {"agreed", analysis.agreed ? to_json(*analysis.agreed) : Json()},
+            {"steps", to_json(std::span<const calibration::StepResult>(analysis.steps))},
+            {"steps_of_2007", analysis.steps.empty() ? Json() : to_json(calibration::steps_of_2007())},
             {"conditions", std::move(conditions)}};
 }
 
 std::string percent(double share) { return rounded(100 * share, 3) + "%"; }
 std::string interval(const calibration::Share& share) { return percent(share.low()) + " to " + percent(share.high()); }
+
+// A row a level that was kept, and one of all; a column a step.
+void add_steps(std::span<const calibration::StepResult> steps, const std::string& who,
+               std::vector<std::vector<std::string>>& rows) {
+    constexpr std::array all_steps = {calibration::LevelStep::decrease, calibration::LevelStep::maintain,
+                                      calibration::LevelStep::increase};
+    const auto add = [&](const std::string& label, std::optional<int> kept) {
+        auto& row = rows.emplace_back(std::vector<std::string>{who, label});
+        for (const calibration::LevelStep step : all_steps) {
+            calibration::Share all;
+            for (const calibration::StepResult& result : steps)
+                if (result.step == step && result.kept == kept.value_or(result.kept))
+                    all.count += result.agreed.count, all.of += result.agreed.of;
+            row.push_back(all.of > 0 ? percent(all.value()) + " of " + std::to_string(all.of) : "-");
+        }
+    };
+    std::optional<int> last;
+    for (const calibration::StepResult& result : steps)
+        if (result.kept != last) add(std::to_string(result.kept), result.kept), last = result.kept;
+    add("all", std::nullopt);
+}
 
 void print(const calibration::StudyAnalysis& analysis, bool markdown) {
     std::vector<std::vector<std::string>> rows = {
@@ -275,6 +305,14 @@ void print(const calibration::StudyAnalysis& analysis, bool markdown) {
     if (analysis.agreed)
         print_line("as predicted: " + percent(analysis.agreed->value()) + " (" + interval(*analysis.agreed) + ") of " +
                    std::to_string(analysis.agreed->of));
+    if (!analysis.steps.empty()) {
+        std::vector<std::vector<std::string>> steps = {
+            {"as decided", "level kept", "decrease", "maintain", "increase"}};
+        add_steps(analysis.steps, "these answers", steps);
+        add_steps(calibration::steps_of_2007(), "people, 2007", steps);
+        print_line("");
+        markdown ? print_markdown(steps) : print_table(steps);
+    }
     for (const std::string& subject : analysis.careless)
         print_warning("'" + subject + "' was wrong in more than a third of the training.");
 }
@@ -322,8 +360,13 @@ void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
         ->type_name("NAME")
         ->allow_extra_args(false);
     CLI::Option* levels = make->add_flag("--levels", a->levels,
-                                         "Of scenes with one object: its discrete levels against the best one, and "
-                                         "what 'unseen render --method perceptual' decides about them");
+                                         "Of scenes with one object: the discrete levels around the one that 'unseen "
+                                         "render --method perceptual' keeps, to see whether people agree");
+    CLI::Option* maps = add_choice<session::MapRecipe, session::MapRecipe>(
+        *make, "--maps", a->control.maps,
+        {{"modern", session::MapRecipe::modern}, {"rpg99", session::MapRecipe::rpg99}},
+        "Of --levels: thresholds by the modern judge (default), or as in the paper of 2007");
+    maps->needs(levels);
     const auto count = [&](const char* name, std::optional<double>& value, double most, const char* text) {
         make->add_option(name, value, text)->type_name("N")->check(whole(1, most));
     };
@@ -331,6 +374,10 @@ void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
     make->add_option("--degrees", a->degrees, "From a view to the next one (default: all around; of scenes 3)")
         ->type_name("A")
         ->check(finite_numbers(1));
+    make->add_option("--distances", a->distances,
+                     "Of the eye from the target, times the view's; all views from each (default: 1)")
+        ->type_name("X ...")
+        ->check(positive());
     count("--samples", a->samples, 256, "A pixel (default: 64)");
     count("--repeats", a->repeats, 1000, "Of every pair (default: 2)");
     make->add_option("--seed", a->seed, "Of orders and sides (default: 1)")
@@ -348,7 +395,7 @@ void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
         if (a->training.empty()) a->training = {"triangles:2%"};
     });
     make->footer("Examples:\n  unseen study make horse.ply bunny.vdt -o study --views 10 --size 512x512\n"
-                 "  unseen study make museum.glb -o levels --levels --size 512x512 --repeats 8");
+                 "  unseen study make museum.glb -o levels --levels --maps rpg99 --size 512x512 --repeats 8");
 }
 
 void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include <unseen/session_gpu/tradeoff.h>
+#include <unseen/vdtree/internal/csv.h>
 
 #include "cut_report.h"
 #include "output_files.h"
@@ -65,7 +66,7 @@ std::string to_csv(const session::Tradeoff& tradeoff) {
         "name,options,triangles,make_ms,follow_ms,draw_ms,visible_pixels,v,second_visible_pixels,second_v,"
         "ssim,shift_m,pareto,recommended\n";
     for (const session::TradeoffPoint& p : tradeoff.points)
-        text += "\"" + p.name + "\"," + options_of(p) + "," + std::to_string(p.triangles) + "," + cell(p.make_ms) +
+        text += csv_field(p.name) + "," + options_of(p) + "," + std::to_string(p.triangles) + "," + cell(p.make_ms) +
                 "," + cell(p.follow_ms) + "," + cell(p.draw_ms) + "," + std::to_string(p.visible_pixels) + "," +
                 cell(p.v) + "," + std::to_string(p.second_visible_pixels) + "," + cell(p.second_v) + "," +
                 cell(p.ssim) + "," + cell(p.shift) + "," + (p.is_on_front ? "1" : "0") + "," +

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_text.h>
 #include <unseen/vdtree/internal/text_file.h>
@@ -13,16 +14,6 @@ namespace unseen::calibration {
 namespace {
 
 using perception::Stimulus;
-
-std::vector<std::string_view> fields_of(std::string_view line) {
-    std::vector<std::string_view> fields;
-    while (true) {
-        const std::size_t comma = line.find(',');
-        fields.push_back(line.substr(0, comma));
-        if (comma == std::string_view::npos) return fields;
-        line.remove_prefix(comma + 1);
-    }
-}
 
 enum Column { dataset, frequency, temporal, eccentricity, luminance, area, sensitivity, column_count };
 constexpr std::array<std::string_view, column_count> column_names = {
@@ -57,14 +48,12 @@ Result<std::vector<MeasuredSensitivity>> parse_sensitivities(std::string_view te
     std::vector<MeasuredSensitivity> all;
     std::array<std::size_t, column_count> columns{};
     bool has_header = false;
-    for (int number = 1; !text.empty(); ++number) {
-        const std::size_t end = std::min(text.find('\n'), text.size());
-        std::string_view line = text.substr(0, end);
-        text.remove_prefix(std::min(end + 1, text.size()));
-        if (line.ends_with('\r')) line.remove_suffix(1);
-        if (line.empty() || line.front() == '#') continue;
+    constexpr std::size_t most_fields = 1000;
+    const auto records = parse_csv(text, name, most_fields);
+    if (!records) return records.error();
+    for (const auto& [number, fields] : *records) {
+        if (fields.front().starts_with('#')) continue;
         const std::string where = name + ":" + std::to_string(number) + ": ";
-        const std::vector<std::string_view> fields = fields_of(line);
         if (!has_header) {
             for (std::size_t c = 0; c < column_count; ++c) {
                 const auto found = std::find(fields.begin(), fields.end(), column_names[c]);
@@ -96,7 +85,7 @@ Result<std::vector<MeasuredSensitivity>> parse_sensitivities(std::string_view te
         stimulus.luminance = perception::Luminance(values[luminance]);
         stimulus.area = perception::SquareDegrees(values[area]);
         stimulus.field = perception::VisualField::worst;
-        all.push_back({std::string(fields[columns[dataset]]), stimulus, values[sensitivity]});
+        all.push_back({fields[columns[dataset]], stimulus, values[sensitivity]});
     }
     if (!has_header) return invalid_argument(name + ": there is no line with the columns' names.");
     return all;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/number_text.h>
@@ -192,6 +193,52 @@ bool StudyAnswer::is_right(const Study& study) const {
     return says_seen(study) != is_of_one_picture(study.pairs[trial.pair]);
 }
 
+// ---- discrete levels
+
+namespace {
+
+constexpr std::array<LevelStep, 3> all_steps = {LevelStep::decrease, LevelStep::maintain, LevelStep::increase};
+
+// What level_condition() says, read back.
+std::optional<std::pair<int, LevelStep>> level_step_of(std::string_view condition) {
+    constexpr std::string_view begin = "level ";
+    const std::size_t comma = condition.find(", ");
+    if (!condition.starts_with(begin) || comma == condition.npos) return std::nullopt;
+    const auto kept = number_from<int>(condition.substr(begin.size(), comma - begin.size()));
+    for (const LevelStep step : all_steps)
+        if (kept && condition == level_condition(*kept, step)) return std::pair(*kept, step);
+    return std::nullopt;
+}
+
+} // namespace
+
+std::string_view name(LevelStep step) {
+    constexpr std::array<std::string_view, 3> names = {"decrease", "maintain", "increase"};
+    return names[static_cast<std::size_t>(step)];
+}
+
+std::string level_condition(int kept, LevelStep step) {
+    return "level " + std::to_string(kept) + ", " + std::string(name(step));
+}
+
+std::span<const StepResult> steps_of_2007() {
+    using enum LevelStep;
+    // The printed percentages are these counts of 88, cut off behind the first decimal.
+    static constexpr std::array<StepResult, 12> table = {{{2, decrease, {69, 88}},
+                                                          {2, maintain, {71, 88}},
+                                                          {2, increase, {29, 88}},
+                                                          {3, decrease, {69, 88}},
+                                                          {3, maintain, {74, 88}},
+                                                          {3, increase, {67, 88}},
+                                                          {4, decrease, {64, 88}},
+                                                          {4, maintain, {28, 88}},
+                                                          {4, increase, {71, 88}},
+                                                          {5, decrease, {29, 88}},
+                                                          {5, maintain, {54, 88}},
+                                                          {5, increase, {63, 88}}}};
+    return table;
+}
+
 // ---- the answers' file
 
 namespace {
@@ -215,16 +262,9 @@ enum Column {
 };
 using Line = std::array<std::string, columns.size()>;
 
-std::string as_field(std::string_view field) {
-    if (field.find_first_of(",\"\r\n") == field.npos) return std::string(field);
-    std::string text = "\"";
-    for (const char c : field) text += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return text + "\"";
-}
-
 std::string joined(const Line& line) {
     std::string text;
-    for (std::size_t i = 0; i < line.size(); ++i) text += (i > 0 ? "," : "") + as_field(line[i]);
+    for (std::size_t i = 0; i < line.size(); ++i) text += (i > 0 ? "," : "") + csv_field(line[i]);
     return text + "\n";
 }
 
@@ -255,41 +295,21 @@ struct Numbered {
     Line line;
 };
 
-// Lines of a table with these columns; fields may be quoted, and go over several lines then.
+// Of a table with these columns.
 Result<std::vector<Numbered>> read_lines(const fs::path& file) {
-    const auto read = read_text_file(file);
-    if (!read) return read.error();
-    const std::string& text = *read;
+    const auto text = read_text_file(file);
+    if (!text) return text.error();
+    const auto records = parse_csv(*text, file.string(), columns.size());
+    if (!records) return records.error();
     const auto wrong = [&](int number, const std::string& what) {
         return Error{ErrorCode::malformed_data, file.string() + ":" + std::to_string(number) + ": " + what};
     };
     std::vector<Numbered> lines;
-    int number = 1;
-    for (std::size_t at = 0; at < text.size();) {
-        const int first = number;
-        std::vector<std::string> fields(1);
-        bool is_quoted = false, ends = false;
-        while (at < text.size() && !ends) {
-            const char c = text[at++];
-            number += c == '\n';
-            if (is_quoted) {
-                if (c != '"') fields.back() += c;
-                else if (at < text.size() && text[at] == '"') fields.back() += text[at++];
-                else is_quoted = false;
-            } else if (c == '"' && fields.back().empty()) is_quoted = true;
-            else if (c == ',') fields.emplace_back();
-            else if (c == '\n') ends = true;
-            else if (c != '\r') fields.back() += c;
-            if (fields.size() > columns.size()) return wrong(first, "there are more fields than columns.");
-        }
-        if (is_quoted) return wrong(first, "a quotation mark is missing.");
-        if (fields.size() == 1 && fields[0].empty()) continue; // an empty line
-        if (fields.size() < columns.size())
-            return wrong(first, "there are " + std::to_string(fields.size()) + " fields in place of " +
-                                    std::to_string(columns.size()) + ": these are no answers of a study.");
-        Numbered numbered{first, {}};
-        std::ranges::move(fields, numbered.line.begin());
-        lines.push_back(std::move(numbered));
+    for (const CsvRecord& record : *records) {
+        if (record.fields.size() < columns.size())
+            return wrong(record.line, "there are " + std::to_string(record.fields.size()) + " fields in place of " +
+                                          std::to_string(columns.size()) + ": these are no answers of a study.");
+        std::ranges::copy(record.fields, lines.emplace_back(Numbered{record.line, {}}).line.begin());
     }
     if (lines.empty() || lines.front().line != header())
         return wrong(1, "the first line must name the columns " +
@@ -462,10 +482,15 @@ Result<StudyAnalysis> analyse_answers(std::span<const fs::path> files) {
         result.median_s = median(tally.seconds);
         if (result.task == StudyTask::which) result.chance = chance_of_so_many(result.seen);
         else if (!tally.is_of_one_picture && false_alarms.of > 0) result.chance = fisher(result.seen, false_alarms);
-        if (tally.is_predicted) result.agreed = tally.agreed;
+        if (tally.is_predicted) {
+            result.agreed = tally.agreed;
+            if (const auto step = level_step_of(result.condition))
+                all.steps.push_back({step->first, step->second, tally.agreed});
+        }
         all.conditions.push_back(std::move(result));
     }
     std::ranges::sort(all.conditions, {}, &ConditionResult::condition);
+    std::ranges::sort(all.steps, {}, [](const StepResult& r) { return std::pair(r.kept, r.step); });
     for (const auto& [subject, right] : training)
         if (1 - right.value() > careless_share) all.careless.push_back(subject);
     if (false_alarms.of > 0) all.false_alarms = false_alarms;

@@ -50,6 +50,23 @@ TEST_F(BenchCommandTest, MeasuresEveryRow) {
     EXPECT_THAT(again.err, Not(HasSubstr("building ball-1472.vdt"))) << "it is kept";
 }
 
+TEST_F(BenchCommandTest, ComparesClusterersAndRepair) {
+    write_ball("ball.obj");
+    // Three triangles at one edge: no manifold, which OpenMesh needs.
+    write_text(path("pages.obj"), "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
+    const Outcome outcome = bench({"libraries", "ball.obj", "pages.obj", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json report = outcome.json(), rows = report["rows"];
+    ASSERT_EQ(rows.size(), 12u); // two meshes, as they are and repaired, three clusterers
+    EXPECT_EQ(rows[0]["clusterer"], "quadric");
+    EXPECT_EQ(rows[0]["triangles"], 1472);
+    EXPECT_EQ(rows[0]["bad_edges"], 0);
+    EXPECT_GT(rows[0]["error_millionths"], 0);
+    EXPECT_LT(rows[0]["error_millionths"], rows[1]["error_millionths"]) << "octree";
+    EXPECT_EQ(rows[6]["bad_edges"], 7); // six at the border, one of three triangles
+    EXPECT_EQ(rows[8]["refused"], true);
+}
+
 TEST_F(BenchCommandTest, DoesNotWriteOverItsMesh) {
     write_ball("ball.obj");
     const std::string before = read_text(path("ball.obj"));

@@ -63,6 +63,39 @@ TEST_F(StudyCommandTest, GoesOnWhereItWasLeft) {
     EXPECT_EQ(read_text(path("s/answers-unnamed.csv")), whole);
 }
 
+TEST_F(StudyCommandTest, LevelsArePairedByWhatIsDecided) {
+    // Small and far away a coarser level is kept than from near by.
+    const Outcome made = run({"study", "make", "ball.vdt", "-o", "s", "--levels", "--maps", "rpg99", "--size",
+                              "200x160", "--views", "2", "--distances", "1", "8", "--samples", "4", "--repeats", "2"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    const Json study = Json::parse(read_text(path("s/study.json")));
+    int maintained = 0;
+    for (const Json& pair : study["pairs"]) {
+        const std::string condition = pair["condition"];
+        if (condition == "original") continue;
+        const int kept = std::stoi(condition.substr(6));
+        const auto shows = [&](const char* which, int level) {
+            return std::string(pair[which]).ends_with("-level" + std::to_string(level) + ".png");
+        };
+        if (condition.ends_with("decrease")) {
+            EXPECT_TRUE(shows("original", 0) && shows("other", kept - 1) && !pair["predicted_seen"]) << condition;
+        } else if (condition.ends_with("maintain")) {
+            EXPECT_TRUE(shows("original", kept - 1) && shows("other", kept) && !pair["predicted_seen"]) << condition;
+            ++maintained;
+        } else {
+            EXPECT_TRUE(shows("original", 0) && shows("other", kept + 1) && pair["predicted_seen"]) << condition;
+        }
+    }
+    EXPECT_GT(maintained, 0);
+    ASSERT_EQ(run({"study", "run", "s", "--simulate", "median"}).status, 0);
+    const Json result = analysis({"s/answers-unnamed.csv"});
+    EXPECT_FALSE(result["steps"].empty());
+    EXPECT_EQ(result["steps_of_2007"].size(), 12u);
+    const Outcome printed = run({"study", "analyse", "s/answers-unnamed.csv"});
+    EXPECT_THAT(printed.out, HasSubstr("people, 2007"));
+    EXPECT_EQ(make({"--maps", "rpg99"}).status, 2);
+}
+
 TEST_F(StudyCommandTest, RefusesWhatItCannotDo) {
     const Outcome unknown = make({"--condition", "twice"});
     EXPECT_EQ(unknown.status, 1);

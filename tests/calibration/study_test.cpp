@@ -212,6 +212,46 @@ TEST(StudyAnalysis, CountsByConditionAndLeavesTrainingOut) {
     EXPECT_EQ(analyse_answers(std::span(&file, 1))->careless, std::vector<std::string>{"ann"});
 }
 
+TEST(StudyAnalysis, SetsStepsOfLevelsBesideThoseOf2007) {
+    const support::TempFolder folder;
+    Study study = study_of(StudyTask::differ, folder.path());
+    const fs::path best = study.pairs.front().original, other = study.pairs.front().other;
+    study.pairs = {{level_condition(10, LevelStep::maintain), best, other, false, false},
+                   {level_condition(2, LevelStep::increase), best, other, false, true},
+                   {level_condition(2, LevelStep::decrease), best, other, false, false},
+                   {"level 2, sideways", best, other, false, true}};
+    study.repeats = 4;
+    std::vector<StudyAnswer> answers;
+    int increases = 0;
+    for (const StudyTrial& trial : trials_of(study, "ann")) {
+        const bool seen = trial.pair == 1 && ++increases <= 3; // three of four
+        answers.push_back({trial, seen ? StudyChoice::different : StudyChoice::same, 1});
+    }
+    const fs::path file = folder.path() / "ann.csv";
+    ASSERT_TRUE(write_answers(file, study, "ann", answers));
+    const auto analysis = analyse_answers(std::span(&file, 1));
+    ASSERT_TRUE(analysis) << analysis.error().message;
+    ASSERT_EQ(analysis->steps.size(), 3u);
+    EXPECT_EQ(analysis->steps[0].kept, 2);
+    EXPECT_EQ(analysis->steps[0].step, LevelStep::decrease);
+    EXPECT_EQ(analysis->steps[0].agreed.count, 4u);
+    EXPECT_EQ(analysis->steps[1].step, LevelStep::increase);
+    EXPECT_EQ(analysis->steps[1].agreed.count, 3u);
+    EXPECT_EQ(analysis->steps[1].agreed.of, 4u);
+    EXPECT_EQ(analysis->steps[2].kept, 10);
+}
+
+// The paper prints 78.4, 80.6, ... percent: cut off, not rounded.
+TEST(StudyAnalysis, HasTheTableOf2007) {
+    const std::vector<double> printed = {78.4, 80.6, 32.9, 78.4, 84.0, 76.1, 72.7, 31.8, 80.6, 32.9, 61.3, 71.5};
+    const auto steps = steps_of_2007();
+    ASSERT_EQ(steps.size(), printed.size());
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        EXPECT_EQ(std::floor(1000 * steps[i].agreed.value()) / 10, printed[i]) << i;
+        EXPECT_EQ(steps[i].kept, 2 + static_cast<int>(i / 3));
+    }
+}
+
 TEST(PictureObserver, IsRightInThreeOfFourAtThreshold) {
     PictureObserver observer;
     observer.lapse = 0;

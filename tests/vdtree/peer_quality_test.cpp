@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
-#include <limits>
 #include <random>
 #include <vector>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 #ifdef UNSEEN_TEST_WITH_MESHOPTIMIZER
@@ -21,93 +19,13 @@
 #include "clustering_tools.h"
 #include "extra_meshes.h"
 #include "shapes.h"
+#include "surface_distance.h"
 #include "temp_folder.h"
-#include "triangle_distance.h"
 
 namespace unseen::vdtree {
 namespace {
 
 #ifdef UNSEEN_TEST_WITH_MESHOPTIMIZER
-
-// The triangles by the cells of a cubic grid that their boxes meet.
-class TriangleGrid {
-public:
-    explicit TriangleGrid(const Mesh& mesh) : mesh_(mesh) {
-        glm::dvec3 high = low_ = mesh.positions[mesh.triangles[0][0]];
-        for (const Triangle& t : mesh.triangles) {
-            for (const Index v : t) {
-                low_ = glm::min(low_, mesh.positions[v]);
-                high = glm::max(high, mesh.positions[v]);
-            }
-        }
-        const glm::dvec3 size = high - low_;
-        cell_ = std::max({size.x, size.y, size.z}) / cells;
-        lists_.resize(cells * cells * cells);
-        for (Index t = 0; t < mesh.triangles.size(); ++t) {
-            const auto p = [&](std::size_t k) { return mesh.positions[mesh.triangles[t][k]]; };
-            const glm::ivec3 from = cell_of(glm::min(p(0), glm::min(p(1), p(2))));
-            const glm::ivec3 to = cell_of(glm::max(p(0), glm::max(p(1), p(2))));
-            for (int z = from.z; z <= to.z; ++z)
-                for (int y = from.y; y <= to.y; ++y)
-                    for (int x = from.x; x <= to.x; ++x) list(x, y, z).push_back(t);
-        }
-    }
-
-    // Looks through shells of cells around the point's until none farther out can hold anything nearer.
-    double distance(glm::dvec3 p) {
-        const glm::ivec3 c = cell_of(p);
-        const double outside = glm::distance(p, glm::clamp(p, low_, low_ + cell_ * cells)); // from the grid
-        double nearest = std::numeric_limits<double>::infinity();
-        for (int r = 0; r < cells && nearest > std::max(outside, (r - 1) * cell_); ++r) {
-            const glm::ivec3 from = glm::max(c - r, glm::ivec3(0)), to = glm::min(c + r, glm::ivec3(cells - 1));
-            for (int z = from.z; z <= to.z; ++z) {
-                for (int y = from.y; y <= to.y; ++y) {
-                    for (int x = from.x; x <= to.x; ++x) {
-                        if (std::max({std::abs(x - c.x), std::abs(y - c.y), std::abs(z - c.z)}) != r) continue;
-                        for (const Index t : list(x, y, z)) nearest = std::min(nearest, distance_to(p, t));
-                    }
-                }
-            }
-        }
-        return nearest;
-    }
-
-private:
-    static constexpr int cells = 64;
-    glm::ivec3 cell_of(glm::dvec3 p) const {
-        return glm::clamp(glm::ivec3(glm::floor((p - low_) / cell_)), glm::ivec3(0), glm::ivec3(cells - 1));
-    }
-    std::vector<Index>& list(int x, int y, int z) {
-        return lists_[static_cast<std::size_t>((z * cells + y) * cells + x)];
-    }
-    double distance_to(glm::dvec3 p, Index t) const {
-        const Triangle& tri = mesh_.triangles[t];
-        return support::distance_to_triangle(p, mesh_.positions[tri[0]], mesh_.positions[tri[1]],
-                                             mesh_.positions[tri[2]]);
-    }
-
-    const Mesh& mesh_;
-    glm::dvec3 low_;
-    double cell_;
-    std::vector<std::vector<Index>> lists_;
-};
-
-// Mean distance of (a sample of) the original vertices from the simplified surface, as a share of the extent.
-double mean_distance(const Mesh& original, const Mesh& simple) {
-    glm::dvec3 low = original.positions[0], high = low;
-    for (const glm::dvec3& p : original.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    const glm::dvec3 size = high - low;
-    TriangleGrid grid(simple);
-    constexpr std::size_t sample = 50000;
-    const std::size_t step = original.positions.size() / sample | 1; // odd: not the same corner of every quad
-    double sum = 0, count = 0;
-    for (std::size_t v = 0; v < original.positions.size(); v += step, ++count)
-        sum += grid.distance(original.positions[v]);
-    return sum / count / std::max({size.x, size.y, size.z});
-}
 
 Mesh simplified_by_meshoptimizer(const Mesh& mesh, std::size_t triangles, bool sloppy) {
     std::vector<float> positions;
@@ -135,7 +53,9 @@ void compare(const char* what, const Mesh& mesh, std::size_t triangles, bool slo
     ASSERT_FALSE(theirs.triangles.empty());
     const Mesh ours = support::simplified_by_deviation(mesh, *clustering, theirs.triangles.size());
     ASSERT_FALSE(ours.triangles.empty());
-    const double their_distance = mean_distance(mesh, theirs), our_distance = mean_distance(mesh, ours);
+    // Means over vertices of the original.
+    const double their_distance = app::mean_surface_distance(mesh, theirs),
+                 our_distance = app::mean_surface_distance(mesh, ours);
     std::cout << what << ": " << mesh.triangles.size() << " triangles to " << ours.triangles.size()
               << ", mean distance " << our_distance << " of the extent, meshoptimizer " << their_distance << " ("
               << theirs.triangles.size() << " triangles), ratio " << our_distance / their_distance << '\n';

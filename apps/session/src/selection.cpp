@@ -23,7 +23,7 @@ static_assert(std::endian::native == std::endian::little, "Files of selections a
 
 constexpr std::array<char, 8> selection_magic = {'U', 'N', 'S', 'E', 'E', 'N', 'S', 'L'};
 constexpr std::array<char, 8> journal_magic = {'U', 'N', 'S', 'E', 'E', 'N', 'S', 'J'};
-constexpr std::uint32_t selection_version = 1;
+constexpr std::uint32_t selection_version = 2;
 constexpr std::uint32_t most_selected_levels = static_cast<std::uint32_t>(most_levels);
 
 // ---- bytes ------------------------------------------------------------------------------------------------------------
@@ -265,6 +265,7 @@ ByteWriter head_of(const Selections& s) {
     out.put(static_cast<std::uint32_t>(s.quality));
     out.put(s.budget);
     out.put(s.window_px);
+    out.put(s.levels);
     for (const double v : {s.grid.origin.x, s.grid.origin.y, s.grid.origin.z, s.grid.step}) out.put(v);
     put(out, s.grid.cells);
     out.put(static_cast<std::int32_t>(s.grid.depth));
@@ -328,8 +329,10 @@ Result<Selections> read_selections(const std::filesystem::path& file) {
     s.quality = static_cast<SelectionQuality>(quality);
     s.budget = in.get<std::uint64_t>();
     s.window_px = in.get<std::int32_t>();
+    s.levels = in.get<std::int32_t>();
     in.require(s.budget > 0, "the budget is 0");
     in.require(s.window_px >= 11 && s.window_px <= 8192, "the window has no such size");
+    in.require(s.levels >= 2 && s.levels <= most_levels, "objects have no such number of levels");
     for (const int axis : {0, 1, 2}) s.grid.origin[axis] = in.get<double>();
     s.grid.step = in.get<double>();
     s.grid.cells = get_point(in);
@@ -338,7 +341,7 @@ Result<Selections> read_selections(const std::filesystem::path& file) {
     s.scene = in.get<std::uint64_t>();
     const std::uint32_t objects = in.count(8, std::numeric_limits<std::uint32_t>::max(), "objects");
     for (std::uint32_t i = 0; i < objects && in.is_right(); ++i) {
-        const std::uint32_t levels = in.count(4, most_selected_levels, "levels of an object");
+        const std::uint32_t levels = in.count(4, static_cast<std::uint32_t>(s.levels), "levels of an object");
         in.require(levels > 0, "an object has no level");
         auto& counts = s.triangles.emplace_back();
         for (std::uint32_t k = 0; k < levels && in.is_right(); ++k) {

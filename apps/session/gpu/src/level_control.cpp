@@ -193,7 +193,7 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
     const Scene& scene = session.scene();
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         const auto levels = uploads.levels(session.tree(i), [&] {
-            return options.method == LevelMethod::given ? selection_chain(session, i)
+            return options.method == LevelMethod::given ? selection_chain(session, i, options.chain.levels)
                                                         : level_chain(session, from, request, i, options.chain);
         });
         if (!levels) return levels.error();

@@ -25,10 +25,14 @@ double ms_since(Clock::time_point start) {
 
 } // namespace
 
-Result<LevelChain> selection_chain(Session& session, std::size_t object) {
+Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels) {
+    if (levels < 2 || levels > most_levels)
+        return invalid_argument("An object to select levels for has 2 to " + std::to_string(most_levels) + " of them.");
     const auto recipe = session.recipe(session.default_view(), {.keeps_shadows = false}, object);
     if (!recipe) return recipe.error();
-    return LevelChain::by_triangles(session.tree(object), *recipe->criterion, selection_levels);
+    return LevelChain::by_triangles(
+        session.tree(object), *recipe->criterion,
+        {.levels = levels, .most_share = 0.5, .least_share = std::exp2(1 - levels), .least_triangles = 20});
 }
 
 struct LevelPictures::Impl {
@@ -40,7 +44,7 @@ struct LevelPictures::Impl {
     Impl(const render::Context& context_, Session& session_)
         : context(context_), session(session_), uploads(context_) {}
 
-    Result<void> load();
+    Result<void> load(int level_count);
     Result<void> need_target(const vdtree::View& view);
     Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
     Result<std::vector<render::Item>> backdrop_items(const vdtree::View& view) const;
@@ -61,11 +65,11 @@ struct LevelPictures::Impl {
     LevelPictureTimes times;
 };
 
-Result<void> LevelPictures::Impl::load() {
+Result<void> LevelPictures::Impl::load(int level_count) {
     if (auto ready = session.prepare(session.default_view(), {}); !ready) return ready.error();
     const Scene& scene = session.scene();
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-        const auto own = uploads.levels(session.tree(i), [&] { return selection_chain(session, i); });
+        const auto own = uploads.levels(session.tree(i), [&] { return selection_chain(session, i, level_count); });
         if (!own) return own.error();
         const LevelChain& chain = (*own)->chain;
         levels.push_back(*own);
@@ -253,7 +257,7 @@ const LevelPictureTimes& LevelPictures::times() const noexcept { return impl_->t
 
 Result<LevelPictures> LevelPictures::create(const render::Context& context, Session& session) {
     auto impl = std::make_unique<Impl>(context, session);
-    if (auto loaded = impl->load(); !loaded) return loaded.error();
+    if (auto loaded = impl->load(levels); !loaded) return loaded.error();
     return LevelPictures(std::move(impl));
 }
 

@@ -269,15 +269,18 @@ public:
         for (std::size_t at = 0; at < open.size();) {
             const std::size_t left = open.size() - at,
                               each = std::clamp<std::size_t>((left + members - 1) / members, 1, corners_at_a_time);
+            // Neighbours cost about the same, so members take turns.
             const auto part = [&](std::size_t member) {
-                const std::size_t from = std::min(at + member * each, open.size());
-                return std::span(open).subspan(from, std::min(each, open.size() - from));
+                std::vector<LatticePoint> own;
+                for (std::size_t i = at + member; i < std::min(at + members * each, open.size()); i += members)
+                    own.push_back(open[i]);
+                return own;
             };
             std::vector<int> asked;
             for (std::size_t member = 1; member < members; ++member) {
-                const auto theirs = part(member);
+                const std::vector<LatticePoint> theirs = part(member);
                 if (theirs.empty()) continue;
-                team_->send(static_cast<int>(member), std::as_bytes(theirs));
+                team_->send(static_cast<int>(member), std::as_bytes(std::span(theirs)));
                 asked.push_back(static_cast<int>(member));
             }
             Result<void> outcome = corners_.run(part(0), keep);
@@ -369,12 +372,13 @@ Result<PrecomputeReport> precompute_selections(const render::Context& context, S
         if (auto valid = check(options); !valid) return valid;
         auto grid = grid_for(session, options);
         if (!grid) return grid.error();
-        auto made = LevelPictures::create(context, session);
+        auto made = LevelPictures::create(context, session, options.levels);
         if (!made) return made.error();
         pictures.emplace(std::move(*made));
         s.quality = options.quality;
         s.budget = options.budget;
         s.window_px = options.window_px;
+        s.levels = options.levels;
         s.grid = *grid;
         s.triangles = pictures->triangles();
         s.scene = scene_fingerprint(session.scene(), s.triangles);

@@ -1,6 +1,8 @@
 #include <unseen/session_gpu/study_pictures.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 #include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
@@ -9,6 +11,7 @@
 namespace unseen::session {
 namespace {
 
+using calibration::LevelStep;
 using calibration::StudyPair;
 namespace fs = std::filesystem;
 
@@ -18,6 +21,10 @@ Result<void> validate(const StudyPicturesOptions& options) {
         return invalid_argument("The views of a study must be 1 to 360.");
     if (options.samples < 1 || options.samples > most_samples)
         return invalid_argument("The samples of a study's pictures must be 1 to 256.");
+    if (options.distances.empty()) return invalid_argument("A study needs a distance to look from.");
+    for (const double distance : options.distances)
+        if (!(distance > 0 && std::isfinite(distance)))
+            return invalid_argument("The distances of a study's views must be above 0.");
     return {};
 }
 
@@ -59,11 +66,20 @@ private:
     SceneRenderer renderer_;
 };
 
-vdtree::View turned(const vdtree::View& view, const StudyPicturesOptions& options, int number) {
-    return vdtree::orbited(view, number * options.degrees);
+// From each distance all around.
+std::vector<vdtree::View> views_of(const vdtree::View& view, const StudyPicturesOptions& options) {
+    std::vector<vdtree::View> views;
+    for (const double distance : options.distances)
+        for (int number = 0; number < options.views; ++number) {
+            vdtree::View& turned = views.emplace_back(vdtree::orbited(view, number * options.degrees));
+            turned.eye = turned.target + distance * (turned.eye - turned.target);
+        }
+    return views;
 }
 
-std::string file_name(int view, const std::string& what) { return "view" + std::to_string(view + 1) + "-" + what; }
+std::string file_name(std::size_t view, const std::string& what) {
+    return "view" + std::to_string(view + 1) + "-" + what;
+}
 
 } // namespace
 
@@ -77,15 +93,17 @@ Result<std::vector<StudyPair>> draw_study_pairs(Session& session, const render::
     auto photographer = Photographer::create(session, context, options);
     if (!photographer) return photographer.error();
     std::vector<StudyPair> pairs;
-    for (int number = 0; number < options.views; ++number) {
-        const vdtree::View from = turned(view, options, number);
+    const std::vector<vdtree::View> views = views_of(view, options);
+    for (std::size_t number = 0; number < views.size(); ++number) {
+        const vdtree::View& from = views[number];
         const auto original = photographer->take(Request{.goal = Goal::full()}, from, file_name(number, "original"));
         if (!original) return original.error();
         if (options.pairs_original) pairs.push_back({"original", *original, *original, false, {}});
         for (std::size_t i = 0; i < conditions.size(); ++i) {
             if (options.progress)
-                options.progress((number + static_cast<double>(i) / static_cast<double>(conditions.size())) /
-                                 options.views);
+                options.progress(
+                    (static_cast<double>(number) + static_cast<double>(i) / static_cast<double>(conditions.size())) /
+                    static_cast<double>(views.size()));
             const StudyCondition& condition = conditions[i];
             const auto other = photographer->take(condition.request, from, file_name(number, std::to_string(i + 1)));
             if (!other) return other.error();
@@ -108,28 +126,43 @@ Result<std::vector<StudyPair>> draw_level_pairs(Session& session, const render::
     if (!photographer) return photographer.error();
     const LevelChain& chain = control->chain(0);
     std::vector<StudyPair> pairs;
-    for (int number = 0; number < options.views; ++number) {
-        if (options.progress) options.progress(static_cast<double>(number) / options.views);
-        const vdtree::View from = turned(view, options, number);
+    const std::vector<vdtree::View> views = views_of(view, options);
+    for (std::size_t number = 0; number < views.size(); ++number) {
+        if (options.progress) options.progress(static_cast<double>(number) / static_cast<double>(views.size()));
+        const vdtree::View& from = views[number];
         const auto settled = control->settle(from);
         if (!settled) return settled.error();
         const int kept = settled->levels.front();
         if (kept < 0) return invalid_argument("The scene's object is out of the window.");
-        std::optional<fs::path> best;
-        for (int level = 0; level < chain.size(); ++level) {
+        std::map<int, fs::path> pictures; // by level, those that were needed
+        const auto picture = [&](int level) -> Result<fs::path> {
+            if (const auto there = pictures.find(level); there != pictures.end()) return there->second;
             const vdtree::Cut cut = chain.cut(level);
-            const auto picture =
+            auto taken =
                 photographer->take(std::span(&cut, 1), from, file_name(number, "level" + std::to_string(level)));
-            if (!picture) return picture.error();
-            if (level == 0) {
-                best = *picture;
-                if (options.pairs_original) pairs.push_back({"original", *best, *best, false, {}});
-                continue;
-            }
-            const char* const decision = level < kept ? "decrease" : level == kept ? "maintain" : "increase";
-            pairs.push_back({"level " + std::to_string(level) + ", " + decision, *best, *picture, false, level > kept});
+            if (taken) pictures.emplace(level, *taken);
+            return taken;
+        };
+        const auto add = [&](LevelStep step, int better, int level, bool is_seen) -> Result<void> {
+            const auto original = picture(better), other = picture(level);
+            if (!original) return original.error();
+            if (!other) return other.error();
+            pairs.push_back({calibration::level_condition(kept, step), *original, *other, false, is_seen});
+            return {};
+        };
+        if (options.pairs_original) {
+            const auto best = picture(0);
+            if (!best) return best.error();
+            pairs.push_back({"original", *best, *best, false, {}});
         }
+        Result<void> added;
+        if (kept >= 2) added = add(LevelStep::decrease, 0, kept - 1, false);
+        if (added && kept >= 1) added = add(LevelStep::maintain, kept - 1, kept, false);
+        if (added && kept + 1 < chain.size()) added = add(LevelStep::increase, 0, kept + 1, true);
+        if (!added) return added.error();
     }
+    if (std::ranges::all_of(pairs, [](const StudyPair& pair) { return pair.original == pair.other; }))
+        return invalid_argument("The object has no level but the full mesh: there is nothing to compare.");
     return pairs;
 }
 

@@ -77,6 +77,21 @@ Result<void> write_answers(const std::filesystem::path& file, const Study& study
 Result<std::vector<StudyAnswer>> read_answers(const std::filesystem::path& file, const Study& study,
                                               std::string_view subject);
 
+// ---- discrete levels of detail
+//
+// What Drettakis and others (2007) ask about an object whose level of detail a program chooses: whether people see what
+// the program says that they see, Table 2.
+
+enum class LevelStep {
+    decrease, // the level before the one that is kept against the best one: it was coarsened, so nobody should see it
+    maintain, // the one that is kept against the one before: nobody should see a difference
+    increase  // the next coarser one against the best one: it was refined, so the difference should show
+};
+std::string_view name(LevelStep step); // "decrease", ...
+
+// The condition that such pairs are counted by: "level 2, maintain". `kept`: the level that is kept, 0 the best one.
+std::string level_condition(int kept, LevelStep step);
+
 // ---- what answers say
 
 // A share of so many, with its interval of 95% confidence (Wilson 1927).
@@ -98,13 +113,25 @@ struct ConditionResult {
     double median_s = 0;
 };
 
+// Of pairs whose condition level_condition() names: how many answers agree with what the program decided.
+struct StepResult {
+    int kept = 0;
+    LevelStep step = LevelStep::decrease;
+    Share agreed;
+};
+
 struct StudyAnalysis {
     std::vector<ConditionResult> conditions; // sorted by name
     std::vector<std::string> subjects;
     std::vector<std::string> careless; // subjects who were wrong in more than a third of the training
     std::optional<Share> false_alarms; // differ: of pairs of one picture
     std::optional<Share> agreed;       // over all conditions
+    std::vector<StepResult> steps;     // ascending by level, then by step
 };
+
+// The answers of eleven people, Table 3 of Drettakis and others (2007): 88 of each, in the order of StudyAnalysis::steps.
+// Their level 1 is level 0 here.
+std::span<const StepResult> steps_of_2007();
 
 // Of files that write_answers() has written; training does not count. Errors name the file and the line.
 Result<StudyAnalysis> analyse_answers(std::span<const std::filesystem::path> files);

@@ -14,6 +14,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <unseen/session/level_chain.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/selection_search.h>
 
@@ -41,6 +42,9 @@ struct SelectionGrid {
 constexpr int most_selection_depth = 8;
 constexpr std::int32_t most_grid_cells = 4096; // along an axis
 constexpr std::uint64_t most_selection_corners = 1'000'000;
+
+// Of an object, full detail among them.
+constexpr int default_selected_levels = 5;
 
 struct SelectionCell {
     LatticePoint at; // of its corner with the least coordinates
@@ -78,6 +82,7 @@ struct Selections {
     SelectionQuality quality = SelectionQuality::ssim;
     std::uint64_t budget = 0; // of a frame, in triangles; a camera's selection keeps to half of it
     std::int32_t window_px = 256;
+    std::int32_t levels = default_selected_levels; // of an object, at most; 2 to most_levels
     SelectionGrid grid;
     std::uint64_t scene = 0;                           // a fingerprint, see scene_fingerprint()
     std::vector<std::vector<std::uint32_t>> triangles; // by object, by level

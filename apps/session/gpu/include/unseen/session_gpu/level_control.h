@@ -37,7 +37,7 @@ enum class LevelMethod {
     perceptual, // what is seen of a better one, see above
     distance,   // the farthest-reaching level that nobody sees from where the eye is, LevelChain::unseen_from()
     area,       // the one with so many triangles for each pixel that the bounding sphere covers
-    given,      // set_levels(); of the chains of selection_chain(), and the options' chain does not count
+    given,      // set_levels(); of the chains of selection_chain() with so many levels as the options' chain
 };
 enum class MapRecipe {
     modern, // perception::threshold_map_modern()

@@ -13,12 +13,9 @@
 
 namespace unseen::session {
 
-// As the source has them: each level has half of the triangles of the one before.
-constexpr LevelChainOptions selection_levels = {
-    .levels = 5, .most_share = 0.5, .least_share = 0.0625, .least_triangles = 20};
-
-// Levels of an object of the session whose triangles shrink by one factor.
-Result<LevelChain> selection_chain(Session& session, std::size_t object);
+// So many levels of an object of the session, or fewer of small ones: each has half of the triangles of the one before,
+// as the source has them. `levels`: 2 to most_levels.
+Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels = default_selected_levels);
 
 struct LevelPictureTimes {
     double draw_ms = 0, read_ms = 0; // of all pictures so far; the GPU's work is waited for in reading
@@ -29,8 +26,9 @@ struct LevelPictureTimes {
 // used. Shadows are not drawn: whose they are changes with the levels of others.
 class LevelPictures {
 public:
-    // Makes the levels of all objects and uploads them: some seconds a million triangles.
-    static Result<LevelPictures> create(const render::Context& context, Session& session);
+    // Makes the levels of all objects, selection_chain(), and uploads them: some seconds a million triangles.
+    static Result<LevelPictures> create(const render::Context& context, Session& session,
+                                        int levels = default_selected_levels);
     LevelPictures(LevelPictures&&) noexcept;
     LevelPictures& operator=(LevelPictures&&) noexcept;
     ~LevelPictures();

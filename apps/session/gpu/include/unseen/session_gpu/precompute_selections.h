@@ -20,6 +20,7 @@ namespace unseen::session {
 struct PrecomputeOptions {
     std::uint64_t budget = 0; // of a frame, triangles of objects; above 0
     SelectionQuality quality = SelectionQuality::ssim;
+    int levels = default_selected_levels; // of an object, each of half of the triangles; 2 to most_levels
     int window_px = 256;
     double spacing = 0;  // of the grid's corners, world units; 0: a tenth of the longer side
     int depth = 1;       // how often a cell may be parted, 0 to most_selection_depth

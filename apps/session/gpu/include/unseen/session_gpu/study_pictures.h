@@ -24,6 +24,7 @@ struct StudyPicturesOptions {
     std::string prefix;                        // of the files' names
     int views = 5;                             // 1 to 360, around the target
     double degrees = 72;                       // from a view to the next one
+    std::vector<double> distances = {1};       // from the target, times the view's; all views from each, above 0
     int samples = 64;                          // a pixel, 1 to 256
     bool pairs_original = false;               // with itself, once a view: for StudyTask::differ
     std::function<void(double)> progress = {}; // hears what share is done
@@ -37,10 +38,9 @@ Result<std::vector<calibration::StudyPair>> draw_study_pairs(Session& session, c
                                                              const std::vector<StudyCondition>& conditions,
                                                              const StudyPicturesOptions& options);
 
-// The same of discrete levels, as in the study of Drettakis and others (2007): each level against the best one, for
-// StudyTask::differ. What is predicted is what LevelControl decides in the view: it keeps one level; a finer one it calls
-// better than need be, so nobody should see a difference ("level 1, decrease"); that one should do ("maintain"); a
-// coarser one should show ("increase"). Fails on scenes of several objects, and as LevelControl does.
+// Of discrete levels, for StudyTask::differ: the pairs of calibration::LevelStep around the level that LevelControl keeps
+// in each view. Where it keeps the best level there is no decrease and no maintain, where the coarsest no increase. Fails
+// on scenes of several objects, where there is no pair at all, and as LevelControl does.
 Result<std::vector<calibration::StudyPair>> draw_level_pairs(Session& session, const render::Context& context,
                                                              const vdtree::View& view,
                                                              const LevelControlOptions& levels,
