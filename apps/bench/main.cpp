@@ -45,6 +45,15 @@ void add_report_options(CLI::App& verb, ReportArguments& report) {
     verb.add_flag("--markdown", report.markdown, "Print the tables as Markdown");
 }
 
+// Nothing where the name is empty.
+Result<void> write_text(const std::string& file, const std::string& text) {
+    if (file.empty()) return {};
+    auto out = vdtree::AtomicFile::create(file);
+    if (!out) return out.error();
+    if (auto written = out->write(text); !written) return written;
+    return out->commit();
+}
+
 // A benchmark from its options to its report: what it reads, what it writes, and the load of the machine before.
 class BenchRun {
 public:
@@ -506,8 +515,7 @@ Result<int> run(SelectionArguments& a) {
     if (!bench) return bench.error();
     auto result = bench_selection(a.options);
     if (!result) return result.error();
-    if (!a.csv.empty())
-        if (auto ok = write_text(a.csv, to_csv(result->frames)); !ok) return ok.error();
+    if (auto ok = write_text(a.csv, to_csv(result->frames)); !ok) return ok.error();
     result->json["budget"] = a.options.budget;
     result->json["width"] = a.options.width;
     result->json["height"] = a.options.height;
@@ -599,14 +607,6 @@ struct AccuracyArguments {
 };
 
 // Written whole or not at all.
-Result<void> write_text(const std::string& file, const std::string& text) {
-    if (file.empty()) return {};
-    auto out = vdtree::AtomicFile::create(file);
-    if (!out) return out.error();
-    if (auto written = out->write(text); !written) return written;
-    return out->commit();
-}
-
 Result<int> run(AccuracyArguments& a) {
     std::vector<std::string> outputs = {a.csv, a.html};
     if (!a.plots.empty())

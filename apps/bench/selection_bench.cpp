@@ -516,6 +516,7 @@ Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& option
     }
     if (!options.selections.empty() && options.selections.size() != files.size())
         return Error{ErrorCode::invalid_argument, "Give as many selections as scenes, in the same order."};
+    if (auto folder = made.make_folder(); !folder) return folder.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     SelectionBenchResult result;

@@ -255,7 +255,7 @@ const std::vector<std::vector<std::uint32_t>>& LevelPictures::triangles() const 
 const LevelChain& LevelPictures::chain(std::size_t object) const noexcept { return impl_->levels[object]->chain; }
 const LevelPictureTimes& LevelPictures::times() const noexcept { return impl_->times; }
 
-Result<LevelPictures> LevelPictures::create(const render::Context& context, Session& session) {
+Result<LevelPictures> LevelPictures::create(const render::Context& context, Session& session, int levels) {
     auto impl = std::make_unique<Impl>(context, session);
     if (auto loaded = impl->load(levels); !loaded) return loaded.error();
     return LevelPictures(std::move(impl));
