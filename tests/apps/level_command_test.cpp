@@ -3,6 +3,8 @@
 
 #include <numeric>
 
+#include "temp_folder.h"
+
 namespace {
 
 using namespace unseen::app::testing;
@@ -101,8 +103,7 @@ TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
     for (const std::string method : {"distance", "area"}) {
         int before = 0;
         for (const std::string bias : {"1e-6", method == "area" ? "3" : "0.03", "1e6"}) {
-            // Under shadows of a lamp among the objects no level is unseen from any distance.
-            const Outcome drawn = render({"--method", method, "--bias", bias, "--json", "-"});
+            const Outcome drawn = render({"--method", method, "--bias", bias, "--no-shadows", "--json", "-"});
             ASSERT_EQ(drawn.status, 0) << drawn.err;
             const int triangles = drawn.json()["frames"][0]["triangles"];
             EXPECT_GT(triangles, before) << method << " " << bias;
@@ -113,7 +114,8 @@ TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
 
 TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
     for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show});
+        const char* shadows = show == "layers" ? "--shadows" : "--no-shadows"; // with a lamp's, seconds each
+        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, shadows});
         ASSERT_EQ(drawn.status, 0) << drawn.err;
         const auto picture = unseen::perception::read_image(path(show + ".png"));
         ASSERT_TRUE(picture);
@@ -123,7 +125,7 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
     // One object is in no layers.
     ASSERT_EQ(run({"scene", "make", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
     for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show});
+        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, "--no-shadows"});
         EXPECT_EQ(drawn.status, 0) << drawn.err;
     }
 }

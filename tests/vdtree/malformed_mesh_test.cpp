@@ -39,15 +39,20 @@ void* counted_allocation_or_throw(std::size_t size) {
 }
 } // namespace
 
-// All that the operators delete below give back; the forms for over-aligned types stay a pair of their own.
-void* operator new(std::size_t size) { return counted_allocation_or_throw(size); }
-void* operator new[](std::size_t size) { return counted_allocation_or_throw(size); }
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return counted_allocation(size); }
-void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return counted_allocation(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+// All that the operators delete below give back; the forms for over-aligned types stay a pair of their own. Where the
+// compiler put one of a pair inline and not the other, it would warn of memory from elsewhere.
+[[gnu::noinline]] void* operator new(std::size_t size) { return counted_allocation_or_throw(size); }
+[[gnu::noinline]] void* operator new[](std::size_t size) { return counted_allocation_or_throw(size); }
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    return counted_allocation(size);
+}
+[[gnu::noinline]] void* operator new[](std::size_t size, const std::nothrow_t&) noexcept {
+    return counted_allocation(size);
+}
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete[](void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace unseen::vdtree {
 namespace {
