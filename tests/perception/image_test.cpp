@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -14,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
-#include <new>
 #include <random>
 #include <string>
 #include <vector>
@@ -30,23 +28,7 @@
 #include <half.h>
 #include <png.h>
 
-// The largest single request to operator new, so that a test can see an allocation that a lying header asked for.
-namespace {
-std::atomic<std::size_t> largest_allocation{0};
-void* counted(std::size_t size) {
-    std::size_t seen = largest_allocation.load();
-    while (size > seen && !largest_allocation.compare_exchange_weak(seen, size)) {
-    }
-    if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
-    throw std::bad_alloc();
-}
-} // namespace
-void* operator new(std::size_t size) { return counted(size); }
-void* operator new[](std::size_t size) { return counted(size); }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete[](void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
+#include "largest_allocation.h"
 
 namespace unseen::perception {
 namespace {
