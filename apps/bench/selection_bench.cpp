@@ -468,8 +468,7 @@ Result<BenchTable> growth(const render::Context& context, const Scene& scene, co
                                      {all, 2, 0},
                                      {all, 3, 0},
                                      {all, 8, 0},
-                                     {all, usual, 1},
-                                     {all, usual, 2}};
+                                     {all, usual, 1}};
     const session::SelectionGrid& grid = selections.grid;
     const std::int32_t side = grid.cell_size();
     BenchTable table;

@@ -178,7 +178,7 @@ TEST_F(SelectCommandTest, QualitiesAndTheGrowthOfCostAreMeasured) {
     EXPECT_EQ(scene["methods"][0]["levels"], "selected, by ssim");
     EXPECT_EQ(scene["methods"][1]["levels"], "selected, by pixels");
     const Json growth = report["growth"]; // first the columns' names
-    ASSERT_EQ(growth.size(), 9u);
+    ASSERT_EQ(growth.size(), 8u);
     const auto drawings = [&](std::size_t row) {
         std::string count = growth[row][9];
         std::erase(count, ',');
