@@ -8,10 +8,9 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "measure/leaf_triangles.h"
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/scaled_geometry.h>
 
 namespace unseen::perception {
@@ -153,15 +152,15 @@ public:
 private:
     std::vector<Contact> by_triangle(MeasuringProgress& progress) const {
         std::vector<Contact> contacts(triangles_.size());
-        tbb::parallel_for(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
-                          [&](const auto& part) {
-                              Scratch scratch;
-                              for (Index t = part.begin(); t < part.end() && !progress.is_cancelled(); t += at_once) {
-                                  const Index end = std::min(t + at_once, part.end());
-                                  find(t, end, contacts, scratch);
-                                  progress.add(end - t);
-                              }
-                          });
+        parallel_loop_over(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
+                           [&](const auto& part) {
+                               Scratch scratch;
+                               for (Index t = part.begin(); t < part.end() && !progress.is_cancelled(); t += at_once) {
+                                   const Index end = std::min(t + at_once, part.end());
+                                   find(t, end, contacts, scratch);
+                                   progress.add(end - t);
+                               }
+                           });
         return contacts;
     }
 

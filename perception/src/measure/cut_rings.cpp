@@ -10,9 +10,9 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
 
 #include <unseen/vdtree/internal/packed_range.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/texture_fit.h>
 #include <unseen/vdtree/internal/tree_parts.h>
@@ -101,9 +101,8 @@ struct TexturedVertices {
 struct ColouredVertices {
     using Light = glm::dvec3;
     explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
-        tbb::parallel_for(std::size_t{0}, chroma.size(), [&](std::size_t node) {
-            chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]);
-        });
+        parallel_loop(std::size_t{0}, chroma.size(),
+                      [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
     }
     glm::dvec3 operator[](NodeId node) const {
         return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y};
@@ -289,7 +288,7 @@ private:
             footprints_[parent].include(footprints_[node]);
             rings_.vertices[parent] = unite(rings_.vertices[parent], rings_.vertices[node]);
         }
-        tbb::parallel_for(NodeId{0}, interior_, [&](NodeId node) {
+        parallel_loop(NodeId{0}, interior_, [&](NodeId node) {
             const TexturePyramid::Range texture = vertices_.pyramid.range(footprints_[node]);
             rings_.texture[node] = {texture.lo, texture.hi};
             if (!is_still(node))

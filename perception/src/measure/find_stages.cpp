@@ -12,11 +12,11 @@
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include "measure/lit_stages.h"
 #include "measure/luminance_bias.h"
 #include "measure/pyramid.h"
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/lighting.h>
 
@@ -587,7 +587,7 @@ private:
 
     template <class F>
     void for_each_direction(F&& f) {
-        tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, direction_count, [&](std::size_t i) {
             if (progress_.is_cancelled()) return;
             Painter painter(tree_, texture_, cameras_[i], surfaces_.local());
             f(i, painter);

@@ -13,9 +13,9 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
 
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/spot_share.h>
 
 #include "measure/fold_record.h"
@@ -317,7 +317,7 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
     for (const LightSource& light : lighting.lights) alone.push_back({.lights = {light}});
     std::vector<FoldRecord> folds(tree.interior_count());
     const auto ambient = static_cast<float>(lighting.ambient);
-    tbb::parallel_for(NodeId{0}, tree.interior_count(), [&](NodeId node) {
+    parallel_loop(NodeId{0}, tree.interior_count(), [&](NodeId node) {
         const VertexCone& cone = state_->bounds.cones()[node];
         const Sphere ring = tree.bounds()[node].ring;
         // Of all lights that something in the ring faces: a light from l makes l a n of a vertex, so a change of a n by

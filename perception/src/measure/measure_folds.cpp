@@ -12,10 +12,10 @@
 #include <string>
 
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/scaled_geometry.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
@@ -318,7 +318,7 @@ public:
             node = is_part ? tree_.subtree_end()[node] : node + 1;
         }
         constexpr NodeId at_once = 64; // nodes between looks at the clock
-        tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, parts.size(), [&](std::size_t i) {
             const NodeId begin = parts[i], end = tree_.subtree_end()[begin];
             Scratch scratch;
             for (NodeId last = end; last > begin && !progress.is_cancelled();) {
@@ -1043,7 +1043,7 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
     arena.execute([&] {
         is_whole = measure_these(all.in_units, all.lights, all.found, up_to, progress);
         if (!is_whole) return;
-        tbb::parallel_for(std::size_t{0}, trees.size(), [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, trees.size(), [&](std::size_t i) {
             const MeasuredFolds& found = all.found[i];
             all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, found.textures, FoldModel());
         });

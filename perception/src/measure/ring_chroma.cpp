@@ -5,10 +5,9 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
@@ -59,7 +58,7 @@ Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {
     const NodeId interior = tree.interior();
     std::vector<glm::vec2> chroma(luminance.size());
     constexpr std::size_t grain = 4096;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chroma.size(), grain), [&](const auto& range) {
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, chroma.size(), grain), [&](const auto& range) {
         for (std::size_t node = range.begin(); node < range.end(); ++node)
             chroma[node] = drawn_chroma(g.colours[node], luminance[node]);
     });

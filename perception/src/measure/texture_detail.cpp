@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include <unseen/vdtree/colour.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "measure/fold_stages.h"
 
@@ -29,7 +29,7 @@ TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
     Level base{width_, height_, std::vector<float>(texture.texels.size()), {}};
     const glm::dvec3 of_tint(tint);
     const double own = rec709_luminance(of_tint);
-    tbb::parallel_for(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
+    parallel_loop(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
         for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
             const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
             base.means[i] = static_cast<float>(own > 0 ? rec709_luminance(of_tint * texel) / own
@@ -41,7 +41,7 @@ TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
         const Level& fine = levels_.back();
         Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
         coarse.means.resize(std::size_t{coarse.width} * coarse.height);
-        tbb::parallel_for(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
+        parallel_loop(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
             for (std::uint32_t x = 0; x < coarse.width; ++x) {
                 float sum = 0, count = 0;
                 for (std::uint32_t fy = 2 * y; fy < std::min(2 * y + 2, fine.height); ++fy)
@@ -60,7 +60,7 @@ void TextureDetail::find_contrasts(std::size_t number) {
     const Level* const next = number + 1 < levels_.size() ? &levels_[number + 1] : nullptr;
     Tiles tiles{tiles_of(level.width), tiles_of(level.height), {}};
     tiles.largest.resize(std::size_t{tiles.width} * tiles.height, 0.0f);
-    tbb::parallel_for(std::uint32_t{0}, tiles.height, [&](std::uint32_t row) {
+    parallel_loop(std::uint32_t{0}, tiles.height, [&](std::uint32_t row) {
         for (std::uint32_t y = row * tile_side; y < std::min((row + 1) * tile_side, level.height); ++y)
             for (std::uint32_t x = 0; x < level.width; ++x) {
                 if (!next) continue; // one texel: nothing varies

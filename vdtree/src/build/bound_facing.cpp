@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
 #include "cut/kernel/prefetch.h"
@@ -281,13 +281,12 @@ public:
 
     ParallelArray<Directions> run() {
         std::vector<Outcome> outcomes(in_.parts.count());
-        tbb::parallel_for(std::size_t{0}, outcomes.size(),
-                          [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
+        parallel_loop(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
         // The dilation runs over places: an unwelded crease is no end of the surface.
         for (Index leaf = 0; leaf < in_.shape.leaves(); ++leaf)
             if (places_.weld[leaf] != leaf) welded(places_.weld[leaf]) |= welded(leaf);
-        tbb::parallel_for(std::size_t{0}, outcomes.size(),
-                          [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
+        parallel_loop(std::size_t{0}, outcomes.size(),
+                      [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
         for (const Outcome& outcome : outcomes)
             for (const Letter& letter : outcome.letters) facing_[letter.to] |= letter.content;
         in_.parts.bottom_up([&] { return [&](NodeId node) { add_children(node); }; });

@@ -11,9 +11,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
@@ -24,6 +22,7 @@
 #include "build/surface.h"
 #include "tree/mask_pool.h"
 #include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/texture_fit.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
@@ -96,7 +95,7 @@ bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2
 bool is_clean(const MeshView& mesh) {
     std::vector<std::uint8_t> used(mesh.positions.size(), 0);
     std::atomic<bool> whole = true;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1 << 14), [&](const auto& range) {
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1 << 14), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             if (uses_a_vertex_twice(mesh.triangles[t])) whole = false;
             for (const Index v : mesh.triangles[t]) std::atomic_ref(used[v]).store(1, std::memory_order_relaxed);
@@ -347,7 +346,7 @@ Result<void> TreeBuilder::analyse() {
 
 std::vector<float> TreeBuilder::find_luminance() const {
     std::vector<float> luminance(mesh_.positions.size());
-    tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
+    parallel_loop(std::size_t{0}, luminance.size(), [&](std::size_t v) {
         luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v],
                                         options_.light, prelit_, is_textured());
     });
@@ -366,7 +365,7 @@ void TreeBuilder::order(const Clustering& clustering) {
     const Index vertices = static_cast<Index>(mesh_.positions.size());
     nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
     std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
-    tbb::parallel_for(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
+    parallel_loop(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
         source_vertices[nodes_.leaf_of_vertex[v]] =
             v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
     });
@@ -380,14 +379,14 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
     // By leaf: weights, and normals of the leaves.
     ParallelArray<double> weights(nodes_.shape.leaves());
     ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
-    tbb::parallel_for(Index{0}, vertices, [&](Index v) {
+    parallel_loop(Index{0}, vertices, [&](Index v) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
     });
     const TreeParts& parts = *parts_;
     ProxyVertices proxies =
         place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
-    tbb::parallel_for(std::size_t{0}, clustering.positions.size(), [&](std::size_t i) {
+    parallel_loop(std::size_t{0}, clustering.positions.size(), [&](std::size_t i) {
         const NodeId node = nodes_.node_of_cluster[i];
         if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
     });
@@ -415,7 +414,7 @@ LeafPlaces TreeBuilder::find_places() const {
     std::iota(places.weld.begin(), places.weld.end(), Index{0});
     places.irregular.assign(leaves, 0);
     places.alone.assign(leaves, 1);
-    tbb::parallel_for(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
+    parallel_loop(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
         const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
         places.weld[leaf] = place;
         places.irregular[leaf] = surface_.irregular[v];
@@ -469,7 +468,7 @@ void TreeBuilder::bound() {
     g_->support_spheres = std::move(spheres.support);
     const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
     std::vector<NodeBounds> bounds(shape.interior());
-    tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
+    parallel_loop(NodeId{0}, shape.interior(), [&](NodeId node) {
         const int irregular = facing[node].marked() ? irregular_ring : 0;
         const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
         bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent),

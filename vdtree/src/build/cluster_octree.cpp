@@ -11,8 +11,8 @@
 #include <span>
 
 #include <glm/common.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
 #include "build/progress_counter.h"
@@ -140,9 +140,8 @@ private:
     template <class F>
     void for_each_chunk(F&& f) const {
         const std::size_t n = positions_.size(), chunks = (n + chunk_size - 1) / chunk_size;
-        tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-            f(chunk, chunk * chunk_size, std::min(n, (chunk + 1) * chunk_size));
-        });
+        parallel_loop(std::size_t{0}, chunks,
+                      [&](std::size_t chunk) { f(chunk, chunk * chunk_size, std::min(n, (chunk + 1) * chunk_size)); });
     }
 
     MortonGrid bounding_cube() const {
@@ -200,7 +199,7 @@ private:
     void build_subtrees() {
         subtrees_.assign(bucket_count(), Subtree(positions_, result_.parents));
         roots_.resize(bucket_count());
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, bucket_count(), 16), [&](const auto& range) {
+        parallel_loop_over(tbb::blocked_range<std::size_t>(0, bucket_count(), 16), [&](const auto& range) {
             if (counter_.stopped()) return;
             for (std::size_t b = range.begin(); b < range.end(); ++b) {
                 const std::span<CodedIndex> items = of_bucket(items_, b);
@@ -220,7 +219,7 @@ private:
         std::vector<Index>& parents = result_.parents;
         parents.reserve(first.back() + bucket_count());
         parents.resize(first.back());
-        tbb::parallel_for(std::size_t{0}, bucket_count(), [&](std::size_t b) {
+        parallel_loop(std::size_t{0}, bucket_count(), [&](std::size_t b) {
             const std::vector<Index>& made = subtrees_[b].parents_made;
             for (std::size_t i = 0; i < made.size(); ++i) parents[first[b] + i] = first[b] + made[i];
             for (const CodedIndex& item : of_bucket(items_, b)) parents[item.index] += first[b];

@@ -19,9 +19,8 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/team.h>
 
 #include "build/help_cluster.h"
@@ -77,7 +76,7 @@ class KdPartition {
 public:
     KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
         : slots_(slots), items_(slots.size()), other_items_(slots.size()), parts_(parts) {
-        tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, slots.size(), [&](std::size_t i) {
             items_[i] = {positions[slots[i]], slots[i]};
         });
     }
@@ -118,8 +117,8 @@ private:
         const std::span<Item> items = std::span(from).subspan(begin, end - begin);
         if (parts == 1) return sort_along_curve(items, slots_.subspan(begin, end - begin));
         halve(items, std::span(to).subspan(begin, end - begin), middle - begin);
-        tbb::parallel_invoke([&] { split(first_part, parts / 2, to, from); },
-                             [&] { split(first_part + parts / 2, parts / 2, to, from); });
+        parallel_loop(std::size_t{0}, std::size_t{2},
+                      [&](std::size_t half) { split(first_part + half * (parts / 2), parts / 2, to, from); });
     }
 
     // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are
@@ -341,7 +340,7 @@ void PartMaker::list_triangles() {
         return;
     }
     std::vector<Index> part_of(input_.mesh.positions.size());
-    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
+    parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
         for (Index i = first_place(part); i < first_place(part + 1); ++i)
             part_of[numbering_.members[i]] = static_cast<Index>(part);
     });
@@ -358,7 +357,7 @@ void PartMaker::list_triangles() {
             if (c != a && c != b) f(t, c);
         }
     };
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
         for_each_use(chunk, [&](std::size_t, Index part) { ++next[chunk * parts + part]; });
     });
     std::size_t sum = 0;
@@ -372,7 +371,7 @@ void PartMaker::list_triangles() {
     }
     first_triangle_[parts] = sum;
     triangles_.resize(sum);
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
         for_each_use(chunk, [&](std::size_t t, Index part) {
             triangles_[next[chunk * parts + part]++] = static_cast<Index>(t);
         });
@@ -515,7 +514,7 @@ private:
         const Index target = count == 1 ? 1 : part_target;
         Level& level = levels_.emplace_back(count);
         std::vector<Contraction> next(count);
-        tbb::parallel_for(
+        parallel_loop_over(
             tbb::blocked_range<std::size_t>(0, count, 1),
             [&](const tbb::blocked_range<std::size_t>& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -603,7 +602,7 @@ public:
         result_.deviations.resize(clusters - vertices());
         for (Level& level : levels) {
             number_rounds(level);
-            tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t i) {
+            parallel_loop(std::size_t{0}, level.size(), [&](std::size_t i) {
                 write_record(level[i], i);
                 level[i] = {};
             });

@@ -6,8 +6,9 @@
 #include <limits>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
 #include "cut/kernel/prefetch.h"
@@ -216,7 +217,7 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
     TriangleOrder order;
     ParallelArray<NodeId> vanishing(triangles.size(), Unfilled());
     constexpr std::size_t together = 64;
-    tbb::parallel_for(std::size_t{0}, (triangles.size() + together - 1) / together, [&](std::size_t i) {
+    parallel_loop(std::size_t{0}, (triangles.size() + together - 1) / together, [&](std::size_t i) {
         const std::size_t begin = i * together;
         find_vanishing<together>(triangles.subspan(begin, std::min(together, triangles.size() - begin)), nodes,
                                  ancestors, &vanishing[begin]);
@@ -226,7 +227,7 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_of_range = [&](auto&& f) {
-        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+        parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
             const std::size_t begin = shape.interior() * r / ranges, size = shape.interior() * (r + 1) / ranges - begin;
             for (std::size_t t = triangles.size(); t-- > 0;)
                 if (vanishing[t] - begin < size) f(t, order.first_triangle[vanishing[t] + 1]);

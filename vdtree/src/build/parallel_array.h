@@ -7,8 +7,7 @@
 #include <span>
 #include <type_traits>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 
@@ -25,7 +24,7 @@ public:
     ParallelArray(std::size_t size, Unfilled) : values_(std::allocator<T>().allocate(size), Deallocate{size}) {}
     explicit ParallelArray(std::size_t size) : ParallelArray(size, Unfilled()) {
         constexpr std::size_t grain = 1 << 14;
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, grain), [&](const auto& range) {
+        parallel_loop_over(tbb::blocked_range<std::size_t>(0, size, grain), [&](const auto& range) {
             std::uninitialized_value_construct_n(values_.get() + range.begin(), range.size());
         });
     }

@@ -10,10 +10,10 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
 #include "tree/message.h"
@@ -39,9 +39,11 @@ bool has_length(glm::vec3 v) {
 // The sum of f(0) .. f(count - 1), the same on any number of threads.
 template <class F>
 double sum(std::size_t count, F&& f) {
+    const TaskOrder order;
     return tbb::parallel_deterministic_reduce(
         tbb::blocked_range<std::size_t>(0, count, grain), 0.0,
         [&](const tbb::blocked_range<std::size_t>& range, double total) {
+            const TaskOrder::Task task(order);
             for (std::size_t i = range.begin(); i < range.end(); ++i) total += f(i);
             return total;
         },
@@ -186,7 +188,7 @@ Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange ve
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_triangle = [&](auto&& use) {
-        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+        parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
             const auto end_of = [&](std::size_t range) { return vertices.begin + vertices.size() * range / ranges; };
             const VertexRange own{end_of(r), end_of(r + 1)};
             for (const Triangle& corners : mesh.triangles) {
@@ -297,7 +299,7 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRa
     surface.areas.assign(coincident.size(), 0);
     surface.normals.resize(coincident.size());
     const Wedges wedges = collect_wedges(mesh, Places(coincident), range, surface.areas);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, range.size(), grain), [&](const auto& places) {
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, range.size(), grain), [&](const auto& places) {
         Fan fan;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
             const std::size_t v = range.begin + place;
@@ -392,7 +394,7 @@ Surface complete(const MeshView& mesh, std::span<const Index> coincident, Surfac
     // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the
     // others read them.
     const auto spread = [&](bool standing) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+        parallel_loop_over(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
             for (std::size_t v = range.begin(); v < range.end(); ++v) {
                 const Index place = coincident[v];
                 if ((place == v) != standing) continue;
@@ -419,7 +421,7 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
     const std::size_t chunks = (positions.size() + grain - 1) / grain;
     const auto end_of = [&](std::size_t chunk) { return std::min(positions.size(), (chunk + 1) * grain); };
     std::vector<std::array<Index, groups>> places(chunks); // by chunk and group: how many, then where the next one goes
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
         places[chunk].fill(0);
         for (std::size_t v = chunk * grain; v < end_of(chunk); ++v) {
             hashes[v] = hash(positions[v]);
@@ -434,12 +436,12 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
     }
     start[groups] = total;
     std::vector<HashedVertex> grouped(positions.size());
-    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
         for (std::size_t v = chunk * grain; v < end_of(chunk); ++v)
             grouped[places[chunk][group_of(v)]++] = {static_cast<std::uint32_t>(hashes[v]), static_cast<Index>(v)};
     });
     std::vector<Index> first(positions.size());
-    tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
+    parallel_loop(std::size_t{0}, groups, [&](std::size_t g) {
         CoincidenceFinder(positions, first).find(std::span(grouped).subspan(start[g], start[g + 1] - start[g]));
     });
     return first;

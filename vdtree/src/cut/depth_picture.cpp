@@ -6,10 +6,8 @@
 #include <limits>
 #include <string>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 namespace {
@@ -88,7 +86,7 @@ Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Sim
     constexpr NodeId word = 64;
     std::vector<std::uint64_t> hidden((interior + word - 1) / word, 0);
     constexpr std::size_t grain = 64;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hidden.size(), grain), [&](const auto& range) {
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, hidden.size(), grain), [&](const auto& range) {
         for (std::size_t w = range.begin(); w < range.end(); ++w) {
             const NodeId end = std::min(static_cast<NodeId>((w + 1) * word), interior);
             for (auto node = static_cast<NodeId>(w * word); node < end; ++node)

@@ -5,7 +5,8 @@
 #include <numbers>
 
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 
@@ -35,7 +36,7 @@ Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Sim
     const NodeId interior = tree.interior_count();
     const Projector project(view);
     std::vector<Footprint> footprints(tree.node_count());
-    tbb::parallel_for(NodeId{0}, tree.node_count(), [&](NodeId node) {
+    parallel_loop(NodeId{0}, tree.node_count(), [&](NodeId node) {
         footprints[node] = project(placement.to_world(tree.origin() + glm::dvec3(tree.positions()[node])));
     });
     // Leaves: all triangles that touch them. From their own places, not from what has grown.

@@ -10,9 +10,8 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 
 namespace unseen::vdtree {
@@ -33,7 +32,7 @@ public:
           sums_(tree.leaf_count() + 1, glm::dvec3(0)) {}
 
     std::vector<VertexCone> run(const FunctionRef<void(const LightBounds::FurtherVertex&)>* further_vertices) {
-        tbb::parallel_for(NodeId{0}, tree_.node_count(), [&](NodeId node) {
+        parallel_loop(NodeId{0}, tree_.node_count(), [&](NodeId node) {
             normals_[node] = tree_.normals()[node];
             albedo_[node] = albedos_of(node);
         });
@@ -42,7 +41,7 @@ public:
             sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
         if (further_vertices) {
             further_.resize(interior_);
-            tbb::parallel_for(NodeId{0}, interior_, [&](NodeId node) { further_[node] = nothing_of(node); });
+            parallel_loop(NodeId{0}, interior_, [&](NodeId node) { further_[node] = nothing_of(node); });
             const auto add = [&](NodeId node, NodeId vertex) {
                 if (vertex != no_node) see(vertex, further_[node]);
                 else further_[node].is_unknown = true;
@@ -56,7 +55,7 @@ public:
             }
         }
         constexpr NodeId grain = 1024;
-        tbb::parallel_for(tbb::blocked_range<NodeId>(0, interior_, grain), [&](const auto& range) {
+        parallel_loop_over(tbb::blocked_range<NodeId>(0, interior_, grain), [&](const auto& range) {
             for (NodeId node = range.begin(); node < range.end(); ++node)
                 if (is_small(node)) measure_each(node);
         });

@@ -5,7 +5,7 @@
 #include <bit>
 #include <utility>
 
-#include <tbb/parallel_for.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 
@@ -62,7 +62,7 @@ std::size_t chunks_of(std::size_t nodes) { return (nodes + grain - 1) / grain; }
 // Calls f(chunk, node) for all nodes, chunks at the same time.
 template <class F>
 void for_each_node(std::size_t nodes, F&& f) {
-    tbb::parallel_for(std::size_t{0}, chunks_of(nodes), [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, chunks_of(nodes), [&](std::size_t chunk) {
         for (std::size_t n = chunk * grain; n < std::min(nodes, (chunk + 1) * grain); ++n) f(chunk, n);
     });
 }
@@ -89,7 +89,7 @@ std::vector<NodeId> find_equal(std::span<const Directions> nodes) {
         grouped[next[chunk][group_of(n)]++] = {hashes[n], static_cast<NodeId>(n)};
     });
     std::vector<NodeId> first(nodes.size());
-    tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
+    parallel_loop(std::size_t{0}, groups, [&](std::size_t g) {
         const auto group = std::span(grouped).subspan(start[g], start[g + 1] - start[g]);
         const std::size_t wrap = std::bit_ceil(2 * group.size() + 1) - 1;
         std::vector<HashedNode> table(wrap + 1, {0, no_node});
@@ -153,7 +153,7 @@ PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId
     }
     pool.records.assign(end + most_mask_bytes, 0);
     begin.push_back(end);
-    tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t chunk) {
+    parallel_loop(std::size_t{0}, records.size(), [&](std::size_t chunk) {
         std::copy_n(records[chunk].data(), begin[chunk + 1] - begin[chunk], pool.records.data() + begin[chunk]);
     });
     return pool;

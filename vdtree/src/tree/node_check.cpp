@@ -6,8 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
+
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "tree/mask_pool.h"
 
@@ -195,9 +196,11 @@ Result<void> NodeChecks::check_all() {
     constexpr NodeId grain = 4096; // nodes
     using Range = tbb::blocked_range<NodeId>;
     const auto lowest = [](NodeId a, NodeId b) { return std::min(a, b); };
+    const TaskOrder order;
     const NodeId node = tbb::parallel_reduce(
         Range(0, static_cast<NodeId>(g_.first_leaf.size()), grain), no_node,
         [&](const Range& range, NodeId found) {
+            const TaskOrder::Task task(order);
             for (NodeId n = range.begin(); n < range.end() && n < found; ++n)
                 if (!is_in_order(n)) return n;
             return found;

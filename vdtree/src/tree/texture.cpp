@@ -7,8 +7,8 @@
 #include <numbers>
 #include <string>
 
-#include <tbb/parallel_for.h>
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 
@@ -95,7 +95,7 @@ TexturePyramid::TexturePyramid(const TextureView& texture)
     Level base{width_, height_, {}, {}};
     base.ranges.resize(texture.texels.size());
     base.means.resize(texture.texels.size());
-    tbb::parallel_for(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
+    parallel_loop(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
         for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
             const double luminance = linear_luminance(texture.texels[i]);
             base.ranges[i] = {rounded_down(luminance), rounded_up(luminance)};
@@ -108,7 +108,7 @@ TexturePyramid::TexturePyramid(const TextureView& texture)
         Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
         coarse.ranges.resize(std::size_t{coarse.width} * coarse.height);
         coarse.means.resize(coarse.ranges.size());
-        tbb::parallel_for(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
+        parallel_loop(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
             for (std::uint32_t x = 0; x < coarse.width; ++x) {
                 Range range = empty_range;
                 double sum = 0;

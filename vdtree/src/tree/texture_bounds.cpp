@@ -1,10 +1,9 @@
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include <tbb/parallel_for.h>
 
 namespace unseen::vdtree {
 
@@ -60,7 +59,7 @@ std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreePar
     const std::vector<UvBox> boxes = bound_footprints(g, parts);
     const TexturePyramid pyramid(g.texture_view());
     std::vector<PackedRange> ranges(boxes.size());
-    tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t node) {
+    parallel_loop(std::size_t{0}, boxes.size(), [&](std::size_t node) {
         const TexturePyramid::Range range = pyramid.range(boxes[node]);
         ranges[node] = {range.lo, range.hi};
     });

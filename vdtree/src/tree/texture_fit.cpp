@@ -1,10 +1,10 @@
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_fit.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
-#include <tbb/parallel_for.h>
 
 #include <unseen/vdtree/internal/texture_bounds.h>
 
@@ -97,7 +97,7 @@ TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g)
 
 std::vector<glm::vec2> TextureFits::fitted_uvs(const std::vector<UvBox>& footprints) const {
     std::vector<glm::vec2> uvs(g_->uvs.begin(), g_->uvs.end());
-    tbb::parallel_for(std::size_t{0}, maps_.size(), [&](std::size_t node) {
+    parallel_loop(std::size_t{0}, maps_.size(), [&](std::size_t node) {
         const Map& map = maps_[node];
         if (!moves_[node]) return;
         const double uu = glm::dot(map.along_u, map.along_u), uv = glm::dot(map.along_u, map.along_v),

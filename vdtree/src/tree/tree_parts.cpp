@@ -1,3 +1,4 @@
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 
 #include <algorithm>
@@ -38,7 +39,7 @@ TreeParts::TreeParts(const TreeLinks& tree)
 }
 
 void TreeParts::assign_triangles(std::span<const Index> first_triangle, std::span<const Triangle> triangles) {
-    tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+    parallel_loop(std::size_t{0}, parts_.size(), [&](std::size_t i) {
         TreePart& part = parts_[i];
         part.first_triangle = first_triangle[part.begin];
         part.triangle_end = first_triangle[part.end];

@@ -1,4 +1,5 @@
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include <algorithm>
@@ -6,8 +7,6 @@
 #include <string>
 
 #include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
@@ -122,7 +121,7 @@ private:
 void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool textured, std::span<Unorm16> luminance) {
     constexpr NodeId grain = 4096; // leaves
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size()), nodes = static_cast<NodeId>(luminance.size());
-    tbb::parallel_for(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
+    parallel_loop_over(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
         for (NodeId node = range.begin(); node < range.end(); ++node)
             luminance[node] = Unorm16::nearest(vertex_luminance(
                 g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
@@ -130,7 +129,7 @@ void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool t
 }
 
 void shade_by(const FunctionRef<float(NodeId)>& given, std::span<Unorm16> luminance) {
-    tbb::parallel_for(NodeId{0}, static_cast<NodeId>(luminance.size()), [&](NodeId node) {
+    parallel_loop(NodeId{0}, static_cast<NodeId>(luminance.size()), [&](NodeId node) {
         luminance[node] = Unorm16::nearest(std::min(1.0f, std::max(0.0f, given(node)))); // NaN: 0
     });
 }

@@ -7,8 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <tbb/parallel_for.h>
-
+#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_shape.h>
 
 namespace unseen::vdtree {
@@ -43,7 +42,7 @@ public:
     // Calls one of make_worker()'s workers for each node, children before parents, for several parts at the same time.
     template <class MakeWorker>
     void bottom_up(MakeWorker&& make_worker) const {
-        tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, parts_.size(), [&](std::size_t i) {
             auto worker = make_worker();
             for (NodeId node = parts_[i].end; node-- > parts_[i].begin;) worker(node);
         });
@@ -55,7 +54,7 @@ public:
     // in the end with those above.
     template <class MakeWorker>
     void part_by_part(MakeWorker&& make_worker) const {
-        tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
+        parallel_loop(std::size_t{0}, parts_.size(), [&](std::size_t i) {
             std::vector<NodeId> nodes(parts_[i].end - parts_[i].begin);
             std::iota(nodes.begin(), nodes.end(), parts_[i].begin);
             make_worker()(std::span<const NodeId>(nodes));
@@ -66,7 +65,7 @@ public:
     // Calls f(part) for all parts, among them what is above the others, several at the same time.
     template <class F>
     void for_each(F&& f) const {
-        tbb::parallel_for(std::size_t{0}, count(), [&](std::size_t i) { f((*this)[i]); });
+        parallel_loop(std::size_t{0}, count(), [&](std::size_t i) { f((*this)[i]); });
     }
     std::size_t count() const { return parts_.size() + 1; }
     const TreePart& operator[](std::size_t i) const { return i == 0 ? top_ : parts_[i - 1]; }

@@ -1,0 +1,80 @@
+// Loops of many threads, by oneTBB.
+//
+// The thread sanitizer does not see how TBB's tasks wait for each other, for the library is not built for it. It is told
+// here: what was done before a loop comes before its tasks, and what they do before what follows the loop. Nothing of that
+// is left in other builds.
+#pragma once
+
+#include <utility>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#ifdef __SANITIZE_THREAD__
+extern "C" void __tsan_acquire(void* address);
+extern "C" void __tsan_release(void* address);
+#endif
+
+namespace unseen {
+
+// Made before tasks begin, and ended when all have ended; each task holds a Task.
+class TaskOrder {
+public:
+#ifdef __SANITIZE_THREAD__
+    TaskOrder() { __tsan_release(&begin_); }
+    ~TaskOrder() { __tsan_acquire(&end_); }
+#else
+    TaskOrder() {} // not trivial: unused ones are no mistake
+    ~TaskOrder() {}
+#endif
+    TaskOrder(const TaskOrder&) = delete;
+    TaskOrder& operator=(const TaskOrder&) = delete;
+
+    class Task {
+    public:
+#ifdef __SANITIZE_THREAD__
+        explicit Task(const TaskOrder& order) : order_(order) { __tsan_acquire(&order_.begin_); }
+        ~Task() { __tsan_release(&order_.end_); }
+#else
+        explicit Task(const TaskOrder&) {}
+        ~Task() {}
+#endif
+        Task(const Task&) = delete;
+        Task& operator=(const Task&) = delete;
+
+#ifdef __SANITIZE_THREAD__
+    private:
+        const TaskOrder& order_;
+#endif
+    };
+
+#ifdef __SANITIZE_THREAD__
+private:
+    mutable char begin_ = 0, end_ = 0; // their addresses count
+#endif
+};
+
+// tbb::parallel_for() over first, first + 1, ... before last.
+template <class Index, class Body>
+void parallel_loop(Index first, Index last, const Body& body) {
+    const TaskOrder order;
+    tbb::parallel_for(first, last, [&](Index i) {
+        const TaskOrder::Task task(order);
+        body(i);
+    });
+}
+
+// tbb::parallel_for() over parts of a range.
+template <class Range, class Body, class... Partitioner>
+void parallel_loop_over(const Range& range, const Body& body, Partitioner&&... partitioner) {
+    const TaskOrder order;
+    tbb::parallel_for(
+        range,
+        [&](const Range& part) {
+            const TaskOrder::Task task(order);
+            body(part);
+        },
+        std::forward<Partitioner>(partitioner)...);
+}
+
+} // namespace unseen
