@@ -13,6 +13,9 @@
 #ifdef __SANITIZE_THREAD__
 extern "C" void __tsan_acquire(void* address);
 extern "C" void __tsan_release(void* address);
+#define UNSEEN_BEFORE_ORDER [[gnu::no_sanitize("thread")]]
+#else
+#define UNSEEN_BEFORE_ORDER // of what a task does before it is in order
 #endif
 
 namespace unseen {
@@ -50,31 +53,40 @@ public:
 
 #ifdef __SANITIZE_THREAD__
 private:
-    mutable char begin_ = 0, end_ = 0; // their addresses count
+    mutable char begin_, end_; // their addresses count, and nobody reads them
 #endif
+};
+
+// A loop's body, as a task runs it.
+template <class Body>
+class OrderedBody {
+public:
+    OrderedBody(const TaskOrder& order, const Body& body) : order_(&order), body_(&body) {}
+    UNSEEN_BEFORE_ORDER OrderedBody(const OrderedBody& other) : order_(other.order_), body_(other.body_) {}
+
+    template <class Part>
+    UNSEEN_BEFORE_ORDER void operator()(const Part& part) const {
+        const TaskOrder::Task task(*order_);
+        (*body_)(part);
+    }
+
+private:
+    const TaskOrder* order_;
+    const Body* body_;
 };
 
 // tbb::parallel_for() over first, first + 1, ... before last.
 template <class Index, class Body>
 void parallel_loop(Index first, Index last, const Body& body) {
     const TaskOrder order;
-    tbb::parallel_for(first, last, [&](Index i) {
-        const TaskOrder::Task task(order);
-        body(i);
-    });
+    tbb::parallel_for(first, last, OrderedBody(order, body));
 }
 
 // tbb::parallel_for() over parts of a range.
 template <class Range, class Body, class... Partitioner>
 void parallel_loop_over(const Range& range, const Body& body, Partitioner&&... partitioner) {
     const TaskOrder order;
-    tbb::parallel_for(
-        range,
-        [&](const Range& part) {
-            const TaskOrder::Task task(order);
-            body(part);
-        },
-        std::forward<Partitioner>(partitioner)...);
+    tbb::parallel_for(range, OrderedBody(order, body), std::forward<Partitioner>(partitioner)...);
 }
 
 } // namespace unseen
