@@ -215,7 +215,12 @@ TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
     const double seconds = cpu_seconds() - start;
     EXPECT_GT(shift, 0);
     EXPECT_LT(shift, 2 * tree.support_spheres()[node].radius);
-    EXPECT_LT(seconds, 5) << crossing.size() << " triangles";
+#ifdef __SANITIZE_THREAD__
+    constexpr double most_seconds = 50; // each read and write is looked up
+#else
+    constexpr double most_seconds = 5;
+#endif
+    EXPECT_LT(seconds, most_seconds) << crossing.size() << " triangles";
 }
 
 // What is inside moves no outline, however far it moves along the sheet.
