@@ -1,5 +1,3 @@
-#include <unseen/vdtree/internal/csv.h>
-
 #include "accuracy_bench.h"
 
 #include <algorithm>
@@ -10,6 +8,8 @@
 #include <map>
 #include <optional>
 #include <utility>
+
+#include <unseen/vdtree/internal/csv.h>
 
 #include "accuracy_axes.h"
 #include "accuracy_plot.h"

@@ -182,9 +182,7 @@ Result<PeerScene> peer_scene(const AccuracySubject& subject, const std::vector<v
         if (is_kept) {
             made = tree.share();
         } else {
-            vdtree::Cut whole(tree);
-            whole.unfold_all();
-            const vdtree::Mesh mesh = vdtree::extract_mesh(whole);
+            const vdtree::Mesh mesh = whole_mesh(tree);
             const auto start = BenchClock::now();
             const vdtree::Mesh simple = simplified_by_meshoptimizer(mesh, wanted);
             seconds += seconds_since(start);

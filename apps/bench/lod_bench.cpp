@@ -32,15 +32,6 @@ void add(LodSeen& seen, const session::PictureVerdict& verdict) {
     seen.v = std::max({seen.v, verdict.v, verdict.second_v});
 }
 
-// All of the model, with its texture, which cuts leave to the tree.
-vdtree::Mesh whole_mesh(const session::Session& session) {
-    vdtree::Mesh mesh = vdtree::extract_mesh(session::whole_cuts(session)[0]);
-    const vdtree::TextureView texture = session.tree().texture();
-    mesh.texture = {texture.width, texture.height, texture.wrap_u, texture.wrap_v,
-                    std::vector(texture.texels.begin(), texture.texels.end())};
-    return mesh;
-}
-
 // The peer's mesh, drawn like the model itself.
 Result<session::Session> session_of_peer(const session::Session& session, const vdtree::Mesh& simple) {
     const vdtree::VertexTree& own = session.tree();
@@ -76,7 +67,7 @@ Result<LodBenchResult> bench_lod(const std::vector<std::string>& models, int lev
         auto renderer = session::SceneRenderer::create(*context, *session);
         if (!renderer) return renderer.error();
         const auto shared = std::make_shared<session::SceneRenderer>(std::move(*renderer));
-        const vdtree::Mesh full = whole_mesh(*session);
+        const vdtree::Mesh full = whole_mesh(session->tree());
         const std::string name = std::filesystem::path(model).filename().string();
         // Level 0 is the control: what the peer's way of being drawn shows by itself, where the first level begins.
         for (std::size_t i = 0; i < object.levels.size() && object.levels.size() > 1; ++i) {

@@ -24,9 +24,8 @@ public:
     Result<std::vector<std::string>> make_to_select_in(std::uint64_t triangles,
                                                        const std::vector<std::string>& statues) const;
 
-    // Another file in the folder, once that is made.
-    Result<void> make_folder() const;
-    std::string file(const std::string& name) const { return (folder_ / name).string(); }
+    Result<void> make_folder() const;                                                     // where it is not there yet
+    std::string file(const std::string& name) const { return (folder_ / name).string(); } // another one in the folder
 
 private:
     std::filesystem::path folder_;

@@ -45,7 +45,7 @@ void add_report_options(CLI::App& verb, ReportArguments& report) {
     verb.add_flag("--markdown", report.markdown, "Print the tables as Markdown");
 }
 
-// Nothing where the name is empty.
+// Whole or not at all; nothing where the name is empty.
 Result<void> write_text(const std::string& file, const std::string& text) {
     if (file.empty()) return {};
     auto out = vdtree::AtomicFile::create(file);
@@ -606,7 +606,6 @@ struct AccuracyArguments {
     bool quick = false, brief = false;
 };
 
-// Written whole or not at all.
 Result<int> run(AccuracyArguments& a) {
     std::vector<std::string> outputs = {a.csv, a.html};
     if (!a.plots.empty())

@@ -132,14 +132,22 @@ double correlation(const MethodFigures& m) {
 
 // ---- ways to choose levels --------------------------------------------------------------------------------------------
 
+// Of a scene's first objects; others are left out.
+Result<session::Session> session_of(const std::string& file,
+                                    std::size_t objects = std::numeric_limits<std::size_t>::max()) {
+    session::LoadOptions load;
+    load.as = session::LoadAs::scene;
+    auto scene = session::Scene::load(file, load);
+    if (!scene) return scene.error();
+    if (scene->objects.size() > objects)
+        scene->objects.erase(scene->objects.begin() + static_cast<std::ptrdiff_t>(objects), scene->objects.end());
+    return session::Session::create(std::move(*scene));
+}
+
 class Scene {
 public:
     static Result<Scene> create(const render::Context& context, const std::string& file, int levels) {
-        session::LoadOptions load;
-        load.as = session::LoadAs::scene;
-        auto scene = session::Scene::load(file, load);
-        if (!scene) return scene.error();
-        auto session = session::Session::create(std::move(*scene));
+        auto session = session_of(file);
         if (!session) return session.error();
         Scene made;
         made.name = fs::path(file).stem().string();
@@ -440,17 +448,6 @@ Result<void> write_plots(const std::string& folder, const std::string& scene,
 }
 
 // ---- what the search costs ----------------------------------------------------------------------------------------------
-
-// The first objects of a scene; others are left out.
-Result<session::Session> session_of(const std::string& file, std::size_t objects) {
-    session::LoadOptions load;
-    load.as = session::LoadAs::scene;
-    auto scene = session::Scene::load(file, load);
-    if (!scene) return scene.error();
-    if (scene->objects.size() > objects)
-        scene->objects.erase(scene->objects.begin() + static_cast<std::ptrdiff_t>(objects), scene->objects.end());
-    return session::Session::create(std::move(*scene));
-}
 
 // One thing is changed at a time. Fewer objects: the first ones. The ground of cameras is always that of all.
 Result<BenchTable> growth(const render::Context& context, const Scene& scene, const std::string& file,
