@@ -1,11 +1,12 @@
-# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ... [PACKAGES ...] [LIBRARIES ...])
+# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ... [PACKAGES ...] [LIBRARIES ...]
+#                    [SINGLE ...])
 #
 # One module of the house: a library `unseen_<name>`, static or by BUILD_SHARED_LIBS shared, alias and export name
 # `unseen::<name>`, whose public headers lie in include/unseen/<name> and are installed alike. DEPENDS is what its headers
 # need, PRIVATE_DEPENDS what only its sources need. PACKAGES: the latter as pkg-config names them; LIBRARIES: those of them
-# that pkg-config does not know.
+# that pkg-config does not know. SINGLE: see unseen_unite_sources().
 function(unseen_add_library name)
-    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS;PACKAGES;LIBRARIES" ${ARGN})
+    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS;PACKAGES;LIBRARIES;SINGLE" ${ARGN})
     set(target unseen_${name})
     add_library(${target} ${arg_SOURCES})
     add_library(unseen::${name} ALIAS ${target})
@@ -20,6 +21,7 @@ function(unseen_add_library name)
     # What shared libraries show of themselves. Of static ones the options say nothing.
     target_link_options(${target} PRIVATE "LINKER:--version-script=${UNSEEN_EXPORTS_SCRIPT}")
     unseen_set_compile_options(${target})
+    unseen_unite_sources(${target} SINGLE ${arg_SINGLE})
     if(UNSEEN_INSTALL)
         install(TARGETS ${target} EXPORT unseen_${name}_targets
             ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
@@ -107,17 +109,24 @@ function(unseen_set_compile_options target)
     endif()
 endfunction()
 
-# Compiles several sources of a target at once, so that heavy headers are read once for all of them. For targets whose
-# sources use no name for two things; the sources in SINGLE stay alone.
+option(UNSEEN_UNITE_SOURCES "Compile several sources of a target at once: three times as fast" ON)
+
+# Compiles several sources of a target at once, so that headers are read once for all of them. For targets whose sources
+# use no name for two things; the sources in SINGLE, and those with options of their own, stay alone. The preset `dev`
+# compiles each alone, so that each includes what it uses.
 function(unseen_unite_sources target)
     cmake_parse_arguments(arg "" "" "SINGLE" ${ARGN})
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 5)
+    if(NOT UNSEEN_UNITE_SOURCES)
+        return()
+    endif()
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
     if(arg_SINGLE)
         set_source_files_properties(${arg_SINGLE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
     endif()
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
         target_compile_options(${target} PRIVATE -Wno-subobject-linkage) # knows only the outermost file as a source
     endif()
+    target_compile_options(${target} PRIVATE -Wno-shadow) # one source's names are not another's
 endfunction()
 
 function(unseen_install_package)

@@ -1,7 +1,9 @@
 # What ./quickstart and ./check share. Sourced from the source folder.
 
-# What ccache keeps serves the same sources in any folder: paths count from this one on.
+# What ccache keeps serves the same sources in any folder: paths count from this one on. The compiler says what a source
+# includes, so that ccache need not preprocess it first.
 export CCACHE_BASEDIR="${CCACHE_BASEDIR:-$PWD}" CCACHE_NOHASHDIR="${CCACHE_NOHASHDIR:-1}"
+export CCACHE_DEPEND="${CCACHE_DEPEND:-1}"
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
@@ -39,6 +41,14 @@ configure_release() {
         grep -A8 'CMake Error' build/configure.log >&2
         die "CMake could not configure the build, see build/configure.log"
     }
+}
+
+# Whether clang++ can link a fuzz target.
+clang_has_fuzzer() {
+    mkdir -p build
+    command -v clang++ >/dev/null &&
+        echo 'extern "C" int LLVMFuzzerTestOneInput(const unsigned char*, unsigned long) { return 0; }' |
+        clang++ -x c++ -fsanitize=fuzzer,address,undefined -o build/fuzzer_probe - 2>/dev/null
 }
 
 # Packages of npm at these versions, into a folder. Fails where they cannot be had; says why on stderr.

@@ -8,6 +8,7 @@
 #include <unseen/vdtree/internal/errors.h>
 
 #include "gl.h"
+#include "luminance_texture.h"
 
 namespace unseen::render {
 namespace {
@@ -17,8 +18,6 @@ int limit(GLenum name) {
     glGetIntegerv(name, &value);
     return value;
 }
-
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
 
 Result<void> check(int width, int height, const TargetOptions& options) {
     if (width < 1 || height < 1)

@@ -14,6 +14,7 @@
 #endif
 
 #include "file_output.h"
+#include "gltf_data.h"
 
 namespace unseen::meshio {
 

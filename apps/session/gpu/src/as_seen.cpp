@@ -2,7 +2,6 @@
 #include <unseen/session_gpu/as_seen.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include <unseen/perception/motion.h>
@@ -10,6 +9,7 @@
 #include <unseen/session_gpu/scene_renderer.h>
 
 #include "scene_masks.h"
+#include "stopwatch.h"
 
 namespace unseen::session {
 namespace {
@@ -17,11 +17,6 @@ namespace {
 // Where thresholds rise in a smaller share of all cells and bands than this, a fold test by them keeps about as many
 // triangles, and is not made.
 constexpr float least_masked_share = 0.02f;
-
-using Clock = std::chrono::steady_clock;
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 // Why pictures tell nothing about the folds of a simplification; null where they do.
 const char* why_pictures_tell_nothing(const Session& session, const Request& request, const Simplification& made) {

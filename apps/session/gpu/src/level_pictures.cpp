@@ -1,7 +1,6 @@
 #include <unseen/session_gpu/level_pictures.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -13,18 +12,9 @@
 #include <unseen/vdtree/internal/errors.h>
 
 #include "shared_uploads.h"
+#include "stopwatch.h"
 
 namespace unseen::session {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-} // namespace
-
 Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels) {
     if (levels < 2 || levels > most_levels)
         return invalid_argument("An object to select levels for has 2 to " + std::to_string(most_levels) + " of them.");

@@ -15,10 +15,10 @@
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 
+#include "stopwatch.h"
+
 namespace unseen::session {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // The eye may get faster by so much while a picture serves, and leave its way by so much of that.
 constexpr double faster = 1.5, aside = 0.2;
@@ -26,10 +26,6 @@ constexpr double faster = 1.5, aside = 0.2;
 constexpr double least_reach = 0.002;
 // Of the reach, and of the field: when the next picture is due.
 constexpr double used_up = 0.5, turned_away = 0.1;
-
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 glm::dvec3 forward(const vdtree::View& view) { return -vdtree::camera_frame(view).back; }
 

@@ -1,7 +1,6 @@
 #include <unseen/session_gpu/tradeoff.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,14 +13,10 @@
 #include <unseen/vdtree/internal/number_format.h>
 
 #include "median.h"
+#include "stopwatch.h"
 
 namespace unseen::session {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 constexpr int timed_frames = 9;         // followed, and drawn
 constexpr double degrees_a_frame = 0.1; // around the scene's centre
