@@ -65,6 +65,13 @@ void check(const ViewOptions& view) {
         refuse("--prelit excludes --light, --ambient, --fill-light and --lights, which light the colours.");
     if (!view.lights.empty() && (view.light || view.ambient || view.fill_light))
         refuse("--lights excludes --light, --ambient and --fill-light: say all of it in the file.");
+    if (view.is_orthographic && view.fov_degrees) refuse("--fov is of perspective views, and excludes --orthographic.");
+    if (view.is_orthographic && view.eye && !view.orthographic_height)
+        refuse(
+            "--orthographic fit frames the whole model, and excludes --eye: say how many metres the window is high.");
+    if (view.orthographic_height && view.fill)
+        refuse(
+            "--fill and the height of --orthographic exclude each other: say --orthographic fit, or leave out --fill.");
     if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
@@ -363,6 +370,20 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
         ->type_name("WxH");
     add_surroundings(group, o);
     group.callback([&o] { check(o); });
+}
+
+void add_orthographic_option(CLI::App& verb, ViewOptions& o) {
+    verb.add_option_function<std::string>(
+            "--orthographic",
+            [&o](const std::string& text) {
+                o.is_orthographic = true;
+                if (text == "fit") return;
+                o.orthographic_height = number_from<double>(text);
+                if (!o.orthographic_height || !(*o.orthographic_height > 0) || !std::isfinite(*o.orthographic_height))
+                    refuse("--orthographic must be fit or a height above 0, not '" + text + "'");
+            },
+            "In parallel, not in perspective: the window is so many metres high, or fits the model (see --fill)")
+        ->type_name("METRES|fit");
 }
 
 void add_surroundings_options(CLI::App& verb, ViewOptions& o) {

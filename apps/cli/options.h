@@ -39,6 +39,8 @@ struct ViewOptions {
     std::optional<glm::dvec3> direction;       // from the model towards the eye
     std::optional<double> fill;                // share of the window's height
     std::optional<double> fov_degrees;         // vertical
+    bool is_orthographic = false;
+    std::optional<double> orthographic_height; // world units; none: as --fill says
     int width = 1024, height = 1024;           // pixels
     std::optional<glm::dvec3> light;           // towards it
     std::optional<double> ambient;             // 0..1
@@ -96,6 +98,7 @@ using session::GazeSource;
 // Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
 // the parse with an error that names the option.
 void add_view_options(CLI::App& verb, ViewOptions& options);
+void add_orthographic_option(CLI::App& verb, ViewOptions& options); // beside them, for verbs that know such views
 // Of those, what does not say where one looks from: of verbs that choose their views.
 void add_surroundings_options(CLI::App& verb, ViewOptions& options);
 // Of verbs that take scenes: --as. Files that look like scenes are, from now on.

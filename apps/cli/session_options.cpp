@@ -128,7 +128,8 @@ vdtree::View make_view(const session::Session& session, const ViewOptions& optio
     view.height = options.height;
     view.fov_y_degrees =
         options.fov_degrees.value_or(perception::physical_field(session.observer().display, options.height).value());
-    const bool has_place = options.eye || options.direction || options.fill;
+    if (options.is_orthographic) view.orthographic_height = options.orthographic_height.value_or(1);
+    const bool has_place = options.eye || options.direction || options.fill || options.is_orthographic;
     if (const auto seen = has_place ? std::nullopt : session.camera_view(view)) {
         view = *seen;
         if (options.fov_degrees) view.fov_y_degrees = *options.fov_degrees;
@@ -138,6 +139,7 @@ vdtree::View make_view(const session::Session& session, const ViewOptions& optio
     } else {
         view =
             session.frame(options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill), view);
+        if (options.orthographic_height) view.orthographic_height = options.orthographic_height;
     }
     if (options.up) view.up = *options.up;
     return view;

@@ -374,6 +374,7 @@ Command render_command(CLI::App& app) {
     });
     add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
+    add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
     add_visibility_option(*verb, a->what, true);
@@ -382,6 +383,7 @@ Command render_command(CLI::App& app) {
     verb->footer(
         "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
         "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
+        "  unseen render part.stl -o front.png --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
         "  unseen render museum.glb -o museum.png --json -\n"
         "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
         "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"

@@ -110,6 +110,7 @@ Command simplify_command(CLI::App& app) {
     add_verbose_option(*verb, a->is_verbose);
     add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
+    add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
     add_visibility_option(*verb, a->what, false);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 
@@ -31,6 +32,23 @@ double near_plane(glm::dvec3 centre_in_view, double radius, glm::dvec2 corner) {
     return std::max(near_margin * depth, floor);
 }
 
+// Near and far plane lie so far before and behind the ball, as a share of its radius.
+constexpr double parallel_margin = 1e-3;
+
+Projection parallel(const vdtree::View& view, const glm::dmat4& view_from_unit, double world_unit, double radius) {
+    Projection projection;
+    projection.world_unit = world_unit;
+    const double half_height = *view.orthographic_height / 2 / world_unit;
+    glm::dmat4 clip_from_view(1);
+    clip_from_view[0][0] = view.height / (half_height * view.width);
+    clip_from_view[1][1] = 1 / half_height;
+    projection.clip_from_unit = clip_from_view * view_from_unit;
+    projection.view_z = glm::row(view_from_unit, 2);
+    const double reach = (1 + parallel_margin) * std::max(radius, point_radius), middle = -view_from_unit[3].z;
+    projection.set_depth_range((middle - reach) * world_unit, (middle + reach) * world_unit);
+    return projection;
+}
+
 } // namespace
 
 UnitFrame unit_frame(const vdtree::Sphere& bounds) {
@@ -44,11 +62,20 @@ UnitFrame unit_frame(const vdtree::Sphere& bounds) {
     return frame;
 }
 
-// Depth is near plane / distance. Only the row of z knows the near plane.
+// In perspective, depth is near plane / distance. Only the row of z knows the near plane.
 void Projection::set_near_plane(double distance) {
     if (distance == near_plane) return;
     near_plane = distance;
     clip_from_unit[3][2] = distance / world_unit;
+}
+
+// In parallel, depth is (far plane - distance) / range. The distance is -z in the camera's frame.
+void Projection::set_depth_range(double nearest, double farthest) {
+    const double range = farthest - nearest;
+    for (int column = 0; column < 4; ++column) clip_from_unit[column][2] = view_z[column] * world_unit / range;
+    clip_from_unit[3][2] += farthest / range;
+    near_plane = nearest;
+    far_plane = farthest;
 }
 
 Projection projection_of(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
@@ -62,6 +89,8 @@ Projection projection_of(const vdtree::View& view, const vdtree::Similarity& pla
 
     glm::dmat4 view_from_unit(rotation);
     view_from_unit[3] = glm::dvec4(centre_in_view, 1);
+
+    if (view.orthographic_height) return parallel(view, view_from_unit, world_unit, frame.radius);
 
     const vdtree::WindowPlane window = vdtree::window_plane(view);
     glm::dmat4 clip_from_view(0);

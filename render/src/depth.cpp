@@ -13,7 +13,7 @@ namespace unseen::render {
 Result<std::vector<float>> farthest_depth(const Context& context, std::span<const Item> items, const vdtree::View& view,
                                           int samples, std::uint32_t seed) {
     if (const auto valid = check_samples(samples); !valid) return valid.error();
-    if (const auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (const auto valid = vdtree::validate_perspective(view, "A picture of depth"); !valid) return valid.error();
     auto target = Target::create(context, view.width, view.height, {.colours = {}, .label = "farthest depth"});
     if (!target) return target.error();
     const auto nearest = near_plane(items, view);

@@ -16,7 +16,7 @@ Result<void> draw(std::span<const Item> items, const Camera& camera, Target& tar
 }
 
 Result<double> near_plane(std::span<const Item> items, const vdtree::View& view) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "A near plane"); !valid) return valid.error();
     const auto projections = projections_of(items, view, {});
     if (!projections) return projections.error();
     return projections->empty() ? 1.0 : projections->front().near_plane;

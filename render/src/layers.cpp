@@ -40,7 +40,7 @@ Result<void> check_layers(int layers) {
 
 Result<LayerSplit> split_into_layers(std::span<const glm::dvec3> centres, const vdtree::View& view, int layers) {
     if (auto valid = check_layers(layers); !valid) return valid.error();
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "A split into layers"); !valid) return valid.error();
     const glm::dvec3 back = vdtree::camera_frame(view).back;
     std::vector<double> depths;
     double nearest = 0, farthest = 0;

@@ -54,7 +54,7 @@ Result<void> Renderer::Impl::fit_sum(int width, int height) {
 
 Result<Frame> Renderer::Impl::draw(const vdtree::View& view, const DrawOptions& options,
                                    const vdtree::Similarity& placement) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
     if (auto fitted = fit_sum(view.width, view.height); !fitted) return fitted.error();
     glFinish(); // what came before is not this frame's time
     const auto start = std::chrono::steady_clock::now();
@@ -71,7 +71,7 @@ Result<Frame> Renderer::Impl::draw(const vdtree::View& view, const DrawOptions& 
 
 Result<void> Renderer::Impl::draw_to_window(const vdtree::View& view, const DrawOptions& options,
                                             const vdtree::Similarity& placement) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid;
+    if (auto valid = vdtree::validate(view); !valid) return valid;
     auto window = Target::foreign(cut.tree().context(), view.width, view.height);
     if (!window) return window.error();
     const Item one = item(options, placement);

@@ -128,6 +128,7 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
             pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
             impl_->add(&used);
         }
+        if (view.orthographic_height) return {}; // its depth is not near / distance
         impl_->drawn_depth = DrawnDepth{sample.depth.id(),
                                         width(),
                                         height(),

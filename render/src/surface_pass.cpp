@@ -136,9 +136,13 @@ Result<std::vector<Projection>> projections_of(std::span<const Item> items, cons
             return invalid_argument("The model cannot be drawn from so far away for its size; move the eye nearer.");
     }
     if (projections.empty()) return projections;
-    const auto nearest = std::ranges::min_element(projections, {}, &Projection::near_plane);
-    const double common = near_plane.value_or(nearest->near_plane);
-    for (Projection& projection : projections) projection.set_near_plane(common);
+    const double nearest = std::ranges::min_element(projections, {}, &Projection::near_plane)->near_plane;
+    if (view.orthographic_height) {
+        const double farthest = std::ranges::max_element(projections, {}, &Projection::far_plane)->far_plane;
+        for (Projection& projection : projections) projection.set_depth_range(nearest, farthest);
+        return projections;
+    }
+    for (Projection& projection : projections) projection.set_near_plane(near_plane.value_or(nearest));
     return projections;
 }
 
@@ -151,7 +155,9 @@ SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_
 Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
                                          int attachment, Use use) {
     const vdtree::View& view = camera.view;
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (camera.near_plane)
+        if (auto valid = vdtree::validate_perspective(view, "A near plane of one's own"); !valid) return valid.error();
     if (view.width != target.width || view.height != target.height)
         return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                                 " pixels, and the target has " + std::to_string(target.width) + "x" +

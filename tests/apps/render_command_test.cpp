@@ -456,6 +456,51 @@ TEST_F(RenderCommandTest, FillIsTheShareOfTheHeight) {
     EXPECT_GE(bottom + 1 - top, 74);
 }
 
+// In parallel: a ball of one unit in a window of four is a quarter of it high, wherever the eye is, and nobody sees what
+// is folded.
+TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
+    const auto height_of = [&](const std::string& name) {
+        const auto picture = read_image(path(name));
+        EXPECT_TRUE(picture);
+        int rows = 0;
+        for (int y = 0; y < picture->image.height; ++y)
+            rows += std::abs(picture->image.at(picture->image.width / 2, y) - 20) > 0.1f;
+        return rows;
+    };
+    render({"--full", "--orthographic", "fit", "--fill", "0.5"}, "fit.pfm");
+    const int half = height_of("fit.pfm");
+    EXPECT_LE(half, 80); // as in FillIsTheShareOfTheHeight
+    EXPECT_GE(half, 74);
+    for (const char* distance : {"0.1", "3", "500"}) {
+        render({"--full", "--orthographic", "4", "--eye", "0", "0", distance, "--target", "0", "0", "-1"}, "far.pfm");
+        const int rows = height_of("far.pfm");
+        render({"--full", "--orthographic", "8", "--eye", "0", "0", distance, "--target", "0", "0", "-1"}, "small.pfm");
+        EXPECT_NEAR(rows, 2 * height_of("small.pfm"), 2) << distance;
+    }
+    const Json cut = render({"--orthographic", "fit", "--fill", "0.5"}, "cut.pfm");
+    EXPECT_LT(cut["triangles"], ball_triangles);
+    EXPECT_EQ(effect_named(cut, "back-face culling")["on"], true);
+    const Outcome same = run({"compare", "fit.pfm", "cut.pfm", "--fail-above", "0"});
+    EXPECT_EQ(same.status, 0) << same.out << same.err;
+    render({"--path", "orbit:30", "--orthographic", "fit"}, "turn.png");
+
+    for (const auto& [words, complaint] :
+         {std::pair<std::vector<std::string>, std::string>{{"--orthographic", "0"}, "must be fit or a height above 0"},
+          {{"--orthographic", "fit", "--fov", "30"}, "--fov is of perspective views"},
+          {{"--orthographic", "fit", "--eye", "0", "0", "3"}, "--orthographic fit frames the whole model"},
+          {{"--orthographic", "2", "--fill", "0.5"}, "exclude each other"}}) {
+        std::vector<std::string> all = {"render", "ball.vdt", "-o", "none.png"};
+        all.insert(all.end(), words.begin(), words.end());
+        const Outcome refused = run(all);
+        EXPECT_EQ(refused.status, 2);
+        EXPECT_THAT(refused.err, HasSubstr(complaint));
+    }
+    const Outcome picture =
+        run({"simplify", "ball.vdt", "-o", "n.ply", "--orthographic", "fit", "--visibility", "picture"});
+    EXPECT_EQ(picture.status, 1);
+    EXPECT_THAT(picture.err, HasSubstr("needs a perspective view"));
+}
+
 TEST_F(RenderCommandTest, AnEyeInsideIsValid) { render({"--eye", "0", "0", "0.1"}, "inside.png"); }
 
 TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {

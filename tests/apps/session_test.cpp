@@ -153,6 +153,35 @@ TEST(Session, FramesAllObjectsWhereTheyArePlaced) {
     EXPECT_EQ(session.default_view().target, sphere.centre);
 }
 
+// What is beside the window folds; what is before the eye, behind it or around it does not.
+TEST(Session, OrthographicViewsKeepWhatTheWindowShows) {
+    auto session = two_balls(); // around 0 0 0 and 4 0 0
+    vdtree::View view{.width = 400, .height = 400, .orthographic_height = 2.4};
+    const auto kept = [&](double x, double z) {
+        view.eye = {x, 0, z};
+        view.target = {x, 0, z - 1};
+        auto made = session.simplify(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture});
+        if (!made) throw std::runtime_error(made.error().message);
+        return std::pair{made->cuts[0].triangle_count(), made->cuts[1].triangle_count()};
+    };
+    const auto at_first = kept(0, 5);
+    EXPECT_GT(at_first.first, 100u);
+    EXPECT_EQ(at_first.second, 0u);
+    EXPECT_EQ(kept(0, 0), at_first) << "the eye is in the middle of the ball";
+    EXPECT_EQ(kept(0, -5), at_first) << "the ball is behind the eye";
+    const auto at_second = kept(4, 5);
+    EXPECT_EQ(at_second.first, 0u);
+    EXPECT_GT(at_second.second, 100u);
+    EXPECT_TRUE(session::is_in_sight({{4, 0, 9}, 0.5}, view));
+    EXPECT_FALSE(session::is_in_sight({{0, 0, 0}, 1}, view));
+
+    auto follower = session::Follower(session);
+    view.eye = {0, 0, 5}, view.target = {0, 0, 0};
+    const auto followed = follower.follow(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture});
+    ASSERT_TRUE(followed) << followed.error().message;
+    EXPECT_EQ(followed->stats.triangles, at_first.first);
+}
+
 TEST(Follower, ComesWhereACutFromScratchIs) {
     Session session = two_balls();
     session::Follower follower(session);

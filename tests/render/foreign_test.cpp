@@ -473,7 +473,6 @@ TEST(OffCentre, ShowsThePartOfALargerWindow) {
         for (int x = 0; x < width; ++x)
             cropped.push_back(whole->luminance[static_cast<std::size_t>((top + y) * large.width + left + x)]);
     EXPECT_LT(different_share(seen->luminance, cropped), 5e-3); // edges, as above
-    EXPECT_FALSE(drawn_in(*context, scene, {.orthographic_height = 2}));
 }
 
 } // namespace

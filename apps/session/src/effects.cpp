@@ -190,7 +190,7 @@ Effect frustum_effect(const Sight& sight, const Decision& decision) {
 Effect culling_effect(const Sight& sight, Purpose purpose) {
     const WorldSphere sphere = world_sphere(sight.object);
     const bool is_open = sight.object.tree.closedness() == vdtree::Closedness::open;
-    const bool is_outside = glm::length(sight.view.eye - sphere.centre) > sphere.radius;
+    const bool is_outside = !is_around_eye(sphere, sight.view);
     if (purpose == Purpose::mesh) return {"back-face culling", false, "nothing is drawn"};
     if (is_open) return {"back-face culling", false, "the surface is open, so both sides are drawn"};
     if (!is_outside) return {"back-face culling", false, "the eye is in the model, so both sides are drawn"};
@@ -201,6 +201,8 @@ Effect culling_effect(const Sight& sight, Purpose purpose) {
 }
 
 Effect magnification_effect(const Sight& sight, const Decision& decision) {
+    if (sight.view.orthographic_height)
+        return {"magnification", false, "the view is orthographic: sizes are those on the screen, at any depth"};
     const double physical = perception::physical_field(sight.observer.display, sight.view.height).value();
     const std::string fields =
         rounded(sight.view.fov_y_degrees, 4) + " degrees, the window fills " + rounded(physical, 4);

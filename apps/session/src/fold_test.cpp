@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <unseen/perception/motion.h>
 #include <unseen/vdtree/internal/errors.h>
@@ -269,7 +270,11 @@ vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     viewpoint.hidden = decision.hidden;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
-        viewpoint.occluders.assign(spheres.begin(), spheres.end());
+        // An orthographic view that shows a small part stands for eyes so near that they may lie among the spheres.
+        std::copy_if(spheres.begin(), spheres.end(), std::back_inserter(viewpoint.occluders), [&](const auto& sphere) {
+            return glm::length(glm::dvec3(sphere.centre) - viewpoint.eye) >
+                   static_cast<double>(sphere.radius) + viewpoint.eye_spread;
+        });
     }
     return viewpoint;
 }
@@ -411,6 +416,7 @@ const char* why_not_hidden(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return "only the perceptual fold tests know what a fold changes";
     if (may_cast_anything(sight, decision)) return may_cast;
     if (sight.lighting && decision.test != FoldTest::error) return "under lights only the fold test error knows it";
+    if (sight.view.orthographic_height) return "the last picture was in perspective";
     if (!request.hidden->holds_for(sight.view.eye)) return "the eye has gone beyond the reach of the last picture";
     return nullptr;
 }
@@ -433,7 +439,7 @@ bool is_translucent(const Sight& sight) {
 bool culls_back_faces(const Sight& sight) {
     const WorldSphere sphere = world_sphere(sight.object);
     return !is_translucent(sight) && sight.object.tree.closedness() != vdtree::Closedness::open &&
-           glm::length(sight.view.eye - sphere.centre) > sphere.radius;
+           !is_around_eye(sphere, sight.view);
 }
 
 bool is_out_of_sight(const Sight& sight, const Decision& decision) {
@@ -443,7 +449,7 @@ bool is_out_of_sight(const Sight& sight, const Decision& decision) {
     // Far more than planes and spheres in single floats are off by.
     const double margin = 1e-3 * sphere.radius + 1e-5 * glm::length(away);
     const bool is_out = std::any_of(sight.window->begin(), sight.window->end(), [&](const vdtree::Plane& plane) {
-        return glm::dot(plane.normal, away) < -(sphere.radius + margin);
+        return glm::dot(plane.normal, away) + plane.offset < -(sphere.radius + margin);
     });
     if (!is_out || !casts_shadows(sight)) return is_out;
     const std::shared_ptr<const KeptCriterion>& last = criterion_of(sight, key_of(sight, decision));

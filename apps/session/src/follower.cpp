@@ -32,8 +32,12 @@ double imperceptible_from(const Sight& sight, const Decision& decision, float la
 // The view through a window whose sides are so much farther from its centre.
 vdtree::View widened(const vdtree::View& view) {
     constexpr double wider = 1.3, widest_degrees = 179;
-    const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
     vdtree::View wide = view;
+    if (view.orthographic_height) {
+        *wide.orthographic_height *= wider;
+        return wide;
+    }
+    const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
     // The middle stays where it is: halves of a wider window are longer.
     wide.fov_y_degrees = std::max(view.fov_y_degrees,
                                   std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));

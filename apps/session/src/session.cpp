@@ -35,9 +35,13 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
     return {a.centre + way * ((radius - a.radius) / distance), radius};
 }
 
-// Around the eye: the planes go through it, and their offsets are 0.
+// Around the eye. In perspective the planes go through it, and their offsets are 0.
 std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
     const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+    if (const auto height = view.orthographic_height) {
+        const double half_up = *height / 2, half_right = half_up * view.width / view.height;
+        return {{frame.right, half_right}, {-frame.right, half_right}, {frame.up, half_up}, {-frame.up, half_up}};
+    }
     const vdtree::WindowPlane window = vdtree::window_plane(view);
     const glm::dvec2 low = window.half - window.middle,
                      high = window.half + window.middle; // left and down; right and up
@@ -77,21 +81,14 @@ WorldSphere world_sphere(const Object& object) {
 }
 
 bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
-    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
-    const glm::dvec3 to = sphere.centre - view.eye;
-    const vdtree::WindowPlane window = vdtree::window_plane(view);
-    const double ahead = -glm::dot(to, frame.back);
-    if (ahead < -sphere.radius) return false;
-    // Beyond a side of the window: the distance from its plane through the eye.
-    const auto is_beyond = [&](double aside, double tangent) {
-        return (aside - tangent * ahead) / std::sqrt(1 + tangent * tangent) > sphere.radius;
-    };
-    const glm::dvec2 aside = {glm::dot(to, frame.right), glm::dot(to, frame.up)};
-    for (int k = 0; k < 2; ++k)
-        if (is_beyond(aside[k], window.half[k] + window.middle[k]) ||
-            is_beyond(-aside[k], window.half[k] - window.middle[k]))
-            return false;
-    return true;
+    const std::vector<vdtree::Plane> planes = window_of(view);
+    return std::none_of(planes.begin(), planes.end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, sphere.centre - view.eye) + plane.offset < -sphere.radius;
+    });
+}
+
+bool is_around_eye(const WorldSphere& sphere, const vdtree::View& view) {
+    return !view.orthographic_height && !(glm::length(view.eye - sphere.centre) > sphere.radius);
 }
 
 WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
@@ -266,13 +263,16 @@ Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
 }
 
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
-    if (const auto valid = vdtree::validate_perspective(view, "A session"); !valid) return valid.error();
+    if (const auto valid = vdtree::validate(view); !valid) return valid.error();
     window_ = window_of(view);
     std::vector<Sight> sights;
     sights.reserve(scene.objects.size());
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         auto lit = lighting(view, i);
         if (!lit) return lit.error();
+        if (view.orthographic_height && *lit && vdtree::shadow_lights(**lit) > 0)
+            return unsupported("Where shadows are seen is not known of orthographic views: switch them off, or look "
+                               "at the scene in perspective.");
         if (*lit && !caches[i]->light_bounds) {
             auto bounds = vdtree::LightBounds::measure(scene.objects[i].tree);
             if (!bounds) return bounds.error();

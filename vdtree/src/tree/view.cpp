@@ -180,6 +180,7 @@ CameraFrame camera_frame(const View& view) {
 
 View frame_sphere(glm::dvec3 centre, double radius, glm::dvec3 direction, double fill, const View& window) {
     View view = window;
+    if (view.orthographic_height) view.orthographic_height = 2 * radius / fill;
     const double half_field = window.fov_y_degrees * std::numbers::pi / 360;
     const double half_angle = std::atan(fill * std::tan(half_field));
     const glm::dvec3 towards_eye = unit(direction);

@@ -122,6 +122,8 @@ private:
 
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,
                                         Request request, const AsSeenOptions& options) {
+    if (auto valid = vdtree::validate_perspective(view, "A simplification by what pictures show"); !valid)
+        return valid.error();
     request.purpose = Purpose::picture;
     request.shown.reset();
     request.masking.clear();

@@ -466,7 +466,7 @@ Result<render::Item> LevelControl::Impl::item(std::size_t object, int level, con
 // ---- a frame ----------------------------------------------------------------------------------------------------------
 
 Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
-    if (auto valid = vdtree::validate(from); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(from, "A choice of levels"); !valid) return valid.error();
     LevelFrame frame;
     frame.number = frames;
     if (auto taken = take_counts(frame); !taken) return taken.error();

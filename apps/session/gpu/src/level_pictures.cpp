@@ -140,7 +140,7 @@ float LevelPictures::Impl::value_of(float luminance, SelectionQuality quality) c
 }
 
 Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQuality quality) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "A search for levels"); !valid) return valid.error();
     Impl& own = *impl_;
     if (auto made = own.need_target(view); !made) return made.error();
     std::vector<std::size_t> objects;
@@ -198,7 +198,7 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
 }
 
 Result<render::Frame> LevelPictures::draw_frame(const vdtree::View& view, std::span<const int> levels, int samples) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate_perspective(view, "A search for levels"); !valid) return valid.error();
     Impl& own = *impl_;
     if (levels.size() != own.levels.size())
         return invalid_argument("There are " + std::to_string(own.levels.size()) + " objects, and levels for " +

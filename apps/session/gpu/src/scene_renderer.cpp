@@ -104,7 +104,7 @@ Result<SceneRenderer> SceneRenderer::create(const render::Context& context, cons
 
 Result<render::Frame> SceneRenderer::draw(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                           const render::DrawOptions& options) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid.error();
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
     auto& sum = impl_->sum;
     if (!sum || sum->width() != view.width || sum->height() != view.height) {
         sum.reset(); // the old one first, so that both sizes need not fit at a time
@@ -136,7 +136,7 @@ Result<render::Frame> SceneRenderer::draw(std::span<const DrawnCut> cuts, const 
 
 Result<void> SceneRenderer::draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                            const render::DrawOptions& options) {
-    if (auto valid = vdtree::validate_perspective(view, "Drawing"); !valid) return valid;
+    if (auto valid = vdtree::validate(view); !valid) return valid;
     auto window = render::Target::foreign(impl_->context, view.width, view.height);
     if (!window) return window.error();
     const auto items = impl_->items(cuts, view, options);

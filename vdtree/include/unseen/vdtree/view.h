@@ -70,7 +70,8 @@ struct CameraFrame {
 CameraFrame camera_frame(const View& view);
 
 // A view from `direction` (towards the eye) in which a sphere's outline takes the share `fill` of the window's
-// height: distance = radius / sin(atan(fill tan(fov / 2))). Field and size come from `window`; target: the centre.
+// height: distance = radius / sin(atan(fill tan(fov / 2))). Field and size come from `window`, but for an orthographic
+// one, whose height becomes 2 radius / fill; target: the centre.
 View frame_sphere(glm::dvec3 centre, double radius, glm::dvec3 direction, double fill, const View& window);
 
 // The view with its eye turned around the axis through the target along `up`, counterclockwise as seen from above.

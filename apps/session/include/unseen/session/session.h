@@ -47,6 +47,7 @@ struct WorldSphere {
 WorldSphere world_sphere(const Object& object); // around its triangles
 // Whether any of it may be in the window: only of spheres outside of one of its sides, or behind the eye, false.
 bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view);
+bool is_around_eye(const WorldSphere& sphere, const vdtree::View& view); // never of an orthographic view
 
 // What Session makes the cut of one object by, for programs that make cuts themselves.
 struct CutRecipe {

@@ -49,7 +49,8 @@ public:
     Result<SceneItems> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
                              const render::DrawOptions& options = {});
 
-    std::optional<render::DrawnDepth> drawn_depth() const noexcept; // by the last draw(), until the next one
+    std::optional<render::DrawnDepth>
+    drawn_depth() const noexcept; // by the last draw() in perspective, until the next one
 
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
 
