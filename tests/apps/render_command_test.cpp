@@ -482,7 +482,10 @@ TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
     EXPECT_EQ(effect_named(cut, "back-face culling")["on"], true);
     const Outcome same = run({"compare", "fit.pfm", "cut.pfm", "--fail-above", "0"});
     EXPECT_EQ(same.status, 0) << same.out << same.err;
-    render({"--path", "orbit:30", "--orthographic", "fit"}, "turn.png");
+    const Outcome orbit =
+        run({"render", "ball.vdt", "--path", "orbit:30", "--orthographic", "fit", "--csv", "turn.csv"});
+    EXPECT_EQ(orbit.status, 0) << orbit.err;
+    EXPECT_THAT(orbit.out, HasSubstr("12 frames"));
 
     for (const auto& [words, complaint] :
          {std::pair<std::vector<std::string>, std::string>{{"--orthographic", "0"}, "must be fit or a height above 0"},
