@@ -28,17 +28,17 @@ struct Projection {
     double world_unit = 1; // world units per unit of the frame
     double near_plane = 1; // distance, world units; in parallel also 0 or below, for the eye may be among the items
     double far_plane = 0;  // likewise; in parallel alone
-    glm::dvec4 view_z =
-        glm::dvec4(0);       // likewise: z in the camera's frame, of what clip_from_unit takes; units of the frame
+    // Likewise: z in the camera's frame, of what clip_from_unit takes; units of the frame.
+    glm::dvec4 view_z = glm::dvec4(0);
     bool eye_inside = false; // of the ball; in parallel never, for all of it is before the picture
 
     void set_near_plane(double distance); // of perspective; world units; an object's own changes no bit
     void set_depth_range(double nearest, double farthest); // of parallel ones; world units
 };
 
-// With the object's own planes: just before its ball and, in parallel, just behind it. Precondition: valid view and placement. The eye is the origin
-// in all that is added up, so that the precision is that of the distance from the eye, not of the distance from the
-// world's origin.
+// With the object's own planes: just before its ball and, in parallel, just behind it. Precondition: valid view and
+// placement. The eye is the origin in all that is added up, so that the precision is that of the distance from the eye,
+// not of the distance from the world's origin.
 Projection projection_of(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
                          const UnitFrame& frame);
 

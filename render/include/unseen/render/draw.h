@@ -39,8 +39,8 @@ struct Item {
 struct Camera {
     vdtree::View view;                  // its window is as large as the target
     glm::dvec2 point = glm::dvec2(0.5); // of each pixel, from its top left, that is drawn
-    std::optional<double> near_plane =
-        {}; // distance, world units; none: just before the items. One for draws that share depth.
+    // Distance, world units; none: just before the items. One for draws that share depth; of perspective views alone.
+    std::optional<double> near_plane = {};
     // Of the lights that cast some, as of their last update; null: none are drawn. They outlive the draw.
     const Shadows* shadows = nullptr;
     // The attachment that how much of each casting light comes to a pixel is drawn to, in the same pass: 0 to 1, the
@@ -64,14 +64,15 @@ struct DrawnDepth {
     double near_plane = 0; // world units
 };
 
-// Draws the items in their order; what is nearer hides what is farther, across items. Items share the target's context.
-// Programs are compiled when they are first needed. `attachment`: the colour that is drawn to, others are kept; without
-// any, only depth is drawn. Fails on an invalid view, placement or light, and on a GL error.
+// Draws the items in their order, in perspective or in parallel; what is nearer hides what is farther, across items.
+// Items share the target's context. Programs are compiled when they are first needed. `attachment`: the colour that is
+// drawn to, others are kept; without any, only depth is drawn. Fails on an invalid view, placement or light, and on a GL
+// error.
 Result<void> draw(std::span<const Item> items, const Camera& camera, Target& target, const Clear& clear = {},
                   int attachment = 0);
 
 // The near plane that draw() chooses. It cuts off nothing but what is nearer to the eye than 1e-4 of the size of an
-// item around the eye.
+// item around the eye. Of perspective views alone: orthographic ones show what is behind the eye, too.
 Result<double> near_plane(std::span<const Item> items, const vdtree::View& view);
 
 } // namespace unseen::render
