@@ -600,6 +600,7 @@ TEST_F(SimplifyTest, ReportsToAFileBesideTheTable) {
 }
 
 TEST_F(SimplifyTest, TakesMeshesToo) {
+    ::setenv("UNSEEN_CACHE", "off", 1);
     const Outcome outcome = run({"simplify", "ball.obj", "-o", "o.ply", "--triangles", "300", "--json", "-"});
     ASSERT_EQ(outcome.status, 0);
     EXPECT_THAT(outcome.err, AllOf(HasSubstr("note"), HasSubstr("unseen build")));

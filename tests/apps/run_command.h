@@ -23,6 +23,8 @@
 #include <nlohmann/json.hpp>
 #include <unseen/perception/image.h>
 
+#include "temp_folder.h"
+
 extern char** environ;
 
 namespace unseen::app::testing {
@@ -60,7 +62,9 @@ protected:
         std::string name = (fs::temp_directory_path() / "unseen-test-XXXXXX").string();
         ASSERT_NE(mkdtemp(name.data()), nullptr);
         folder_ = name;
-        ::setenv("UNSEEN_CACHE", "off", 1); // nothing of a test is the user's
+        // Nothing of a test is the user's. Its cases share what is built and measured of meshes that they have in common.
+        static const support::TempFolder kept_trees;
+        ::setenv("UNSEEN_CACHE", kept_trees.path().c_str(), 1);
     }
     void TearDown() override {
         std::error_code ignored;
