@@ -456,8 +456,8 @@ TEST_F(RenderCommandTest, FillIsTheShareOfTheHeight) {
     EXPECT_GE(bottom + 1 - top, 74);
 }
 
-// In parallel: a ball of one unit in a window of four is a quarter of it high, wherever the eye is, and nobody sees what
-// is folded.
+// In parallel: in a window of half of the height the ball is twice as high, wherever the eye is, and nobody sees what is
+// folded.
 TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
     const auto height_of = [&](const std::string& name) {
         const auto picture = read_image(path(name));

@@ -2,8 +2,11 @@
 #include "gl_test.h"
 #include "scenes.h"
 
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <stdexcept>
+#include <vector>
 
 #include <unseen/render/renderer.h>
 #include <unseen/render/sample_sum.h>
@@ -129,7 +132,6 @@ TEST_F(Orthographic, NobodySeesWhatIsFolded) {
         support::measured(support::built(shapes::placed(shapes::bumpy_sphere(5, 0.02), 0.1, {0, 0, 0})), 0);
     auto renderer = Renderer::create(context(), tree);
     ASSERT_TRUE(renderer) << renderer.error().message;
-    std::uint32_t most = 0;
     int i = 0;
     for (oracle::Look look : oracle::looks_at(tree, {.window_px = 320, .count = 6})) {
         look.view.orthographic_height = std::array{0.25, 0.05, 2.0}.at(static_cast<std::size_t>(i++ % 3));
@@ -140,14 +142,13 @@ TEST_F(Orthographic, NobodySeesWhatIsFolded) {
         whole.unfold_all();
         ASSERT_TRUE(cut.follow(*criterion, vdtree::viewpoint_of(tree, look.view, {}, true), {.cull_back_faces = true}));
         EXPECT_LT(cut.triangle_count(), whole.triangle_count());
-        most = std::max(most, cut.triangle_count());
+        EXPECT_GT(cut.triangle_count(), 0u);
         const auto judged = oracle::judge(oracle::draw(*renderer, whole, look.view),
                                           oracle::draw(*renderer, cut, look.view), look, perception::CsfModel::castle);
         EXPECT_EQ(judged.visible_pixels, 0u) << oracle::words(look) << ", largest V " << judged.max_ratio;
         std::printf("%g units high: %u of %u triangles, largest V %.2f\n", *look.view.orthographic_height,
                     cut.triangle_count(), whole.triangle_count(), static_cast<double>(judged.max_ratio));
     }
-    EXPECT_GT(most, 0u);
 }
 
 } // namespace
