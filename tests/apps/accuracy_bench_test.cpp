@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <set>
 
-namespace {
+namespace accuracy_bench_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -111,4 +111,4 @@ TEST_F(AccuracyBenchTest, NamesTheAxesThatThereAre) {
     EXPECT_THAT(outcome.err, HasSubstr("spheres"));
 }
 
-} // namespace
+} // namespace accuracy_bench_test

@@ -16,7 +16,7 @@
 #include "measured.h"
 #include "shapes.h"
 
-namespace unseen::session {
+namespace unseen::session::as_seen_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -140,4 +140,4 @@ TEST_F(AsSeen, PicturesAreOfTheirOwnViewAlone) {
 }
 
 } // namespace
-} // namespace unseen::session
+} // namespace unseen::session::as_seen_test

@@ -1,7 +1,7 @@
 // unseen-bench engine, on a mesh so small that the figures mean nothing: every row is there, and measured.
 #include "run_bench.h"
 
-namespace {
+namespace bench_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -141,4 +141,4 @@ TEST_F(BenchCommandTest, SuggestsWhatWasMeant) {
     EXPECT_EQ(bench({"help", "engine"}).out, bench({"engine", "--help"}).out);
 }
 
-} // namespace
+} // namespace bench_command_test

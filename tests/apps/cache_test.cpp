@@ -4,7 +4,7 @@
 #include <unseen/session/session.h>
 #include <unseen/vdtree/tree_io.h>
 
-namespace {
+namespace cache_test {
 
 using namespace unseen;
 using namespace unseen::app::testing;
@@ -373,4 +373,4 @@ TEST(Size, HasUnits) {
         EXPECT_FALSE(session::parse_size(text)) << text;
 }
 
-} // namespace
+} // namespace cache_test

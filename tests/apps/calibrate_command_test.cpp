@@ -3,7 +3,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace calibrate_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -282,4 +282,4 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
     }
 }
 
-} // namespace
+} // namespace calibrate_command_test

@@ -3,7 +3,7 @@
 
 #include "run_command.h"
 
-namespace {
+namespace command_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -990,4 +990,4 @@ TEST_F(SignalTest, ABusErrorIsNotBlamedOnAFile) {
     fs::remove(log.string() + ".in");
 }
 
-} // namespace
+} // namespace command_test

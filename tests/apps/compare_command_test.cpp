@@ -3,7 +3,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace compare_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::ElementsAre;
@@ -232,4 +232,4 @@ TEST_F(CompareTest, TheGpuSaysWhatTheCpuSays) {
     EXPECT_THAT(refused.err, HasSubstr("--device"));
 }
 
-} // namespace
+} // namespace compare_command_test

@@ -3,7 +3,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace csf_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -250,4 +250,4 @@ TEST_F(CsfCommandTest, PlotsCurves) {
     EXPECT_EQ(run({"csf", "--plot", "csf.gif"}).status, 2);
 }
 
-} // namespace
+} // namespace csf_command_test

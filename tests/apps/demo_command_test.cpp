@@ -2,7 +2,7 @@
 #include "run_command.h"
 #include "virtual_display.h"
 
-namespace {
+namespace demo_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -43,4 +43,4 @@ TEST_F(DemoCommandTest, MakesAndShowsAModel) {
     EXPECT_THAT(run({"demo", "--made", "-o", "file"}).err, IsAnErrorForPeople());
 }
 
-} // namespace
+} // namespace demo_command_test

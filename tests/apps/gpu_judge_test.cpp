@@ -20,7 +20,7 @@
 #include "luminance_images.h"
 #include "shapes.h"
 
-namespace {
+namespace gpu_judge_test {
 
 using namespace unseen;
 using perception::Image;
@@ -359,4 +359,4 @@ TEST_F(GpuJudgeTest, KnowsNoEccentricityWithoutAGaze) {
     EXPECT_FALSE(perception::judge_tables(0, 4, 1, 2, {}));
 }
 
-} // namespace
+} // namespace gpu_judge_test

@@ -23,7 +23,7 @@
 #include "measured.h"
 #include "oracle.h"
 
-namespace unseen::app {
+namespace unseen::app::hard_mesh_test {
 namespace {
 
 using vdtree::VertexTree;
@@ -211,4 +211,4 @@ TEST(LitFolds, AreUnseenUnderLightsThatStandStill) {
 }
 
 } // namespace
-} // namespace unseen::app
+} // namespace unseen::app::hard_mesh_test

@@ -12,7 +12,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 
-namespace {
+namespace interruption_test {
 
 using namespace unseen;
 
@@ -40,4 +40,4 @@ TEST(LostPagesDeathTest, AreSaidAndLeaveNothingBehind) {
     EXPECT_EQ(folder.file_count(), 1u) << "not even what was being written";
 }
 
-} // namespace
+} // namespace interruption_test

@@ -5,7 +5,7 @@
 
 #include "temp_folder.h"
 
-namespace {
+namespace level_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -190,4 +190,4 @@ TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
     EXPECT_EQ(files(), std::set<std::string>({"scene.glb"}));
 }
 
-} // namespace
+} // namespace level_command_test

@@ -18,7 +18,7 @@
 #include "measured.h"
 #include "shapes.h"
 
-namespace {
+namespace level_control_test {
 
 using namespace unseen;
 using namespace unseen::session;
@@ -473,4 +473,4 @@ TEST_F(LevelControlTest, LevelsFadeUnderShadows) {
     }
 }
 
-} // namespace
+} // namespace level_control_test

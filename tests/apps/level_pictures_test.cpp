@@ -18,7 +18,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 
-namespace {
+namespace level_pictures_test {
 
 using namespace unseen;
 using namespace unseen::session;
@@ -164,4 +164,4 @@ TEST_F(PrecomputeTest, RefusesOptionsOutOfRange) {
     EXPECT_EQ(folder.file_count(), 0u);
 }
 
-} // namespace
+} // namespace level_pictures_test

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace {
+namespace lod_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -157,4 +157,4 @@ TEST_F(LodCommandTest, WrongUsageIsNamed) {
     EXPECT_FALSE(fs::exists(path("out.glb")));
 }
 
-} // namespace
+} // namespace lod_command_test

@@ -14,7 +14,7 @@
 #include "measured.h"
 #include "shapes.h"
 
-namespace {
+namespace lod_test {
 
 using namespace unseen;
 using namespace unseen::session;
@@ -140,4 +140,4 @@ TEST(LodDirections, AreSpreadAndOffTheAxes) {
     EXPECT_NE(lod_directions(1, 1)[0], lod_directions(1, 2)[0]);
 }
 
-} // namespace
+} // namespace lod_test

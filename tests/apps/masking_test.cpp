@@ -23,7 +23,7 @@
 #include "measured.h"
 #include "shapes.h"
 
-namespace unseen::session {
+namespace unseen::session::masking_test {
 namespace {
 
 using perception::Elevations;
@@ -525,4 +525,4 @@ TEST_F(PassesTest, MaskingThatIsNotWorthItLeavesTheFoldTestAlone) {
 }
 
 } // namespace
-} // namespace unseen::session
+} // namespace unseen::session::masking_test

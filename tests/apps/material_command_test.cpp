@@ -7,7 +7,7 @@
 #include "gltf_scene.h"
 #include "obj_file.h"
 
-namespace {
+namespace material_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -329,4 +329,4 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
     }
 }
 
-} // namespace
+} // namespace material_command_test

@@ -16,7 +16,7 @@
 #include "measured.h"
 #include "shapes.h"
 
-namespace unseen::session {
+namespace unseen::session::moving_occlusion_test {
 namespace {
 
 using perception::Image;
@@ -242,4 +242,4 @@ TEST_F(MovingOcclusionTest, RefusesWhatIsNone) {
 }
 
 } // namespace
-} // namespace unseen::session
+} // namespace unseen::session::moving_occlusion_test

@@ -19,7 +19,7 @@
 #include "gl_test.h"
 #include "temp_folder.h"
 
-namespace unseen::session {
+namespace unseen::session::museum_test {
 namespace {
 
 using app::MuseumBars;
@@ -138,4 +138,4 @@ TEST_F(MuseumTest, CutsBehindBarsNeedFewerTriangles) {
 }
 
 } // namespace
-} // namespace unseen::session
+} // namespace unseen::session::museum_test

@@ -4,7 +4,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace perception_bench_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -222,4 +222,4 @@ TEST_F(PerceptionBenchTest, RefusesWrongUsage) {
     EXPECT_EQ(bench({"effects", "--mesh", "missing.ply"}).status, 1);
 }
 
-} // namespace
+} // namespace perception_bench_test

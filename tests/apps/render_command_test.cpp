@@ -5,7 +5,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace render_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::ElementsAre;
@@ -860,4 +860,4 @@ TEST_F(RenderCommandTest, PathsAndTracesAreTextOfAnEnd) {
                 ::testing::AllOf(HasSubstr("eye_\\x1b[31m"), ::testing::Not(HasSubstr("\x1b"))));
 }
 
-} // namespace
+} // namespace render_command_test

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <thread>
 
-namespace {
+namespace select_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -224,4 +224,4 @@ TEST_F(SelectCommandTest, SeveralProcessesSelectTheSame) {
 }
 #endif
 
-} // namespace
+} // namespace select_command_test

@@ -16,7 +16,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 
-namespace {
+namespace selection_test {
 
 using namespace unseen;
 using namespace unseen::session;
@@ -489,4 +489,4 @@ TEST(SelectionFollower, RefusesAnotherScene) {
     EXPECT_FALSE(SelectionFollower::create(s, scene, levels));
 }
 
-} // namespace
+} // namespace selection_test

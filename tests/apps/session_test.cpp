@@ -15,7 +15,7 @@
 
 #include "shapes.h"
 
-namespace {
+namespace session_test {
 
 using namespace unseen;
 using session::FoldTest;
@@ -316,4 +316,4 @@ TEST(Observer, ACircleAroundTheGazeIsOneOfAngles) {
     }
 }
 
-} // namespace
+} // namespace session_test

@@ -18,7 +18,7 @@
 #include "gl_test.h"
 #include "shapes.h"
 
-namespace unseen::app {
+namespace unseen::app::shadow_cut_test {
 namespace {
 
 using Kind = vdtree::LightSource::Kind;
@@ -279,4 +279,4 @@ INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 1
                          [](const auto& of) { return std::string(settings()[of.param].name); });
 
 } // namespace
-} // namespace unseen::app
+} // namespace unseen::app::shadow_cut_test

@@ -1,7 +1,7 @@
 // unseen study: pictures, answers of a simulated observer, and what they come to.
 #include "run_command.h"
 
-namespace {
+namespace study_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -117,4 +117,4 @@ TEST_F(StudyCommandTest, RefusesWhatItCannotDo) {
     EXPECT_THAT(gone.err, HasSubstr("ball-view2-1.png"));
 }
 
-} // namespace
+} // namespace study_command_test

@@ -11,7 +11,7 @@
 #include "shapes.h"
 #include "subdivide.h"
 
-namespace {
+namespace subdivide_test {
 
 using namespace unseen;
 using app::subdivide;
@@ -164,4 +164,4 @@ TEST(Subdivide, RefusesWhatCannotBe) {
     EXPECT_EQ(subdivide(mesh, cancelled).error().code, ErrorCode::cancelled);
 }
 
-} // namespace
+} // namespace subdivide_test

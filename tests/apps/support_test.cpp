@@ -23,7 +23,7 @@
 #include "temp_folder.h"
 #include "visibility_map.h"
 
-namespace {
+namespace support_test {
 
 using namespace unseen;
 using namespace unseen::app;
@@ -431,4 +431,4 @@ TEST(ColourBar, LiesBelowTheMapWithAllOfItsText) {
     EXPECT_GT(visible.r, visible.b);
 }
 
-} // namespace
+} // namespace support_test

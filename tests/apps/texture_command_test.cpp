@@ -11,7 +11,7 @@
 
 #include "tree_file.h"
 
-namespace {
+namespace texture_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -399,4 +399,4 @@ TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
     }
 }
 
-} // namespace
+} // namespace texture_command_test

@@ -10,7 +10,7 @@
 
 #include "gltf_scene.h"
 
-namespace {
+namespace textured_scene_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -251,4 +251,4 @@ TEST_F(TexturedSceneTest, FoldsWhereNobodySeesIt) {
     }
 }
 
-} // namespace
+} // namespace textured_scene_test

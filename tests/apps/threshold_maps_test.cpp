@@ -18,7 +18,7 @@
 #include "luminance_images.h"
 #include "shapes.h"
 
-namespace {
+namespace threshold_maps_test {
 
 using namespace unseen;
 using perception::Image;
@@ -272,4 +272,4 @@ TEST_F(ThresholdMapsTest, RefuseWhatIsNone) {
     EXPECT_FALSE(passes->map_thresholds(other->texture(), -1));
 }
 
-} // namespace
+} // namespace threshold_maps_test

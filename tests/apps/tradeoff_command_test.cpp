@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace {
+namespace tradeoff_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -90,4 +90,4 @@ TEST_F(TradeoffCommandTest, ThresholdsAreOfImperceptibleCuts) {
     EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "0"}).err, HasSubstr("--threshold"));
 }
 
-} // namespace
+} // namespace tradeoff_command_test

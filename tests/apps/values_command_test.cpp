@@ -1,7 +1,7 @@
 // Values of vertices from a file to another one, by way of trees, and VTK's files as models.
 #include "run_command.h"
 
-namespace {
+namespace values_command_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -104,4 +104,4 @@ TEST_F(ValuesCommandTest, AreKeptInEveryWayOfBuilding) {
     EXPECT_THAT(arrays("large.ply"), IsEmpty());
 }
 
-} // namespace
+} // namespace values_command_test

@@ -7,7 +7,7 @@
 
 #include "profile_files.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::display_fit_test {
 namespace {
 
 using testing::AllOf;
@@ -85,4 +85,4 @@ TEST_F(DisplayFit, BadTablesNameTheFileAndTheLine) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::display_fit_test

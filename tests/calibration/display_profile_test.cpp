@@ -7,7 +7,7 @@
 
 #include "profile_files.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::display_profile_test {
 namespace {
 
 using perception::Display;
@@ -288,4 +288,4 @@ TEST_F(DisplayProfile, WritingThroughALinkKeepsTheLink) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::display_profile_test

@@ -10,7 +10,7 @@
 #include "profile_files.h"
 #include "shapes.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::light_rig_test {
 namespace {
 
 using Kind = vdtree::LightSource::Kind;
@@ -163,4 +163,4 @@ TEST_F(LightRigTest, LightsCastShadowsWhereTheySaySo) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::light_rig_test

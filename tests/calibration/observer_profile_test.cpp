@@ -7,7 +7,7 @@
 
 #include "profile_files.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::observer_profile_test {
 namespace {
 
 using perception::CsfModel;
@@ -262,4 +262,4 @@ TEST_F(ObserverProfileTest, WritingFailsWithoutLeavingAFile) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::observer_profile_test

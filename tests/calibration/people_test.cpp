@@ -16,7 +16,7 @@
 
 #include "judge/band_weights.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::people_test {
 namespace {
 
 using perception::CsfModel;
@@ -262,4 +262,4 @@ TEST(People, HaveNames) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::people_test

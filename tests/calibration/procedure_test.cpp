@@ -12,7 +12,7 @@
 
 #include "profile_files.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::procedure_test {
 namespace {
 
 using perception::CsfSamples;
@@ -542,4 +542,4 @@ TEST_F(ProcedureTest, ObserversAreDescribedByNameAndKeys) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::procedure_test

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::calibration {
+namespace unseen::calibration::quest_test {
 namespace {
 
 using testing::HasSubstr;
@@ -137,4 +137,4 @@ TEST(QuestPlus, RefusesGridsThatAreNone) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::quest_test

@@ -16,7 +16,7 @@
 
 #include "temp_folder.h"
 
-namespace unseen::calibration {
+namespace unseen::calibration::study_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -290,4 +290,4 @@ TEST(PictureObserver, SeesByTheSecondJudge) {
 }
 
 } // namespace
-} // namespace unseen::calibration
+} // namespace unseen::calibration::study_test

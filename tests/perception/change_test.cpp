@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::change_test {
 namespace {
 
 using testing::HasSubstr;
@@ -262,4 +262,4 @@ TEST(ChangeJudge, RefusesWhatIsNoChange) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::change_test

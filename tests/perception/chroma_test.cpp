@@ -12,7 +12,7 @@
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
 
-namespace unseen::perception {
+namespace unseen::perception::chroma_test {
 namespace {
 
 using vdtree::Cut;
@@ -243,4 +243,4 @@ TEST(Chroma, FollowsTheLight) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::chroma_test

@@ -23,7 +23,7 @@
 #include "textures.h"
 #include "tree_file.h"
 
-namespace unseen::perception {
+namespace unseen::perception::criterion_test {
 namespace {
 
 using vdtree::Mesh;
@@ -451,4 +451,4 @@ TEST(ViewpointOf, TakesGazesOffCentreAndNoneInParallel) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::criterion_test

@@ -15,7 +15,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::csf_models_test {
 namespace {
 
 // Relative. Of formulas in double against each other.
@@ -365,4 +365,4 @@ TEST(CsfModels, HaveDistinctNames) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::csf_models_test

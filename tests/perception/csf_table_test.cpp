@@ -14,7 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::csf_table_test {
 namespace {
 
 using testing::HasSubstr;
@@ -657,4 +657,4 @@ TEST(CsfTable, SaysHowFarItsSamplesReach) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::csf_table_test

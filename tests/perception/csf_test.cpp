@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::csf_test {
 namespace {
 
 // Relative. The golden values have 9 digits; the forms themselves agree to about 1e-8.
@@ -202,4 +202,4 @@ TEST(Csf, ModelsHaveNames) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::csf_test

@@ -18,7 +18,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace cut_rings_test {
 
 using support::built;
 
@@ -230,5 +230,5 @@ TEST(CutRings, FindShiftsOfTheMean) {
     EXPECT_NEAR(bound_cut_rings(*bright)->mean_shift[node], 0.125, 1e-4);
 }
 
-} // namespace
+} // namespace cut_rings_test
 } // namespace unseen::perception

@@ -21,7 +21,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace damaged_tree_test {
 
 using support::TreeFile;
 
@@ -59,5 +59,5 @@ TEST(DamagedTrees, AreMeasuredByNobody) {
     }
 }
 
-} // namespace
+} // namespace damaged_tree_test
 } // namespace unseen::perception

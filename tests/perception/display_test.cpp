@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::display_test {
 namespace {
 
 using testing::HasSubstr;
@@ -269,4 +269,4 @@ TEST(Display, ValidationNamesTheField) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::display_test

@@ -21,7 +21,7 @@
 #include "shapes.h"
 #include "sound.h"
 
-namespace unseen::perception {
+namespace unseen::perception::error_distances_test {
 namespace {
 
 using vdtree::Mesh;
@@ -202,4 +202,4 @@ TEST(ErrorDistances, RefuseFactorsThatAreNone) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::error_distances_test

@@ -9,7 +9,7 @@
 
 #include "judge/masking.h"
 
-namespace unseen::perception {
+namespace unseen::perception::fast_math_test {
 namespace {
 
 constexpr double tolerance = 4e-7; // as the header says
@@ -52,4 +52,4 @@ TEST(FastMath, ElevatesThresholdsAsDalySays) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::fast_math_test

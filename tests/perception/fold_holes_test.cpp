@@ -18,7 +18,7 @@
 
 #include "sound.h"
 
-namespace unseen::perception {
+namespace unseen::perception::fold_holes_test {
 namespace {
 
 using vdtree::Cut;
@@ -462,4 +462,4 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::fold_holes_test

@@ -32,7 +32,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace fold_measurement_test {
 
 // Colours are what is drawn.
 VertexTree built(const Mesh& mesh) { return support::measured(support::built(mesh, {.prelit = true, .threads = 1})); }
@@ -412,5 +412,5 @@ TEST(FoldErrors, AreKeptInTheFile) {
     EXPECT_FALSE(has_fold_measurement(plain));
 }
 
-} // namespace
+} // namespace fold_measurement_test
 } // namespace unseen::perception

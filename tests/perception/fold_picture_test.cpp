@@ -8,7 +8,7 @@
 
 namespace unseen::perception {
 
-namespace {
+namespace fold_picture_test {
 
 using Layer = FoldPicture::Layer;
 constexpr float half_width = 1;
@@ -134,5 +134,5 @@ TEST(FoldPicture, SurvivesPlacesThatAreNoNumbers) {
     for (const float amplitude : amplitudes_of(picture)) EXPECT_FALSE(amplitude > 1e37f);
 }
 
-} // namespace
+} // namespace fold_picture_test
 } // namespace unseen::perception

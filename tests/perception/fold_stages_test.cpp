@@ -24,7 +24,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace fold_stages_test {
 
 // Colours are what is drawn.
 VertexTree built(const Mesh& mesh, int threads = 1) {
@@ -219,5 +219,5 @@ TEST(FoldStages, AreKeptInFiles) {
     }
 }
 
-} // namespace
+} // namespace fold_stages_test
 } // namespace unseen::perception

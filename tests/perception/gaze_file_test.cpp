@@ -11,7 +11,7 @@
 
 #include <unseen/perception/gaze.h>
 
-namespace unseen::perception {
+namespace unseen::perception::gaze_file_test {
 namespace {
 
 using testing::AllOf;
@@ -282,4 +282,4 @@ TEST_F(GazeFileTest, SimulatedRecordingsAreMadeByTheirRule) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::gaze_file_test

@@ -8,7 +8,7 @@
 
 #include <gmock/gmock.h>
 
-namespace unseen::perception {
+namespace unseen::perception::gaze_test {
 namespace {
 
 using testing::HasSubstr;
@@ -233,4 +233,4 @@ TEST(GazeTest, MarginsAreAtLeastAsLargeAsATablesSteps) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::gaze_test

@@ -13,7 +13,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::judge_modern_test {
 namespace {
 
 Image flat(int width, int height, double value) {
@@ -489,4 +489,4 @@ TEST(JudgeModern, RefusesBadInput) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::judge_modern_test

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::judge_rpg99_test {
 namespace {
 
 Image flat(int width, int height, float value) {
@@ -163,4 +163,4 @@ TEST(PerceptualdiffLuminance, UsesAdobeWeightsAndGamma) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::judge_rpg99_test

@@ -22,7 +22,7 @@
 #include "measure/fold_record.h"
 #include "shapes.h"
 
-namespace unseen::perception {
+namespace unseen::perception::lit_folds_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -310,4 +310,4 @@ TEST(LitFolds, RefuseWhatTheyDoNotKnow) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::lit_folds_test

@@ -19,7 +19,7 @@
 #include "shapes.h"
 #include "tree_checks.h"
 
-namespace unseen::perception {
+namespace unseen::perception::metamorphic_test {
 namespace {
 
 using namespace vdtree;
@@ -265,4 +265,4 @@ TEST_F(Metamorphic, AClosedCameraPath) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::metamorphic_test

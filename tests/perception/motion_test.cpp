@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::motion_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -130,4 +130,4 @@ TEST(Motion, WhatIsFollowedStandsStillAndTheRestMoves) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::motion_test

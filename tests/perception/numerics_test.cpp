@@ -20,7 +20,7 @@
 #include "judge/masking.h"
 #include "luminance_images.h"
 
-namespace unseen::perception {
+namespace unseen::perception::numerics_test {
 namespace {
 
 using support::flat;
@@ -407,4 +407,4 @@ TEST(Numerics, MaskersOfAnyStrength) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::numerics_test

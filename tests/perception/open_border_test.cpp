@@ -23,7 +23,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace open_border_test {
 
 using Place = std::array<float, 3>;
 
@@ -282,5 +282,5 @@ TEST(FoldedBorders, CountWhatTurnsOverBeyondThem) {
     EXPECT_GT(turned_over, 10u);
 }
 
-} // namespace
+} // namespace open_border_test
 } // namespace unseen::perception

@@ -26,7 +26,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace single_folds_test {
 
 // In all, over all meshes; UNSEEN_FOLDS sets it.
 int wanted_folds() {
@@ -365,5 +365,5 @@ TEST_P(SingleFolds, StayWithinTheCutsRing) {
     EXPECT_LE(found.turned, folds_turned_over * wanted_folds() / static_cast<double>(std::size(cases)) + 2);
 }
 
-} // namespace
+} // namespace single_folds_test
 } // namespace unseen::perception

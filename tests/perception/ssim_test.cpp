@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::ssim_test {
 namespace {
 
 // Codes n/255 of a fixed pseudo-random sequence over a ramp.
@@ -109,4 +109,4 @@ TEST(Ssim, RefusesWhatItCannotCompare) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::ssim_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::summation_test {
 namespace {
 
 // The mean of w over discs, w = Ac / (Ac + pi r^2)^2, is the law of area.
@@ -45,4 +45,4 @@ TEST(SummationWindow, LosesNothingOfAPlane) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::summation_test

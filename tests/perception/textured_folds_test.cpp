@@ -18,7 +18,7 @@
 #include "temp_folder.h"
 #include "textures.h"
 
-namespace unseen::perception {
+namespace unseen::perception::textured_folds_test {
 namespace {
 
 using namespace vdtree;
@@ -208,4 +208,4 @@ TEST(TexturedFolds, OfOddMeshesAreNumbers) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::textured_folds_test

@@ -20,7 +20,7 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
+namespace textured_rings_test {
 
 using support::built;
 
@@ -147,5 +147,5 @@ TEST(TexturedRings, MoveByNoMoreThanTheirDeviation) {
     EXPECT_GT(smaller, looked / 4);
 }
 
-} // namespace
+} // namespace textured_rings_test
 } // namespace unseen::perception

@@ -10,7 +10,7 @@
 
 #include "measured.h"
 
-namespace unseen::perception {
+namespace unseen::perception::translucency_test {
 namespace {
 
 using vdtree::Cut;
@@ -110,4 +110,4 @@ TEST_P(Translucency, OfOpaqueMeshesIsNone) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::translucency_test

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::perception {
+namespace unseen::perception::units_test {
 namespace {
 
 TEST(Units, ConvertDegreesToRadiansAndBack) {
@@ -43,4 +43,4 @@ TEST(Units, WorkInConstantExpressions) {
 }
 
 } // namespace
-} // namespace unseen::perception
+} // namespace unseen::perception::units_test

@@ -12,7 +12,7 @@
 
 #include "gl_object.h"
 
-namespace {
+namespace context_test {
 
 using namespace unseen::render;
 // A call that any GL must refuse.
@@ -123,4 +123,4 @@ TEST(WindowOptions, MustHaveASize) {
     EXPECT_THAT(window.error().message, ::testing::HasSubstr("0x10"));
 }
 
-} // namespace
+} // namespace context_test

@@ -13,7 +13,7 @@
 #include <unseen/render/target.h>
 #include <unseen/vdtree/cut.h>
 
-namespace {
+namespace depth_cells_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -132,4 +132,4 @@ TEST_F(DepthCellsTest, RefuseWhatIsNone) {
     EXPECT_TRUE(reader.begin(two_cubes(), small, 1));
 }
 
-} // namespace
+} // namespace depth_cells_test

@@ -7,7 +7,7 @@
 #include <unseen/render/difference_count.h>
 #include <unseen/render/stage_times.h>
 
-namespace {
+namespace difference_count_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -134,4 +134,4 @@ TEST_F(DifferenceCountTest, TimesStages) {
     EXPECT_TRUE(times->take().empty());
 }
 
-} // namespace
+} // namespace difference_count_test

@@ -24,7 +24,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 
-namespace unseen {
+namespace unseen::fold_oracle_test {
 namespace {
 
 using support::built;
@@ -288,4 +288,4 @@ TEST(FoldDistance, LeavesLittleOfAFarObject) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::fold_oracle_test

@@ -11,7 +11,7 @@
 
 #include <unseen/render/renderer.h>
 
-namespace {
+namespace geomorph_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -208,4 +208,4 @@ TEST_F(GeomorphTest, WithoutGlidesNothingIsMadeAndPixelsAreTheSame) {
     EXPECT_EQ(living_buffers(), buffers + 1);
 }
 
-} // namespace
+} // namespace geomorph_test

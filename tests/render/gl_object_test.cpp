@@ -9,7 +9,7 @@
 
 #include "gl_object.h"
 
-namespace {
+namespace gl_object_test {
 
 using namespace unseen::render;
 using GlObjectTest = unseen::render::testing::GlTest;
@@ -89,4 +89,4 @@ TEST_F(GlObjectTest, MakesEveryKind) {
     EXPECT_TRUE(glIsProgram(ProgramObject::create("p").id()));
 }
 
-} // namespace
+} // namespace gl_object_test

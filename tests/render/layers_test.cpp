@@ -11,7 +11,7 @@
 #include <unseen/render/layers.h>
 #include <unseen/render/shadows.h>
 
-namespace {
+namespace layers_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -327,4 +327,4 @@ TEST_F(LayersTest, RefusesWhatCannotBeSplit) {
         HasSubstr("9x8"));
 }
 
-} // namespace
+} // namespace layers_test

@@ -17,7 +17,7 @@
 #include "oracle.h"
 #include "shapes.h"
 
-namespace unseen {
+namespace unseen::lit_test {
 namespace {
 
 using support::built;
@@ -154,4 +154,4 @@ TEST_P(Lit, RefusesLightsThatCannotBe) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::lit_test

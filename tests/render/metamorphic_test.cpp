@@ -16,7 +16,7 @@
 #include "oracle.h"
 #include "shapes.h"
 
-namespace unseen {
+namespace unseen::metamorphic_test {
 namespace {
 
 using namespace vdtree;
@@ -71,4 +71,4 @@ TEST_F(Metamorphic, PicturesOfPermutedMeshes) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::metamorphic_test

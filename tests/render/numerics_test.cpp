@@ -16,7 +16,7 @@
 #include "one_band.h"
 #include "scenes.h"
 
-namespace unseen::render {
+namespace unseen::render::numerics_test {
 namespace {
 
 using Numerics = testing::GlTest;
@@ -118,4 +118,4 @@ TEST_F(Numerics, MaskingExponentsIn16Bits) {
 }
 
 } // namespace
-} // namespace unseen::render
+} // namespace unseen::render::numerics_test

@@ -12,7 +12,7 @@
 #include <unseen/render/overlay.h>
 #include <unseen/render/renderer.h>
 
-namespace {
+namespace overlay_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -227,4 +227,4 @@ TEST_F(OverlayTest, RefusesWhatIsNoImageAndNoPicture) {
     ASSERT_TRUE(context().make_current());
 }
 
-} // namespace
+} // namespace overlay_test

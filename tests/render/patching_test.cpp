@@ -9,7 +9,7 @@
 
 #include <unseen/render/renderer.h>
 
-namespace {
+namespace patching_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -159,4 +159,4 @@ TEST_F(PatchingTest, GrowsWithTheCut) {
     EXPECT_GT(before, 3u * 1000u);
 }
 
-} // namespace
+} // namespace patching_test

@@ -5,7 +5,7 @@
 
 #include "program.h"
 
-namespace {
+namespace program_test {
 
 using namespace unseen::render;
 using ProgramTest = unseen::render::testing::GlTest;
@@ -58,4 +58,4 @@ TEST_F(ProgramTest, OwnsNothingWhenMovedFrom) {
     EXPECT_EQ(program->id(), 0u); // NOLINT(bugprone-use-after-move)
 }
 
-} // namespace
+} // namespace program_test

@@ -17,7 +17,7 @@
 #include "built.h"
 #include "shapes.h"
 
-namespace {
+namespace renderer_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -681,4 +681,4 @@ TEST_F(RendererTest, RefusesToDrawToAWindowThatIsNotThere) {
     EXPECT_THAT(drawn.error().message, ::testing::HasSubstr("headless"));
 }
 
-} // namespace
+} // namespace renderer_test

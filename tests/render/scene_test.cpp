@@ -13,7 +13,7 @@
 
 #include <unseen/render/renderer.h>
 
-namespace {
+namespace scene_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -334,4 +334,4 @@ TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     EXPECT_EQ(why_not({.cut = cut}, {.view = view}), "drawn");
 }
 
-} // namespace
+} // namespace scene_test

@@ -15,7 +15,7 @@
 #include "scenes.h"
 #include "shapes.h"
 
-namespace unseen::render {
+namespace unseen::render::shadow_test {
 namespace {
 
 using vdtree::Lighting;
@@ -362,4 +362,4 @@ TEST_F(ShadowTest, AllKindsOfSurfacesAreDrawnWithThem) {
 }
 
 } // namespace
-} // namespace unseen::render
+} // namespace unseen::render::shadow_test

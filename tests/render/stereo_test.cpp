@@ -10,7 +10,7 @@
 #include "oracle.h"
 #include "shapes.h"
 
-namespace unseen {
+namespace unseen::stereo_test {
 namespace {
 
 using vdtree::Cut;
@@ -65,4 +65,4 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::stereo_test

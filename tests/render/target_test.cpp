@@ -11,7 +11,7 @@
 
 #include <unseen/render/target.h>
 
-namespace {
+namespace target_test {
 
 using namespace unseen::render;
 using ::testing::Each;
@@ -159,4 +159,4 @@ TEST_F(TargetTest, KeepsItsContextAlive) {
     EXPECT_TRUE(context().make_current());
 }
 
-} // namespace
+} // namespace target_test

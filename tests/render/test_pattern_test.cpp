@@ -9,7 +9,7 @@
 
 #include <unseen/render/test_pattern.h>
 
-namespace {
+namespace test_pattern_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
@@ -186,4 +186,4 @@ TEST_F(TestPatternTest, RefusesWhatCannotBeDrawn) {
     EXPECT_THAT(made.error().message, HasSubstr("code 7"));
 }
 
-} // namespace
+} // namespace test_pattern_test

@@ -17,7 +17,7 @@
 #include "sound.h"
 #include "textures.h"
 
-namespace unseen {
+namespace unseen::texture_test {
 namespace {
 
 using vdtree::Cut;
@@ -255,4 +255,4 @@ TEST_F(Textured, AreBoundedUnderLights) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::texture_test

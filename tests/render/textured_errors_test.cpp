@@ -21,7 +21,7 @@
 #include "shapes.h"
 #include "textures.h"
 
-namespace unseen {
+namespace unseen::textured_errors_test {
 namespace {
 
 using vdtree::Cut;
@@ -211,4 +211,4 @@ TEST_P(TexturedErrors, AreSeenByNobodyUnderLights) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::textured_errors_test

@@ -17,7 +17,7 @@
 #include "shapes.h"
 #include "textures.h"
 
-namespace unseen {
+namespace unseen::textured_oracle_test {
 namespace {
 
 using support::built;
@@ -130,4 +130,4 @@ TEST(TextureDeviation, LetsEvenTexturesOnPlanesFold) {
 }
 
 } // namespace
-} // namespace unseen
+} // namespace unseen::textured_oracle_test

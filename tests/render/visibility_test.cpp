@@ -17,7 +17,7 @@
 #include "gpu_plane.h"
 #include "one_band.h"
 
-namespace {
+namespace visibility_test {
 
 using namespace unseen::render;
 using ::testing::Each;
@@ -164,4 +164,4 @@ TEST_F(VisibilityTest, RefusesPlanesThatCannotBeDrawnTo) {
     EXPECT_NE(context().take_errors(), ""); // GL says so, too
 }
 
-} // namespace
+} // namespace visibility_test

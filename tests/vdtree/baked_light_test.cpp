@@ -14,7 +14,7 @@
 #include "shapes.h"
 #include "textures.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::baked_light_test {
 namespace {
 
 using support::built;
@@ -115,4 +115,4 @@ TEST(BakedLight, IsSeldomFoundByChance) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::baked_light_test

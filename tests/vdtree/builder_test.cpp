@@ -26,7 +26,7 @@
 #include "sound.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::builder_test {
 namespace {
 
 using testing::ElementsAre;
@@ -1023,4 +1023,4 @@ TEST(BuildTree, ReportsProgressThatGrows) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::builder_test

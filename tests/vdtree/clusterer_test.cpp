@@ -27,7 +27,7 @@
 #include "clustering_tools.h"
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::clusterer_test {
 namespace {
 
 using support::ClusteringTask;
@@ -491,4 +491,4 @@ TEST(QuadricParts, StopWhenToldTo) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::clusterer_test

@@ -16,7 +16,7 @@
 #include "built.h"
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::conserve_light_test {
 namespace {
 
 using support::built;
@@ -92,4 +92,4 @@ TEST(ConserveLight, ChangesProxiesOnlyAndNothingWhenDoneAgain) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::conserve_light_test

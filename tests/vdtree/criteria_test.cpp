@@ -21,7 +21,7 @@
 #include "shapes.h"
 #include "sound.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::criteria_test {
 namespace {
 
 using shapes::random_between;
@@ -777,4 +777,4 @@ TEST(ViewpointOfPair, HoldsWhatEitherWindowShowsAndRefusesWhatIsNone) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::criteria_test

@@ -20,7 +20,7 @@
 #include "sound.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::cut_test {
 namespace {
 
 using shapes::random_unit;
@@ -584,4 +584,4 @@ TEST(ExtractMesh, IsEmptyForAFoldedCut) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::cut_test

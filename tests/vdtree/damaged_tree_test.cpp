@@ -21,7 +21,7 @@
 #include "tree_file.h"
 #include "tree_use.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::damaged_tree_test {
 namespace {
 
 using support::built;
@@ -150,4 +150,4 @@ INSTANTIATE_TEST_SUITE_P(All, DamagedTrees,
                          [](const auto& kind) { return kind.param.name; });
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::damaged_tree_test

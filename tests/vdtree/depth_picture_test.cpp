@@ -15,7 +15,7 @@
 #include "built.h"
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::depth_picture_test {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -161,4 +161,4 @@ TEST(DepthPicture, RefusesWhatIsNone) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::depth_picture_test

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::examine_test {
 namespace {
 
 using meshio::Examination;
@@ -168,4 +168,4 @@ TEST(Examine, TakesAnyMeshThatIsValid) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::examine_test

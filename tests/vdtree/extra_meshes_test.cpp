@@ -22,7 +22,7 @@
 #include "temp_folder.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::extra_meshes_test {
 namespace {
 
 class ExtraMesh : public testing::TestWithParam<std::filesystem::path> {};
@@ -121,4 +121,4 @@ TEST(ExtraMeshes, AreThereWhereTheFolderIs) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::extra_meshes_test

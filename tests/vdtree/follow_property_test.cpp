@@ -8,7 +8,7 @@
 
 #include "follow_drive.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::follow_property_test {
 namespace {
 
 // Runs; more with the environment variable UNSEEN_RUNS.
@@ -36,4 +36,4 @@ TEST(FollowProperty, HoldsWhenTheBytesEndAnywhere) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::follow_property_test

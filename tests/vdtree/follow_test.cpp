@@ -24,7 +24,7 @@
 #include "sound.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::follow_test {
 namespace {
 
 using shapes::random_unit;
@@ -1122,4 +1122,4 @@ TEST(FollowThreads, SeveralCutsShareATree) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::follow_test

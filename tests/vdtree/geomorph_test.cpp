@@ -19,7 +19,7 @@
 #include "sound.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::geomorph_test {
 namespace {
 
 using shapes::random_unit;
@@ -524,4 +524,4 @@ TEST(Geomorph, RefusesWhatIsNoTime) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::geomorph_test

@@ -20,7 +20,7 @@
 #include "sound.h"
 #include "tree_checks.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::lighting_test {
 namespace {
 
 using Kind = LightSource::Kind;
@@ -612,4 +612,4 @@ TEST(FollowLights, RefusesASceneWithoutThem) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::lighting_test

@@ -8,7 +8,7 @@
 #include "mesh_files.h"
 #include "temp_folder.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::materials_test {
 namespace {
 
 class Materials : public testing::Test {
@@ -138,4 +138,4 @@ TEST_F(Materials, OfGltfShareTheirImage) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::materials_test

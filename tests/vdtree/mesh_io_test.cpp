@@ -20,7 +20,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::mesh_io_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -1020,4 +1020,4 @@ TEST(Mesh, ValidateNamesTheFirstOffender) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::mesh_io_test

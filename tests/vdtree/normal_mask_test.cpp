@@ -15,7 +15,7 @@
 
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::normal_mask_test {
 namespace {
 
 using shapes::random_between;
@@ -329,4 +329,4 @@ TEST(Facing, IsMixedInsideAndNoneForNothing) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::normal_mask_test

@@ -18,7 +18,7 @@
 #include "sound.h"
 #include "triangle_distance.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::occluders_test {
 namespace {
 
 using support::built;
@@ -147,4 +147,4 @@ TEST(Occluders, RefuseWhatHidesNothing) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::occluders_test

@@ -15,7 +15,7 @@
 #include "built.h"
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::occlusion_map_test {
 namespace {
 
 using shapes::random_between;
@@ -279,4 +279,4 @@ TEST(OcclusionMap, CutsFollowWhatIsHidden) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::occlusion_map_test

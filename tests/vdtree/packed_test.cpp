@@ -12,7 +12,7 @@
 #include "shapes.h"
 #include "tree/mask_pool.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::packed_test {
 namespace {
 
 // ---- shares
@@ -131,4 +131,4 @@ TEST(MaskPool, ReadsAnyBytes) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::packed_test

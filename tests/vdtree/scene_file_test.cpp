@@ -16,7 +16,7 @@
 
 #include <unseen/vdtree/builder.h>
 
-namespace {
+namespace scene_file_test {
 
 using namespace unseen;
 using nlohmann::json;
@@ -268,4 +268,4 @@ TEST(SceneFile, SurvivesMutatedFiles) {
     }
 }
 
-} // namespace
+} // namespace scene_file_test

@@ -12,7 +12,7 @@
 #include "gltf_scene.h"
 #include "temp_folder.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::source_document_test {
 namespace {
 
 using meshio::SourceDocument;
@@ -174,4 +174,4 @@ TEST(SourceDocuments, MustBeThatOfTheirTree) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::source_document_test

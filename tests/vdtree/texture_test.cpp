@@ -20,7 +20,7 @@
 #include "textures.h"
 #include "tree_file.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::texture_test {
 namespace {
 
 using support::built;
@@ -279,4 +279,4 @@ TEST(Textures, SendOutLightThatIsNotConserved) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::texture_test

@@ -34,7 +34,7 @@
 #include "tree_file.h"
 #include "tree_use.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::tree_io_test {
 namespace {
 
 using support::built;
@@ -714,4 +714,4 @@ TEST_F(TreeIo, CanBeCancelledAtAnyTime) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::tree_io_test

@@ -23,7 +23,7 @@
 #include "temp_folder.h"
 #include "value_types.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::vertex_values_test {
 namespace {
 
 using namespace std::string_literals;
@@ -455,4 +455,4 @@ TEST(VertexValues, HaveARange) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::vertex_values_test

@@ -18,7 +18,7 @@
 
 #include "shapes.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::view_test {
 namespace {
 
 using shapes::random_between;
@@ -315,4 +315,4 @@ TEST(View, RefusesShiftsAndHeightsThatAreNone) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::view_test

@@ -20,7 +20,7 @@
 #include "vtk_polygons.h"
 #include "vtp_data.h"
 
-namespace unseen::vdtree {
+namespace unseen::vdtree::vtk_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -559,4 +559,4 @@ TEST(Vtk, OtherFormatsSayWhatTheyLeaveOut) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::vdtree::vtk_test
