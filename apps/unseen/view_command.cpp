@@ -63,6 +63,7 @@ Command view_command(CLI::App& app) {
     add_geomorph_option(*verb, a->viewer.geomorph_seconds);
     add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
+    add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
     add_visibility_option(*verb, a->viewer.what, true);
@@ -74,6 +75,7 @@ Command view_command(CLI::App& app) {
     verb->footer(viewer_help() + "\nExamples:\n  unseen view bunny.vdt\n"
                                  "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                  "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25\n"
+                                 "  unseen view part.stl --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
                                  "  unseen view museum.glb --visibility auto");
     return {verb, [a] { return run(*a); }};
 }

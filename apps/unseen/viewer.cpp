@@ -150,12 +150,14 @@ private:
         case '3': choose(Goal::budget(budget_)); break;
         case '4':
             choose(Goal::imperceptible());
+            if (view_.orthographic_height) switch_projection(); // where there is no gaze
             gaze_px_ = pointer_px_;
             gaze_follows_pointer_ = true;
             break;
         case '=': // where + is on the same key
         case '+': scale_budget(budget_step); break;
         case '-': scale_budget(1 / budget_step); break;
+        case 'o': switch_projection(); break;
         case 'w': draw_.wireframe = !draw_.wireframe; break;
         case 'f':
             draw_.shading = draw_.shading == render::Shading::flat ? render::Shading::smooth : render::Shading::flat;
@@ -228,9 +230,8 @@ private:
     // What is as far as the target stays under the pointer.
     void move(glm::dvec2 px) {
         const vdtree::CameraFrame frame = vdtree::camera_frame(view_);
-        const double half_height =
-            glm::length(view_.eye - view_.target) * std::tan(glm::radians(view_.fov_y_degrees) / 2);
-        const glm::dvec3 shift = (px.y * frame.up - px.x * frame.right) * (2 * half_height / std::max(1, view_.height));
+        const glm::dvec3 shift =
+            (px.y * frame.up - px.x * frame.right) * (distance() * height_per_distance() / std::max(1, view_.height));
         view_.eye += shift;
         view_.target += shift;
         needs_frame_ = true;
@@ -251,12 +252,43 @@ private:
 
     void on_wheel(double notches) {
         const double radius = std::max(session_.bounding_sphere().radius, 1e-30);
-        const glm::dvec3 from_target = view_.eye - view_.target;
-        const double distance = glm::length(from_target);
         const double wanted =
-            std::clamp(distance * std::pow(zoom_per_notch, notches), nearest_radii * radius, farthest_radii * radius);
-        view_.eye = view_.target + from_target * (wanted / distance);
+            std::clamp(distance() * std::pow(zoom_per_notch, notches), nearest_radii * radius, farthest_radii * radius);
+        if (view_.orthographic_height) view_.orthographic_height = wanted * height_per_distance();
+        else view_.eye = view_.target + glm::normalize(view_.eye - view_.target) * wanted;
         needs_frame_ = true;
+    }
+
+    // How much of the world the window's height shows in perspective, of what is that far.
+    double height_per_distance() const { return 2 * std::tan(glm::radians(view_.fov_y_degrees) / 2); }
+
+    // Of the eye from the target; in parallel: the distance at which perspective shows the target in the same size.
+    double distance() const {
+        return view_.orthographic_height ? *view_.orthographic_height / height_per_distance()
+                                         : glm::length(view_.eye - view_.target);
+    }
+
+    // Between perspective and parallel, where what is as far as the target keeps its size.
+    void switch_projection() {
+        if (occlusion_)
+            return say("The view stays in perspective: pictures of what is hidden are made of no other.", true);
+        vdtree::View view = view_;
+        const std::optional<session::Gaze> gaze = session_.observer().gaze;
+        if (view.orthographic_height) {
+            view.eye = view.target + glm::normalize(view.eye - view.target) * distance();
+            view.orthographic_height.reset();
+        } else {
+            view.orthographic_height = distance() * height_per_distance();
+            session_.set_gaze(std::nullopt); // there is none in parallel views
+        }
+        if (const auto ready = session_.prepare(view, request_); !ready) {
+            session_.set_gaze(gaze);
+            return say("The view stays as it is: " + ready.error().message, true);
+        }
+        view_ = view;
+        if (!view.orthographic_height) return;
+        gaze_px_.reset();
+        gaze_follows_pointer_ = plays_gaze_ = false;
     }
 
     void follow_window_size() {
@@ -311,7 +343,8 @@ private:
                           .goal = request_.goal,
                           .report = report,
                           .display = display(),
-                          .window_px = {view_.width, view_.height}};
+                          .window_px = {view_.width, view_.height},
+                          .orthographic_height = view_.orthographic_height};
         if (request_.goal.kind != Goal::Kind::full && !report.fold_tests.empty() &&
             session::is_perceptual(report.fold_tests.front()))
             state.gaze = session_.observer().gaze;

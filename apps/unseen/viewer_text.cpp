@@ -77,6 +77,8 @@ std::vector<TextLine> viewer_lines(const ViewerState& state) {
         if (!report.fold_tests.empty()) lines.push_back({words_for(report.fold_tests.front()), "fold test"});
     }
     if (state.gaze) lines.push_back({gaze_text(state), "gaze"});
+    if (state.orthographic_height)
+        lines.push_back({"in parallel, " + rounded(*state.orthographic_height, 3) + " m high", "view"});
     if (state.frame_ms)
         lines.push_back({time_text(*state.frame_ms) + " a frame" +
                              (state.adapt_ms ? ", " + time_text(*state.adapt_ms) + " of it to follow the view" : ""),
@@ -99,6 +101,7 @@ const std::vector<TextLine>& viewer_keys() {
         {"turn the model", "drag"},
         {"move it (or drag with the middle or right button)", "shift + drag"},
         {"nearer, farther", "wheel"},
+        {"in parallel (orthographic) or in perspective", "o"},
         {"the first view again", "r"},
         {"edges of triangles", "w"},
         {"flat or smooth", "f"},

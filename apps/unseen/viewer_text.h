@@ -19,6 +19,7 @@ struct ViewerState {
     session::Report report = {};
     perception::Display display = {};
     glm::ivec2 window_px = glm::ivec2(0);
+    std::optional<double> orthographic_height = {};              // of the view, metres
     std::optional<session::Gaze> gaze = {};                      // that the cut is made for
     session::GazeSource gaze_source = session::GazeSource::none; // of it; none: a pixel that was asked for
     std::optional<double> limit_ms = {};                         // of following the view

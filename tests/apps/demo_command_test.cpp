@@ -1,4 +1,6 @@
 // unseen demo: without a file, with a display and without one.
+#include <utility>
+
 #include "run_command.h"
 #include "virtual_display.h"
 
@@ -31,16 +33,22 @@ TEST_F(DemoCommandTest, MakesAndShowsAModel) {
     // The mesh is what simplify writes of the tree.
     EXPECT_EQ(run({"simplify", "look/ball.vdt", "-o", "again.ply"}).status, 0);
     EXPECT_TRUE(read_text(path("again.ply")) == read_text(path("look/ball_small.ply")));
-
-    // The same a second time, and how to look at it where no window can be opened.
-    unsetenv("DISPLAY");
-    const std::string sheet = read_text(path("look/ball_sheet.png"));
-    const Outcome unseen = run({"demo", "--made", "-o", "look"});
-    ASSERT_EQ(unseen.status, 0) << unseen.err;
-    EXPECT_THAT(unseen.out, HasSubstr("where there is a display:  unseen view look/ball.vdt"));
-    EXPECT_TRUE(read_text(path("look/ball_sheet.png")) == sheet);
     write_text(path("file"), "");
     EXPECT_THAT(run({"demo", "--made", "-o", "file"}).err, IsAnErrorForPeople());
+}
+
+// And makes the same once more, over what is there.
+TEST_F(DemoCommandTest, SaysHowToLookAtItWhereThereIsNoDisplay) {
+    unsetenv("DISPLAY");
+    std::string sheet;
+    for (int time = 0; time < 2; ++time) {
+        const Outcome made = run({"demo", "--made", "-o", "look"});
+        ASSERT_EQ(made.status, 0) << made.err;
+        if (made.err.find("pictures are left out") != std::string::npos) GTEST_SKIP() << made.err;
+        EXPECT_THAT(made.out, HasSubstr("where there is a display:  unseen view look/ball.vdt"));
+        const std::string before = std::exchange(sheet, read_text(path("look/ball_sheet.png")));
+        EXPECT_TRUE(time == 0 || sheet == before);
+    }
 }
 
 } // namespace demo_command_test

@@ -1,6 +1,9 @@
 // unseen view under X, driven by synthetic events: what the window's title says follows the keys and the mouse.
 #include "window_test.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
@@ -118,6 +121,49 @@ TEST_F(ViewCommandTest, DraggingTurnsAndTheWheelZooms) {
         return std::count(image.values.begin(), image.values.end(), corner);
     };
     EXPECT_LT(background(moved->image), background(still->image) * 9 / 10);
+}
+
+// What is as far as the target keeps its size, so the ball covers about as much in parallel; a gaze needs perspective.
+TEST_F(ViewCommandTest, ParallelViewsZoomAndComeBack) {
+    if (!open({"--triangles", "400", "--fill", "0.5"})) GTEST_SKIP() << "no window: " << errors();
+    window().title_with("budget");
+    take("s", 1);
+    window().press(XK_o);
+    take("s", 2);
+    for (int notch = 0; notch < 3; ++notch) {
+        window().button(Button4, true, 100, 80);
+        window().button(Button4, false, 100, 80);
+    }
+    take("s", 3);
+    window().press(XK_o);
+    take("s", 4);
+    window().press(XK_o);
+    take("s", 5);
+    window().press(XK_4);
+    EXPECT_THAT(window().title_with("gaze-directed"), HasSubstr("gaze-directed"));
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+    const std::vector<Image> images = screenshots();
+    ASSERT_EQ(images.size(), 5u);
+    std::vector<double> covered;
+    for (const Image& image : images)
+        covered.push_back(static_cast<double>(
+            std::ranges::count_if(image.values, [&](float value) { return value != image.at(0, 0); })));
+    EXPECT_NE(images[1].values, images[0].values);
+    EXPECT_GT(covered[1] / covered[0], 0.8);
+    EXPECT_LT(covered[1] / covered[0], 1); // in perspective an outline lies before the middle
+    EXPECT_NEAR(covered[2] / covered[1], std::pow(0.9, -6), 0.05);
+    EXPECT_NE(images[3].values, images[2].values);
+    EXPECT_EQ(images[4].values, images[2].values);
+
+    ASSERT_TRUE(open({"--full", "--orthographic", "fit", "--screenshot", "fit.png"}));
+    window().title_with("whole");
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+    const Outcome drawn =
+        run({"render", "ball.vdt", "--full", "--orthographic", "fit", "--size", "200x160", "-o", "same.png"});
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_TRUE(read_text(path("fit.png")) == read_text(path("same.png")));
 }
 
 // "... 368 of 1,472 triangles ..." -> "368 of 1,472 triangles"

@@ -58,6 +58,13 @@ TEST(ViewerText, SaysWhatIsShown) {
     EXPECT_EQ(viewer_title(bunny()), "bunny.vdt - imperceptible: 34,294 of 69,666 triangles - Unseen");
 }
 
+TEST(ViewerText, ParallelViewsSayHowHighTheyAre) {
+    ViewerState state = bunny();
+    EXPECT_EQ(line_of(state, "view"), "none");
+    state.orthographic_height = 0.2346;
+    EXPECT_EQ(line_of(state, "view"), "in parallel, 0.235 m high");
+}
+
 TEST(ViewerText, TheWholeModelIsFoldedByNoTest) {
     ViewerState state = bunny();
     state.goal = Goal::full();
