@@ -314,6 +314,12 @@ CLI::Option* add_triangles_option(CLI::App& verb, TriangleCount& count, const st
         ->type_name("N|P%");
 }
 
+void add_model_option(CLI::App& verb, std::string& model) {
+    verb.add_option("TREE", model, "A tree, a mesh, or a scene (glTF)")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb");
+}
+
 void add_as_option(CLI::App& verb, session::LoadAs& as) {
     as = session::LoadAs::automatic;
     add_choice<session::LoadAs, session::LoadAs>(

@@ -101,7 +101,9 @@ void add_view_options(CLI::App& verb, ViewOptions& options);
 void add_orthographic_option(CLI::App& verb, ViewOptions& options); // beside them, for verbs that know such views
 // Of those, what does not say where one looks from: of verbs that choose their views.
 void add_surroundings_options(CLI::App& verb, ViewOptions& options);
-// Of verbs that take scenes: --as. Files that look like scenes are, from now on.
+// Of verbs that take scenes: the model, TREE.
+void add_model_option(CLI::App& verb, std::string& model);
+// And --as. Files that look like scenes are, from now on.
 void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);

@@ -1,6 +1,5 @@
 // unseen build: a mesh becomes a vertex tree, once and for all.
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -16,6 +15,7 @@
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/lit_folds.h>
 #include <unseen/session/model_file.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "build_team.h"
 #include "memory_plan.h"
@@ -219,7 +219,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
         }
     }
     if (!source) return source.error();
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = vdtree::Clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
     if (const std::string hint = session::hint_at_baked_light(*tree); !hint.empty())
@@ -227,7 +227,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (!a.no_fold_errors) tree = measure(a, std::move(*tree));
     if (tree && a.lit_fold_errors) tree = measure_under_lights(a, *tree);
     if (!tree) return tree.error();
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = vdtree::seconds_since(start);
 
     JsonReport& report = source->report;
     if (auto ok = report.prepare(to_json(*tree, seconds, source->repair.json)); !ok) return ok.error();

@@ -1,7 +1,6 @@
 #include "fly_through.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -14,6 +13,7 @@
 #include <unseen/session_gpu/moving_occlusion.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "camera_path.h"
 #include "cut_report.h"
@@ -29,8 +29,6 @@
 
 namespace unseen::app {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
 
@@ -314,7 +312,7 @@ private:
             if (!draw) return draw.error();
             if (auto drawn = changes_->before(follower_, request_, view_, *draw); !drawn) return drawn.error();
         }
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         if (drawing && drawing->occlusion) {
             auto hidden = drawing->occlusion->begin_frame(view_);
             if (!hidden) return hidden.error();
@@ -333,7 +331,7 @@ private:
             record.gliding = static_cast<double>(last_.gliding);
         }
         Result<render::Frame> frame = render::Frame{};
-        const auto frame_ms = [&] { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); };
+        const auto frame_ms = [&] { return vdtree::ms_since(start); };
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();

@@ -221,9 +221,7 @@ Command lod_command(CLI::App& app) {
     auto a = std::make_shared<LodArguments>();
     CLI::App* verb =
         app.add_subcommand("lod", "Make levels of detail with the distances from which nobody sees them, for engines");
-    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
-        ->required()
-        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    add_model_option(*verb, a->model);
     verb->add_option("-o,--output", a->out, "All levels, by the extension MSFT_lod")
         ->type_name("OUT.glb|.gltf")
         ->required()

@@ -298,9 +298,7 @@ void add_level_options(CLI::App& verb, RenderArguments& a) {
 Command render_command(CLI::App& app) {
     auto a = std::make_shared<RenderArguments>();
     CLI::App* verb = app.add_subcommand("render", "Draw a simplification of a model or a scene for a view");
-    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
-        ->required()
-        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    add_model_option(*verb, a->model);
     verb->add_option("-o,--output", a->out, "PNG for people; PFM or EXR for judging: luminance in cd/m2")
         ->type_name("OUT.png|.pfm|.exr")
         ->check(ending_in({".png", ".pfm", ".exr"}));

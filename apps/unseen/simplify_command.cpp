@@ -1,11 +1,11 @@
 // unseen simplify: a cut of a tree as a mesh of its own.
-#include <chrono>
 #include <deque>
 #include <limits>
 #include <memory>
 
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/meshio/scene_file.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "cut_report.h"
 #include "output_files.h"
@@ -65,9 +65,9 @@ Result<int> run(const SimplifyArguments& a) {
     const session::Request request = a.what.request_for(session->triangle_count());
     auto result = simplify_by(a.what, *session, seen, request);
     if (!result) return result.error();
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = vdtree::Clock::now();
     for (const vdtree::Cut& cut : result->cuts) cut.indices();
-    result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    result->extract_ms += vdtree::ms_since(start);
     if (result->stats.triangles == 0 && session->scene().backdrop.empty()) {
         if (!result->stats.is_complete)
             return Error{ErrorCode::invalid_argument,
@@ -99,9 +99,7 @@ Result<int> run(const SimplifyArguments& a) {
 Command simplify_command(CLI::App& app) {
     auto a = std::make_shared<SimplifyArguments>();
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh, or scene, for a view");
-    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
-        ->required()
-        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    add_model_option(*verb, a->model);
     verb->add_option("-o,--output", a->out, "The mesh")
         ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.vtk")
         ->required()

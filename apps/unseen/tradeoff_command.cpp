@@ -153,9 +153,7 @@ Command tradeoff_command(CLI::App& app) {
     auto a = std::make_shared<TradeoffArguments>();
     CLI::App* verb =
         app.add_subcommand("tradeoff", "What accuracy costs for a model and a view: which options to take");
-    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
-        ->required()
-        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    add_model_option(*verb, a->model);
     verb->add_option("--csv", a->csv, "One line a way")->type_name("FILE.csv");
     add_json_option(*verb, a->json);
     verb->add_option("--seconds", a->options.seconds,

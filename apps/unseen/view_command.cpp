@@ -47,9 +47,7 @@ Result<int> run(ViewArguments& a) {
 Command view_command(CLI::App& app) {
     auto a = std::make_shared<ViewArguments>();
     CLI::App* verb = app.add_subcommand("view", "Look at a model or a scene in a window");
-    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
-        ->required()
-        ->type_name("TREE.vdt|MESH|SCENE.glb");
+    add_model_option(*verb, a->model);
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
     add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading,
                                                  {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},

@@ -18,6 +18,7 @@
 #include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/moving_occlusion.h>
 #include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "session_options.h"
 #include "terminal.h"
@@ -29,7 +30,7 @@ namespace unseen::app {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using vdtree::Clock;
 
 constexpr double turn_per_window = 3.2;                      // radians for a drag across the window's height
 constexpr double zoom_per_notch = 0.9;                       // of the distance
@@ -42,10 +43,6 @@ constexpr double lines_of_window = 56;                // ... and never less than
 constexpr std::chrono::milliseconds times_shown{250}; // numbers that change faster cannot be read
 constexpr std::chrono::seconds message_shown{6};
 constexpr double most_margin_deg = 89; // beyond, a gaze may be anywhere on the screen, and its ring is none
-
-double milliseconds_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 std::uint32_t budget_of(std::uint64_t triangles) {
     return static_cast<std::uint32_t>(
@@ -324,11 +321,11 @@ private:
         if (occlusion_) {
             const auto items = renderer_.items(cuts(), view_, draw_);
             if (!items) return items.error();
-            if (auto ended = occlusion_->end_frame(*items, view_, milliseconds_since(start)); !ended) return ended;
+            if (auto ended = occlusion_->end_frame(*items, view_, vdtree::ms_since(start)); !ended) return ended;
             result->passes = {occlusion_->effect()};
         }
         // The first frame compiles and uploads: its time says nothing of those that follow.
-        if (has_drawn_) times_.add(milliseconds_since(start), result->adapt_ms);
+        if (has_drawn_) times_.add(vdtree::ms_since(start), result->adapt_ms);
         if (auto shown = show(state_of(*result)); !shown) return shown;
         // What the time limit has left to do, and what glides, goes on in the next frame.
         if (!has_drawn_ || !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||

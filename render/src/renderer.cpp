@@ -1,17 +1,13 @@
 // One tree and one cut on the GPU, drawn as a scene of one item.
 #include <unseen/render/renderer.h>
 
-#include <chrono>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "context_impl.h"
 #include "gl.h"
 
 namespace unseen::render {
 namespace {
-
-double milliseconds_since(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
 
 Frame frame_of(std::span<const glm::vec4> pixels, int width, int height) {
     Frame frame;
@@ -57,13 +53,13 @@ Result<Frame> Renderer::Impl::draw(const vdtree::View& view, const DrawOptions& 
     if (auto valid = vdtree::validate(view); !valid) return valid.error();
     if (auto fitted = fit_sum(view.width, view.height); !fitted) return fitted.error();
     glFinish(); // what came before is not this frame's time
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = vdtree::Clock::now();
     const Item one = item(options, placement);
     if (auto drawn = sum->draw({&one, 1}, view, {options.samples, options.seed, options.background}); !drawn)
         return drawn.error();
     const auto pixels = sum->mean();
     if (!pixels) return pixels.error();
-    const double draw_ms = milliseconds_since(start);
+    const double draw_ms = vdtree::ms_since(start);
     Frame frame = frame_of(*pixels, view.width, view.height);
     frame.draw_ms = draw_ms;
     return frame;

@@ -1,10 +1,11 @@
 #include <unseen/session/follower.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "session_state.h"
 #include "shadow_limit.h"
@@ -12,14 +13,8 @@
 namespace unseen::session {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
-
-double milliseconds_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 // Cost is v*/v for the perceptual tests alone; the others count pixels.
 double imperceptible_from(const Sight& sight, const Decision& decision, float largest_cost) {
@@ -179,7 +174,7 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Req
 Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request,
                                                                       const Prepared& prepared) {
     std::vector<vdtree::AdjustStats> stats;
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         Followed& object = objects_[i];
         if (!object.recipe) {
@@ -188,7 +183,7 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Requ
         }
         CutRecipe& recipe = *object.recipe;
         if (request.milliseconds && i > 0)
-            recipe.options.milliseconds = std::max(0.0, *request.milliseconds - milliseconds_since(start));
+            recipe.options.milliseconds = std::max(0.0, *request.milliseconds - vdtree::ms_since(start));
         auto followed = object.cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
         if (!followed) return followed.error();
         stats.push_back(*followed);
@@ -253,14 +248,14 @@ Result<Report> Follower::State::follow(const vdtree::View& view, const Request& 
         for (Followed& object : objects_) object.stats_out_of_sight.reset();
     }
     Report report;
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     const bool is_shared = prepared->shares_budget();
     const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
-    report.adapt_ms = milliseconds_since(start);
+    report.adapt_ms = vdtree::ms_since(start);
     if (!stats) return stats.error();
     conclude(report, *prepared, *stats);
 
-    const auto adapted = Clock::now();
+    const auto adapted = vdtree::Clock::now();
     if (glide_s_)
         if (const auto glided = glide(report); !glided) return glided.error();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -270,7 +265,7 @@ Result<Report> Follower::State::follow(const vdtree::View& view, const Request& 
         report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
         report.effects.back().object = i;
     }
-    report.extract_ms = milliseconds_since(adapted);
+    report.extract_ms = vdtree::ms_since(adapted);
     return report;
 }
 

@@ -1,7 +1,6 @@
 #include <unseen/session/model_file.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <string_view>
 
@@ -10,6 +9,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/conserve_light.h>
 #include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "cache_key.h"
@@ -64,10 +64,10 @@ bool is_same_tree(const vdtree::VertexTree& a, const vdtree::VertexTree& b) {
 template <class Make, class Deed>
 Result<vdtree::VertexTree> make_and_keep(const TreeCache& cache, const std::optional<std::string>& key,
                                          const fs::path& file, const Messages& messages, Make&& make, Deed&& deed) {
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = vdtree::Clock::now();
     Result<vdtree::VertexTree> tree = make();
     if (!tree) return tree;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = vdtree::seconds_since(start);
     std::string what_becomes = "vdtree::write_tree() does it once and for all";
     if (cache.is_on() && key) {
         const auto kept = cache.keep(*key, file, *tree);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -14,6 +13,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "cache_key.h"
 #include "loaded_tree.h"
@@ -24,7 +24,6 @@ namespace unseen::session {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 // What glTF says nothing of: light that comes from everywhere, so that nothing is black.
 constexpr double usual_ambient = 0.15; // relative luminance of white
@@ -56,7 +55,7 @@ public:
         : file_(file), name_(name), options_(options), measures_(measures), cache_(options.cache) {}
 
     Result<void> build(std::vector<Part>& parts) {
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         std::atomic<std::size_t> next{0}, done{0};
         const auto work = [&](bool is_caller) {
             for (std::size_t i; !is_over_ && (i = next++) < parts.size(); ++done) {
@@ -75,7 +74,7 @@ public:
             work(true);
         }
         if (failure_) return *failure_;
-        tell(std::chrono::duration<double>(Clock::now() - start).count());
+        tell(vdtree::seconds_since(start));
         return {};
     }
 

@@ -7,9 +7,9 @@
 #include <unseen/perception/motion.h>
 #include <unseen/render/depth.h>
 #include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "scene_masks.h"
-#include "stopwatch.h"
 
 namespace unseen::session {
 namespace {
@@ -74,7 +74,7 @@ private:
             effects_.push_back({"occlusion", false, "it is not asked for"});
             return {};
         }
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         const auto depths = render::farthest_depth(context_, scene.items, view_, options_.samples);
         if (!depths) return depths.error();
         auto shown = vdtree::DepthPicture::create(view_, *depths);
@@ -82,7 +82,7 @@ private:
         request.shown = std::move(*shown);
         constexpr std::uint64_t depth_bytes = 4;
         effects_.push_back({"occlusion", true, "what lies behind what the view shows is folded", options_.samples, 0,
-                            depth_bytes * depths->size(), ms_since(start)});
+                            depth_bytes * depths->size(), vdtree::ms_since(start)});
         return {};
     }
 
@@ -92,7 +92,7 @@ private:
             effects_.push_back({"masking", false, why});
             return {};
         }
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         const auto split = split_objects(session_, view_, options_.layers);
         if (!split) return split.error();
         const bool has_layers = split->count > 1;
@@ -107,7 +107,8 @@ private:
         effects_.push_back({"masking", is_worth_it,
                             is_worth_it ? "the scene raises thresholds of what folds change"
                                         : "the scene masks too little to be worth another fold test",
-                            masks->surface_passes, masks->full_screen_passes, masks->texture_bytes, ms_since(start)});
+                            masks->surface_passes, masks->full_screen_passes, masks->texture_bytes,
+                            vdtree::ms_since(start)});
         return {};
     }
 

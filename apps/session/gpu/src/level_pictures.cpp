@@ -10,9 +10,9 @@
 #include <unseen/render/sample_sum.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "shared_uploads.h"
-#include "stopwatch.h"
 
 namespace unseen::session {
 Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels) {
@@ -115,19 +115,19 @@ Result<double> LevelPictures::Impl::near_plane(const std::vector<std::size_t>& o
 
 Result<LevelPictures::Impl::Drawn> LevelPictures::Impl::draw(const std::vector<render::Item>& items,
                                                              const vdtree::View& view, double near) {
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     if (auto drawn = render::draw(items, {.view = view, .near_plane = near}, *target,
                                   {.colour = glm::vec4(session.background())});
         !drawn)
         return drawn.error();
-    times.draw_ms += ms_since(start);
+    times.draw_ms += vdtree::ms_since(start);
     ++times.drawings;
-    const auto read_start = Clock::now();
+    const auto read_start = vdtree::Clock::now();
     auto pixels = render::read_pixels(*target);
     if (!pixels) return pixels.error();
     auto depth = render::read_depth(*target);
     if (!depth) return depth.error();
-    times.read_ms += ms_since(read_start);
+    times.read_ms += vdtree::ms_since(read_start);
     return Drawn{std::move(*pixels), std::move(*depth)};
 }
 
@@ -222,13 +222,13 @@ Result<render::Frame> LevelPictures::draw_frame(const vdtree::View& view, std::s
         if (!made) return made.error();
         sum = std::move(*made);
     }
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     if (auto drawn = sum->draw(items, view, {.samples = samples, .background = own.session.background()}); !drawn)
         return drawn.error();
     const auto pixels = sum->mean();
     if (!pixels) return pixels.error();
     render::Frame frame;
-    frame.draw_ms = ms_since(start);
+    frame.draw_ms = vdtree::ms_since(start);
     frame.width = view.width, frame.height = view.height;
     for (const glm::vec4& pixel : *pixels) {
         frame.luminance.push_back(pixel.a);

@@ -14,8 +14,7 @@
 #include <unseen/session_gpu/trial.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
-
-#include "stopwatch.h"
+#include <unseen/vdtree/internal/stopwatch.h>
 
 namespace unseen::session {
 namespace {
@@ -112,10 +111,10 @@ Result<void> MovingOcclusion::Impl::look_for_nodes() {
 
 Result<std::shared_ptr<const HiddenNodes>> MovingOcclusion::begin_frame(const vdtree::View& view) {
     Impl& impl = *impl_;
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     if (const auto looked = impl.look_for_cells(); !looked) return looked.error();
     if (const auto looked = impl.look_for_nodes(); !looked) return looked.error();
-    impl.frame_extra_ms = ms_since(start);
+    impl.frame_extra_ms = vdtree::ms_since(start);
     if (!impl.is_on() || !impl.known || !impl.known->holds_for(view.eye)) return std::shared_ptr<const HiddenNodes>();
     return impl.known;
 }
@@ -157,12 +156,12 @@ Result<void> MovingOcclusion::Impl::begin_picture(const vdtree::View& view, Begi
 
 template <class Begin>
 Result<void> MovingOcclusion::Impl::end_frame(const vdtree::View& view, double frame_ms, Begin&& begin) {
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     const bool was_on = is_on();
     see_motion(view);
     if (was_on && is_due(view))
         if (auto begun = begin_picture(view, begin); !begun) return begun;
-    const double after_ms = ms_since(start);
+    const double after_ms = vdtree::ms_since(start);
     ++facts.frames;
     facts.frames_on += was_on;
     facts.is_on = was_on;

@@ -1,7 +1,6 @@
 #include <unseen/session_gpu/precompute_selections.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <deque>
@@ -12,13 +11,10 @@
 
 #include <unseen/session_gpu/level_pictures.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 namespace unseen::session {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // Corners that a member does before all talk to each other again.
 constexpr std::size_t corners_at_a_time = 12;
@@ -151,7 +147,7 @@ private:
     };
 
     Found search(const LayeredPicture& picture) const {
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         Found result;
         const auto found =
             select_greedily(picture, frame_.quality, session_.observer().display, {.budget = frame_.budget / 2}, true);
@@ -170,7 +166,7 @@ private:
         result.camera = std::move(camera);
         result.evaluations = found->evaluations;
         result.holds = found->holds;
-        result.seconds = seconds_since(start);
+        result.seconds = vdtree::seconds_since(start);
         return result;
     }
 
@@ -359,7 +355,7 @@ Result<void> search_all(FirstMember& first, const PrecomputeOptions& options, Se
 Result<PrecomputeReport> precompute_selections(const render::Context& context, Session& session,
                                                const std::filesystem::path& file, const PrecomputeOptions& options,
                                                vdtree::Team* team) {
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     PrecomputeReport report;
     report.processes = team ? team->size() : 1;
     const bool is_first = !team || team->rank() == 0;
@@ -390,7 +386,7 @@ Result<PrecomputeReport> precompute_selections(const render::Context& context, S
         return {};
     };
     const Result<void> ready = begin();
-    report.load_seconds = seconds_since(start);
+    report.load_seconds = vdtree::seconds_since(start);
     // All go on or none.
     if (team && team->size() > 1) {
         const auto complaint = [&](const Result<void>& r) {
@@ -435,7 +431,7 @@ Result<PrecomputeReport> precompute_selections(const render::Context& context, S
     Corners corners(session, s, *pictures, options.threads, report);
     const auto finish = [&] {
         const LevelPictureTimes& times = pictures->times();
-        report.seconds = seconds_since(start);
+        report.seconds = vdtree::seconds_since(start);
         report.draw_seconds = times.draw_ms / 1e3;
         report.read_seconds = times.read_ms / 1e3;
         report.drawings = times.drawings;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include <unseen/vdtree/internal/stopwatch.h>
+
 #include "shared_uploads.h"
-#include "stopwatch.h"
 
 namespace unseen::session {
 
@@ -115,14 +116,14 @@ Result<render::Frame> SceneRenderer::draw(std::span<const DrawnCut> cuts, const 
     const auto items = impl_->items(cuts, view, options);
     if (!items) return items.error();
     if (auto done = impl_->context.finish(); !done) return done.error(); // what came before is not this frame's time
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     if (auto drawn = sum->draw(items->items, view, {options.samples, options.seed, options.background, items->shadows});
         !drawn)
         return drawn.error();
     const auto pixels = sum->mean();
     if (!pixels) return pixels.error();
     render::Frame frame;
-    frame.draw_ms = ms_since(start);
+    frame.draw_ms = vdtree::ms_since(start);
     frame.width = view.width;
     frame.height = view.height;
     frame.luminance.reserve(pixels->size());

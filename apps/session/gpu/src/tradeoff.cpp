@@ -11,9 +11,9 @@
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 #include "median.h"
-#include "stopwatch.h"
 
 namespace unseen::session {
 namespace {
@@ -99,11 +99,11 @@ public:
     // The full model comes first: the others are judged against it.
     Result<TradeoffPoint> measure(const Way& way) {
         TradeoffPoint point{.name = way.name, .request = way.request, .is_of_view = way.is_of_view};
-        const auto start = Clock::now();
+        const auto start = vdtree::Clock::now();
         auto made = way.is_of_view ? simplify_as_seen(session_, context_, view_, way.request)
                                    : session_.simplify(view_, way.request);
         if (!made) return made.error();
-        point.make_ms = ms_since(start);
+        point.make_ms = vdtree::ms_since(start);
         point.triangles = made->stats.triangles;
         point.shift = largest_shift(session_, made->cuts);
         auto frame = draw(made->cuts, samples_);
@@ -163,10 +163,10 @@ private:
         Follower follower(session_);
         std::vector<double> times;
         for (int i = 0; i <= timed_frames + 1; ++i) {
-            const auto start = Clock::now();
+            const auto start = vdtree::Clock::now();
             const auto followed = follower.follow(vdtree::orbited(view_, degrees_a_frame * i), request);
             if (!followed) return followed.error();
-            if (i > 1) times.push_back(ms_since(start)); // the first makes the cut, the second what to watch
+            if (i > 1) times.push_back(vdtree::ms_since(start)); // the first makes the cut, the second what to watch
         }
         return median(std::move(times));
     }
@@ -214,21 +214,21 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     if (options.samples < 1 || options.samples > most_samples)
         return invalid_argument("The samples of a trade-off must be 1 to 256.");
     if (options.least_samples < 1) return invalid_argument("The least samples of a trade-off must be 1 or more.");
-    const auto start = Clock::now();
+    const auto start = vdtree::Clock::now();
     const auto prepared = session.prepare(view, {.purpose = Purpose::picture});
     if (!prepared) return prepared.error();
     Tradeoff result;
-    result.measuring_s = ms_since(start) / 1e3;
+    result.measuring_s = vdtree::ms_since(start) / 1e3;
     auto measurement = Measurement::create(session, context, view, options);
     if (!measurement) return measurement.error();
-    const auto begin = Clock::now();
+    const auto begin = vdtree::Clock::now();
     const std::vector<Way> all = ways(session);
     const auto samples = measurement->choose_samples(all.size());
     if (!samples) return samples.error();
     result.samples = *samples;
     for (std::size_t i = 0; i < all.size(); ++i) {
         if (options.progress) options.progress(static_cast<double>(i) / static_cast<double>(all.size()));
-        if (!result.points.empty() && ms_since(begin) > 1e3 * options.seconds) {
+        if (!result.points.empty() && vdtree::ms_since(begin) > 1e3 * options.seconds) {
             result.left_out.push_back(all[i].name);
             continue;
         }
