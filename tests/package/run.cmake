@@ -57,8 +57,8 @@ foreach(library IN LISTS libraries)
     string(REPLACE "]" ")" symbols "${symbols}")
     string(REPLACE "\n" ";" symbols "${symbols}")
     list(LENGTH symbols symbol_count)
-    if(symbol_count LESS 2) # a version and nothing else
-        message(FATAL_ERROR "${name} shows only ${symbol_count} symbols.")
+    if(symbol_count LESS 2) # what is behind the last line counts
+        message(FATAL_ERROR "${name} shows no symbol.")
     endif()
     list(FILTER symbols EXCLUDE REGEX "^[0-9a-f]+ . ((non-virtual thunk|virtual thunk) to |(vtable|VTT|typeinfo|typeinfo name|guard variable) for )?unseen(::|_)")
     list(FILTER symbols EXCLUDE REGEX "^$")
