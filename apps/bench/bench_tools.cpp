@@ -20,10 +20,6 @@ constexpr double active_tolerance = 0.002; // how near a threshold must come to 
 
 } // namespace
 
-double seconds_since(BenchClock::time_point start) {
-    return std::chrono::duration<double>(BenchClock::now() - start).count();
-}
-
 double median(std::vector<double> values) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

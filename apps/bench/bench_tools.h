@@ -1,7 +1,6 @@
 // What benchmarks share: clocks, medians, one core for one thread, and where the files of a checkout are.
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,11 +9,12 @@
 
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/internal/stopwatch.h>
 
 namespace unseen::app {
 
-using BenchClock = std::chrono::steady_clock;
-double seconds_since(BenchClock::time_point start);
+using BenchClock = vdtree::Clock;
+using vdtree::seconds_since;
 
 double median(std::vector<double> values); // NaN of none
 
