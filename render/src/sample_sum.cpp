@@ -160,7 +160,7 @@ Result<void> SampleSum::add() {
 Result<std::span<const glm::vec4>> SampleSum::mean() {
     auto& pixels = impl_->pixels;
     auto read = in_context(impl_->context(), "Reading the sum of samples",
-                           [&] { return impl_->sum.impl().read_colour(0, pixels); });
+                           [&] { return impl_->sum.impl().read_colour(0, impl_->sum.impl().whole(), pixels); });
     if (!read) return read.error();
     const double share = 1.0 / std::max(impl_->count, 1);
     for (glm::vec4& pixel : pixels) pixel = glm::vec4(glm::dvec4(pixel) * share + glm::dvec4(impl_->background));

@@ -68,6 +68,16 @@ Result<void> check(const Item& item, const Context& context) {
     return {};
 }
 
+Result<void> check_tile(const Camera& camera, const Target::Impl& target) {
+    const vdtree::View& view = camera.view;
+    const Tile& tile = *camera.tile;
+    if (target.is_foreign || camera.shadow_mask)
+        return invalid_argument("A tile is drawn to the library's own targets, without a mask of shadows.");
+    if (auto valid = check_part(tile.part, view.width, view.height, "the view's window"); !valid) return valid;
+    return check_part({tile.left, tile.top, tile.part.width, tile.part.height}, target.width, target.height,
+                      "the target");
+}
+
 // In the unit frame.
 LightUniforms uniforms_of(const vdtree::Lighting& lighting, glm::dvec3 eye, const UnitFrame& frame) {
     using Kind = vdtree::LightSource::Kind;
@@ -158,7 +168,9 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
     if (auto valid = vdtree::validate(view); !valid) return valid.error();
     if (camera.near_plane)
         if (auto valid = vdtree::validate_perspective(view, "A near plane of one's own"); !valid) return valid.error();
-    if (view.width != target.width || view.height != target.height)
+    if (camera.tile) {
+        if (auto valid = check_tile(camera, target); !valid) return valid.error();
+    } else if (view.width != target.width || view.height != target.height)
         return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                                 " pixels, and the target has " + std::to_string(target.width) + "x" +
                                 std::to_string(target.height) + ".");
@@ -213,38 +225,52 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
     return pass;
 }
 
-PixelBox SurfacePass::pixels_of(std::span<const glm::dvec2> points) const {
+void ShownPixels::add(const Projection& projection, const Box& box, glm::dvec2 point) {
+    const glm::dmat4 clip_from_unit(jittered(projection, view_, point));
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
+                            corner & 4 ? box.high.z : box.low.z);
+        const glm::dvec4 clip = clip_from_unit * glm::dvec4(at, 1);
+        const glm::dvec2 pixel((clip.x / clip.w + 1) / 2 * view_.width, (1 - clip.y / clip.w) / 2 * view_.height);
+        if (!(clip.w > 0 && std::isfinite(pixel.x) && std::isfinite(pixel.y))) {
+            is_behind_ = true;
+            return;
+        }
+        low_ = glm::min(low_, pixel);
+        high_ = glm::max(high_, pixel);
+    }
+}
+
+PixelBox ShownPixels::box() const {
     constexpr double margin = 2; // pixels, for the rounding of single floats and of the rasteriser
     const int width = view_.width, height = view_.height;
-    glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const PreparedItem& item : items_) {
-        const Box& box = item.cut.impl().box;
-        for (const glm::dvec2 point : points) {
-            const glm::dmat4 clip_from_unit(jittered(item.projection, view_, point));
-            for (int corner = 0; corner < 8; ++corner) {
-                const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
-                                    corner & 4 ? box.high.z : box.low.z);
-                const glm::dvec4 clip = clip_from_unit * glm::dvec4(at, 1);
-                const glm::dvec2 pixel((clip.x / clip.w + 1) / 2 * width, (1 - clip.y / clip.w) / 2 * height);
-                if (!(clip.w > 0 && std::isfinite(pixel.x) && std::isfinite(pixel.y))) return {0, 0, width, height};
-                low = glm::min(low, pixel);
-                high = glm::max(high, pixel);
-            }
-        }
-    }
+    if (is_behind_) return {0, 0, width, height};
     const auto within = [](double at, int most) {
         return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(most)));
     };
-    const int left = within(std::floor(low.x - margin), width), top = within(std::floor(low.y - margin), height);
-    return {left, top, std::max(0, within(std::ceil(high.x + margin), width) - left),
-            std::max(0, within(std::ceil(high.y + margin), height) - top)};
+    const int left = within(std::floor(low_.x - margin), width), top = within(std::floor(low_.y - margin), height);
+    return {left, top, std::max(0, within(std::ceil(high_.x + margin), width) - left),
+            std::max(0, within(std::ceil(high_.y + margin), height) - top)};
+}
+
+PixelBox SurfacePass::pixels_of(std::span<const glm::dvec2> points) const {
+    ShownPixels shown(view_);
+    for (const PreparedItem& item : items_)
+        for (const glm::dvec2 point : points) shown.add(item.projection, item.cut.impl().box, point);
+    return shown.box();
 }
 
 void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count,
                        const PixelBox* only) const {
     set_fixed_state(target);
-    if (only) {
-        glScissor(only->left, only->top, only->width, only->height);
+    std::optional<PixelBox> box;
+    if (only) box = *only;
+    if (tile_) {
+        glViewport(tile_->left - tile_->part.left, tile_->top - tile_->part.top, view_.width, view_.height);
+        box = PixelBox{tile_->left, tile_->top, tile_->part.width, tile_->part.height};
+    }
+    if (box) {
+        glScissor(box->left, box->top, box->width, box->height);
         glEnable(GL_SCISSOR_TEST);
     }
     if (output_ == Output::display) glEnable(GL_FRAMEBUFFER_SRGB);

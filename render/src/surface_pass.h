@@ -1,6 +1,7 @@
 // Draws a scene's items; what has to be found out about them is found out once for any number of draws.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -19,9 +20,18 @@
 
 namespace unseen::render {
 
-// Pixels from the top left.
-struct PixelBox {
-    int left = 0, top = 0, width = 0, height = 0;
+// Which pixels of a window things can show in.
+class ShownPixels {
+public:
+    explicit ShownPixels(const vdtree::View& view) : view_(view) {}
+    // What lies in the box, where each pixel is drawn at that point.
+    void add(const Projection& projection, const Box& box, glm::dvec2 point);
+    PixelBox box() const; // all of them where a part of something may lie behind the eye
+
+private:
+    vdtree::View view_;
+    glm::dvec2 low_ = glm::dvec2(std::numeric_limits<double>::infinity()), high_ = -low_;
+    bool is_behind_ = false;
 };
 
 // Everything that drawing depends on but for depth, blending and faces is set: a window's other users may have changed
@@ -77,13 +87,14 @@ private:
     };
 
     SurfacePass(const Camera& camera, int attachment, Output output)
-        : view_(camera.view), attachment_(attachment), mask_(camera.shadow_mask), output_(output),
+        : view_(camera.view), tile_(camera.tile), attachment_(attachment), mask_(camera.shadow_mask), output_(output),
           shadows_(camera.shadows ? &camera.shadows->impl() : nullptr) {}
     static Cull cull_for(vdtree::Closedness closedness, bool eye_inside);
     void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const;
     void set_colours(const PreparedItem& item, float lod_bias) const;
 
     vdtree::View view_;
+    std::optional<Tile> tile_;
     int attachment_;
     std::optional<int> mask_; // the attachment of shadows' masks
     Output output_;

@@ -58,16 +58,22 @@ bool encodes_srgb(unsigned framebuffer) {
     return encoding == GL_SRGB;
 }
 
+std::size_t pixel_count(const PixelBox& part) {
+    return static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height);
+}
+
 // GL keeps pixels in the order of its own rows.
-void read(const Target::Impl& from, GLenum format, std::size_t channels, std::span<float> values) {
+void read(const Target::Impl& from, const PixelBox& part, GLenum format, std::size_t channels,
+          std::span<float> values) {
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
     for (const GLenum zero : std::initializer_list<GLenum>{GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
         glPixelStorei(zero, 0);
     glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, from.id);
-    glReadPixels(0, 0, from.width, from.height, format, GL_FLOAT, values.data());
+    const int first_row = from.top_row_first ? part.top : from.height - part.top - part.height;
+    glReadPixels(part.left, first_row, part.width, part.height, format, GL_FLOAT, values.data());
     if (from.top_row_first) return;
-    const auto row = static_cast<std::ptrdiff_t>(from.width) * static_cast<std::ptrdiff_t>(channels);
+    const auto row = static_cast<std::ptrdiff_t>(part.width) * static_cast<std::ptrdiff_t>(channels);
     for (auto top = values.begin(), bottom = values.end(); bottom - top >= 2 * row; top += row) {
         bottom -= row;
         std::swap_ranges(top, top + row, bottom);
@@ -86,6 +92,16 @@ Result<std::vector<float>> read_channels(const Target& target, int attachment, s
 }
 
 } // namespace
+
+Result<void> check_part(const PixelBox& part, int width, int height, const char* what) {
+    const auto lies_in = [](int first, int count, int size) {
+        return first >= 0 && count >= 1 && count <= size && first <= size - count;
+    };
+    if (lies_in(part.left, part.width, width) && lies_in(part.top, part.height, height)) return {};
+    return invalid_argument("A part of " + size_text(part.width, part.height) + " pixels from " +
+                            std::to_string(part.left) + ", " + std::to_string(part.top) + " on does not lie in " +
+                            what + ", which has " + size_text(width, height) + ".");
+}
 
 int largest_target_side() {
     GLint viewport[2] = {0, 0};
@@ -166,10 +182,10 @@ Result<void> Target::Impl::check_readable() const {
     return {};
 }
 
-Result<void> Target::Impl::read_colour(int attachment, std::span<glm::vec4> pixels) const {
+Result<void> Target::Impl::read_colour(int attachment, const PixelBox& part, std::span<glm::vec4> pixels) const {
     if (auto valid = check_readable(); !valid) return valid;
     if (!is_foreign) glNamedFramebufferReadBuffer(id, colour_attachment(static_cast<std::size_t>(attachment)));
-    read(*this, GL_RGBA, 4, {&pixels[0].x, 4 * pixels.size()});
+    read(*this, part, GL_RGBA, 4, {&pixels[0].x, 4 * pixels.size()});
     return {};
 }
 
@@ -219,11 +235,13 @@ Result<void> resolve(const Target& from, Target& to) {
     });
 }
 
-Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment) {
+Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment, const std::optional<PixelBox>& part) {
     const Target::Impl& from = target.impl();
+    const PixelBox box = part.value_or(from.whole());
     if (auto valid = from.check_attachment(attachment); !valid) return valid.error();
-    std::vector<glm::vec4> pixels(static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height));
-    auto read = in_context(from.context, "Reading pixels", [&] { return from.read_colour(attachment, pixels); });
+    if (auto valid = check_part(box, from.width, from.height, "the target"); !valid) return valid.error();
+    std::vector<glm::vec4> pixels(pixel_count(box));
+    auto read = in_context(from.context, "Reading pixels", [&] { return from.read_colour(attachment, box, pixels); });
     if (!read) return read.error();
     return pixels;
 }
@@ -239,13 +257,15 @@ Result<std::vector<float>> read_colour(const Target& target, int attachment) {
     return read_channels(target, attachment, 0, 3);
 }
 
-Result<std::vector<float>> read_depth(const Target& target) {
+Result<std::vector<float>> read_depth(const Target& target, const std::optional<PixelBox>& part) {
     const Target::Impl& from = target.impl();
+    const PixelBox box = part.value_or(from.whole());
     if (!from.has_depth) return invalid_argument("The target has no depth.");
-    std::vector<float> depth(static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height));
+    if (auto valid = check_part(box, from.width, from.height, "the target"); !valid) return valid.error();
+    std::vector<float> depth(pixel_count(box));
     auto done = in_context(from.context, "Reading depth", [&]() -> Result<void> {
         if (auto valid = from.check_readable(); !valid) return valid;
-        read(from, GL_DEPTH_COMPONENT, 1, depth);
+        read(from, box, GL_DEPTH_COMPONENT, 1, depth);
         return {};
     });
     if (!done) return done.error();

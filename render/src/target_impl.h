@@ -12,6 +12,9 @@
 
 namespace unseen::render {
 
+// Fails unless the part is a pixel at least and lies in what is so large; `what`: "the target".
+Result<void> check_part(const PixelBox& part, int width, int height, const char* what);
+
 struct Target::Impl {
     Impl(const Context& context_, int width_, int height_) : context(context_), width(width_), height(height_) {}
     Impl(const Impl&) = delete;
@@ -25,7 +28,9 @@ struct Target::Impl {
     void bind(int attachment, std::optional<int> mask = {}) const;
     Result<void> check_attachment(int attachment) const;
     Result<void> check_readable() const;
-    Result<void> read_colour(int attachment, std::span<glm::vec4> pixels) const; // as many as it has
+    Result<void> read_colour(int attachment, const PixelBox& part, std::span<glm::vec4> pixels) const;
+
+    PixelBox whole() const { return {0, 0, width, height}; }
 
     // How the attachment wants its colours; depth: it has none at all.
     Output output(int attachment) const {

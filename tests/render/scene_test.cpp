@@ -308,6 +308,59 @@ TEST_F(SceneTest, CutsOfOneTreeAddOneBufferEach) {
     EXPECT_EQ(living_buffers(), before);
 }
 
+TEST_F(SceneTest, TilesAreThatPartOfTheWindow) {
+    const Scene scene(bumpy_sphere(40));
+    const GpuCut cut = cut_on_gpu(scene);
+    const Item item{.cut = cut, .placement = at({0.4, -0.3, 0})};
+    View view = oblique_view();
+    view.eye *= 1.5;
+    const auto whole = picture({item}, view);
+    const auto shown = pixels_of({&item, 1}, view);
+    ASSERT_TRUE(shown) << shown.error().message;
+    ASSERT_GT(shown->width, 8);
+    ASSERT_LT(shown->width * shown->height, window * window / 2);
+    for (int i = 0; i < window * window; ++i) {
+        const int x = i % window - shown->left, y = i / window - shown->top;
+        const bool is_in_box = x >= 0 && y >= 0 && x < shown->width && y < shown->height;
+        if (!is_in_box) {
+            ASSERT_EQ(whole[static_cast<std::size_t>(i)], default_background) << i;
+        }
+    }
+
+    auto sheet = Target::create(context(), 700, 300);
+    ASSERT_TRUE(sheet);
+    const float untouched = 0.9f;
+    View of_sheet = view;
+    of_sheet.width = 700, of_sheet.height = 300;
+    ASSERT_TRUE(draw({}, {.view = of_sheet}, *sheet, {.colour = glm::vec4(untouched)}));
+    const PixelBox right{shown->left + shown->width / 2, shown->top, shown->width - shown->width / 2, shown->height};
+    const std::vector<Tile> tiles = {{*shown, 10, 20}, {right, 700 - right.width, 300 - right.height}};
+    for (const Tile& tile : tiles) ASSERT_TRUE(draw({&item, 1}, {.view = view, .tile = tile}, *sheet));
+    const auto pixels = read_luminance(*sheet);
+    ASSERT_TRUE(pixels);
+    std::vector<float> expected(pixels->size(), untouched);
+    for (const Tile& tile : tiles)
+        for (int y = 0; y < tile.part.height; ++y)
+            for (int x = 0; x < tile.part.width; ++x)
+                expected[static_cast<std::size_t>((tile.top + y) * 700 + tile.left + x)] =
+                    whole[static_cast<std::size_t>((tile.part.top + y) * window + tile.part.left + x)];
+    EXPECT_LT(flipped_share(*pixels, expected), most_flipped / 10);
+}
+
+TEST_F(SceneTest, NothingIsShownBesideTheWindow) {
+    const Scene scene(cube());
+    const GpuCut cut = cut_on_gpu(scene);
+    const auto box = [&](glm::dvec3 place) {
+        const Item item{.cut = cut, .placement = at(place)};
+        return *pixels_of({&item, 1}, frontal_view(window, window));
+    };
+    EXPECT_EQ(box({200, 0, -5}).width, 0);
+    EXPECT_EQ(box({0, -200, -5}).height, 0);
+    EXPECT_EQ(pixels_of({}, frontal_view(window, window))->width, 0);
+    const Item around{.cut = cut, .placement = at(frontal_view(window, window).eye)};
+    EXPECT_EQ(pixels_of({&around, 1}, frontal_view(window, window))->width, window) << "parts are behind the eye";
+}
+
 TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     const Scene scene(cube());
     const GpuCut cut = cut_on_gpu(scene);
@@ -325,6 +378,11 @@ TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     for (const double scale : {nan, 0.0})
         EXPECT_THAT(why_not({.cut = cut, .placement = at({}, scale)}, {.view = view}), HasSubstr("scale"));
     EXPECT_THAT(why_not({.cut = cut, .placement = at({nan, 0, 0})}, {.view = view}), HasSubstr("translation"));
+
+    const PixelBox all{0, 0, window, window}, none{3, 3, 0, 5};
+    EXPECT_THAT(why_not({.cut = cut}, {.view = view, .tile = Tile{none, 0, 0}}), HasSubstr("the view's window"));
+    EXPECT_THAT(why_not({.cut = cut}, {.view = view, .tile = Tile{all, 1, 0}}), HasSubstr("the target"));
+    EXPECT_THAT(why_not({.cut = cut}, {.view = view, .shadow_mask = 0, .tile = Tile{all, 0, 0}}), HasSubstr("mask"));
 
     auto other = Context::headless();
     ASSERT_TRUE(other);

@@ -2,6 +2,7 @@
 #include "gl_test.h"
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -118,9 +119,26 @@ TEST_F(TargetTest, RowsComeFromTheTopAlsoOfForeignFramebuffers) {
     const auto foreign = Target::foreign(context(), 2, 3, {.id = own->id(), .is_for_display = false});
     ASSERT_TRUE(foreign) << foreign.error().message;
     EXPECT_THAT(*read_luminance(*foreign), ::testing::ElementsAre(2, 2, 1, 1, 0, 0));
+    const PixelBox bottom{1, 1, 1, 2};
+    EXPECT_THAT(*read_depth(*own, bottom), ::testing::SizeIs(2));
+    EXPECT_THAT(*read_pixels(*own, 0, bottom), ::testing::ElementsAre(glm::vec4(1), glm::vec4(2)));
+    EXPECT_THAT(*read_pixels(*foreign, 0, bottom), ::testing::ElementsAre(glm::vec4(1), glm::vec4(0)));
     const auto display = Target::foreign(context(), 2, 3, {.id = own->id()});
     ASSERT_TRUE(display);
     EXPECT_FALSE(read_luminance(*display)) << "displays get codes";
+}
+
+TEST_F(TargetTest, PartsThatAreReadLieInIt) {
+    const auto made = Target::create(context(), 5, 3);
+    ASSERT_TRUE(made);
+    constexpr int most = std::numeric_limits<int>::max();
+    for (const PixelBox& part : {PixelBox{0, 0, 6, 3}, PixelBox{0, 1, 5, 3}, PixelBox{-1, 0, 2, 2},
+                                 PixelBox{0, 0, 0, 1}, PixelBox{most, 0, most, 1}, PixelBox{0, -most, 1, most}}) {
+        const auto read = read_pixels(*made, 0, part);
+        ASSERT_FALSE(read);
+        EXPECT_THAT(read.error().message, HasSubstr("5x3"));
+        EXPECT_FALSE(read_depth(*made, part));
+    }
 }
 
 TEST_F(TargetTest, ForeignFramebuffersStayTheirOwners) {

@@ -566,13 +566,11 @@ void CsfTable::State::prepare_monotone() {
         }
     }
     std::vector<float>& v = log2_monotone;
-    for (std::size_t i = v.size() - 1; i-- > 0;) {
-        if ((i + 1) % frequencies != 0) v[i] = std::max(v[i], v[i + 1]);
-    }
+    for (std::size_t row = 0; row < v.size(); row += frequencies)
+        for (std::size_t f = frequencies - 1; f-- > 0;) v[row + f] = std::max(v[row + f], v[row + f + 1]);
     for (std::size_t i = v.size() - plane; i-- > 0;) v[i] = std::max(v[i], v[i + plane]);
-    for (std::size_t i = frequencies; i < v.size(); ++i) {
-        if (i % plane >= frequencies) v[i] = std::max(v[i], v[i - frequencies]);
-    }
+    for (std::size_t first = 0; first < v.size(); first += plane)
+        for (std::size_t i = first + frequencies; i < first + plane; ++i) v[i] = std::max(v[i], v[i - frequencies]);
 }
 
 // One slope for the whole table: a slope per column could make a frequency rise with eccentricity. The shallowest is

@@ -23,7 +23,7 @@ constexpr int border = 2; // free cells around the mesh
 constexpr double off_middle_y = 0.0131, off_middle_z = -0.0217;
 // A room lies inside where so many of its columns say so. (All should; a line may pass through an edge.)
 constexpr double most_of_a_room = 0.9;
-constexpr float least_radius = 1; // cells
+constexpr int least_radius = 1; // cells
 // Spheres whose middles lie in a larger one, or nearly, hide little more.
 constexpr float apart = 0.9f;
 
@@ -149,21 +149,21 @@ private:
         }
     }
 
-    // Of the cells' middles from the nearest cell that is not an inner one, squared, in cells: the squares add up axis
-    // by axis.
+    // Of the cells' middles from the nearest cell that is not an inner one, squared, in half cells: the squares add up
+    // axis by axis.
     void find_distances(const std::vector<std::uint8_t>& is_inner) {
         squared_.resize(is_inner.size());
         for (std::size_t row = 0; row < is_inner.size(); row += side()) {
             const auto sweep = [&](auto at) {
-                float cells = 0; // since the last that is no inner one; the grid's border is none
+                std::int32_t cells = 0; // since the last that is no inner one; the grid's border is none
                 for (std::size_t x = 0; x < side(); ++x) {
                     cells = is_inner[row + at(x)] ? cells + 1 : 0;
-                    const float way = std::max(cells - 0.5f, 0.0f);
+                    const std::int32_t way = std::max(2 * cells - 1, 0);
                     squared_[row + at(x)] = std::min(squared_[row + at(x)], way * way);
                 }
             };
             std::fill_n(squared_.begin() + static_cast<std::ptrdiff_t>(row), side(),
-                        std::numeric_limits<float>::infinity());
+                        std::numeric_limits<std::int32_t>::max());
             sweep([](std::size_t x) { return x; });
             sweep([&](std::size_t x) { return side() - 1 - x; });
         }
@@ -171,18 +171,24 @@ private:
         for (std::size_t i = 0; i < side(); ++i) join_rows(i * side(), side() * side());
     }
 
-    // Of rows along x that begin at equal steps.
+    // Of rows along x that begin at equal steps. From each row outwards, until no row is near enough to change anything.
     void join_rows(std::size_t first, std::size_t step) {
-        std::vector<float> before(side() * side());
+        std::vector<std::int32_t> before(side() * side());
         for (std::size_t row = 0; row < side(); ++row)
             std::copy_n(&squared_[first + row * step], side(), &before[row * side()]);
         for (std::size_t to = 0; to < side(); ++to) {
-            float* const joined = &squared_[first + to * step];
-            for (std::size_t from = 0; from < side(); ++from) {
-                const float between =
-                    std::max(std::abs(static_cast<float>(to) - static_cast<float>(from)) - 0.5f, 0.0f);
-                const float* const row = &before[from * side()];
-                for (std::size_t x = 0; x < side(); ++x) joined[x] = std::min(joined[x], row[x] + between * between);
+            std::int32_t* const joined = &squared_[first + to * step];
+            for (std::size_t rows = 1; rows < side(); ++rows) {
+                const auto way = static_cast<std::int32_t>(2 * rows - 1), between = way * way;
+                std::int32_t most = 0;
+                for (std::size_t x = 0; x < side(); ++x) most = std::max(most, joined[x]);
+                if (most <= between) break;
+                const auto join = [&](std::size_t from) {
+                    const std::int32_t* const row = &before[from * side()];
+                    for (std::size_t x = 0; x < side(); ++x) joined[x] = std::min(joined[x], row[x] + between);
+                };
+                if (to >= rows) join(to - rows);
+                if (to + rows < side()) join(to + rows);
             }
         }
     }
@@ -190,18 +196,20 @@ private:
     std::vector<Sphere> largest(int count) const {
         std::vector<Sphere> chosen;
         while (chosen.size() < static_cast<std::size_t>(count)) {
-            float most = least_radius * least_radius;
+            constexpr std::int32_t least = 4 * least_radius * least_radius;
+            std::int32_t most = least;
             glm::vec3 best(0);
             for (std::size_t cell = 0; cell < squared_.size(); ++cell) {
-                if (!(squared_[cell] > most)) continue;
+                if (squared_[cell] <= most) continue;
                 const glm::vec3 centre = middle_of(cell);
                 const bool is_apart = std::all_of(chosen.begin(), chosen.end(), [&](const Sphere& larger) {
                     return glm::length(larger.centre - centre) >= apart * larger.radius;
                 });
                 if (is_apart) most = squared_[cell], best = centre;
             }
-            if (!(most > least_radius * least_radius)) break;
-            chosen.push_back({best, static_cast<float>(std::sqrt(static_cast<double>(most)) * cell_ * (1 - rounding))});
+            if (most == least) break;
+            const double radius = std::sqrt(static_cast<double>(most)) / 2 * cell_;
+            chosen.push_back({best, static_cast<float>(radius * (1 - rounding))});
         }
         return chosen;
     }
@@ -219,7 +227,7 @@ private:
     double cell_ = 0;                   // mesh units
     glm::dvec3 corner_ = glm::dvec3(0); // of the first cell
     std::vector<std::uint8_t> touched_;
-    std::vector<float> squared_;
+    std::vector<std::int32_t> squared_; // distances, in half cells
 };
 
 } // namespace

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
+
+#include <glm/vec2.hpp>
 
 #include <unseen/render/draw.h>
 #include <unseen/render/gpu_tree.h>
@@ -15,6 +18,7 @@
 #include "shared_uploads.h"
 
 namespace unseen::session {
+
 Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels) {
     if (levels < 2 || levels > most_levels)
         return invalid_argument("An object to select levels for has 2 to " + std::to_string(most_levels) + " of them.");
@@ -25,22 +29,54 @@ Result<LevelChain> selection_chain(Session& session, std::size_t object, int lev
         {.levels = levels, .most_share = 0.5, .least_share = std::exp2(1 - levels), .least_triangles = 20});
 }
 
+namespace {
+
+// Pixels a side of the sheet that pictures are drawn to, unless the window is larger: of dozens of small ones.
+constexpr int sheet_side = 1024;
+
+// Places for pictures on a sheet: in rows, from the left.
+class SheetRows {
+public:
+    SheetRows(int width, int height) : width_(width), height_(height) {}
+
+    // The top left; none: there is no place left.
+    std::optional<glm::ivec2> place(int width, int height) {
+        if (left_ + width > width_) left_ = 0, top_ = bottom_;
+        if (left_ + width > width_ || top_ + height > height_) return {};
+        const glm::ivec2 at(left_, top_);
+        left_ += width;
+        bottom_ = std::max(bottom_, top_ + height);
+        return at;
+    }
+    int used() const { return bottom_; } // pixels from the top
+
+private:
+    int width_, height_;
+    int left_ = 0, top_ = 0, bottom_ = 0; // of the row that is being filled
+};
+
+} // namespace
+
 struct LevelPictures::Impl {
-    struct Drawn {
-        std::vector<glm::vec4> pixels;
-        std::vector<float> depth;
+    // A picture on the sheet that has not come back yet.
+    struct Placed {
+        LevelImage* image; // its box is that of the tile
+        glm::ivec2 at;
     };
 
     Impl(const render::Context& context_, Session& session_)
         : context(context_), session(session_), uploads(context_) {}
 
     Result<void> load(int level_count);
-    Result<void> need_target(const vdtree::View& view);
+    Result<void> need_sheet(const vdtree::View& view);
     Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
     Result<std::vector<render::Item>> backdrop_items(const vdtree::View& view) const;
     Result<double> near_plane(const std::vector<std::size_t>& objects, const std::vector<render::Item>& background,
                               const vdtree::View& view) const;
-    Result<Drawn> draw(const std::vector<render::Item>& items, const vdtree::View& view, double near);
+    Result<void> clear_sheet();
+    Result<void> draw(std::span<const render::Item> items, const vdtree::View& view, double near,
+                      const render::PixelBox& part, LevelImage& image);
+    Result<void> read_sheet();
     float value_of(float luminance, SelectionQuality quality) const;
 
     render::Context context;
@@ -50,7 +86,9 @@ struct LevelPictures::Impl {
     std::vector<WorldSphere> spheres;          // by object
     std::vector<std::vector<std::uint32_t>> triangles;
     std::vector<render::GpuCut> backdrop;
-    std::optional<render::Target> target;
+    std::optional<render::Target> sheet;
+    SheetRows rows{0, 0};
+    std::vector<Placed> placed;
     std::optional<render::SampleSum> sum; // of frames, for each of another size
     LevelPictureTimes times;
 };
@@ -75,12 +113,13 @@ Result<void> LevelPictures::Impl::load(int level_count) {
     return {};
 }
 
-Result<void> LevelPictures::Impl::need_target(const vdtree::View& view) {
-    if (target && target->width() == view.width && target->height() == view.height) return {};
-    target.reset();
-    auto made = render::Target::create(context, view.width, view.height, {.label = "level picture"});
+Result<void> LevelPictures::Impl::need_sheet(const vdtree::View& view) {
+    const int width = std::max(view.width, sheet_side), height = std::max(view.height, sheet_side);
+    if (sheet && sheet->width() == width && sheet->height() == height) return {};
+    sheet.reset();
+    auto made = render::Target::create(context, width, height, {.label = "level pictures"});
     if (!made) return made.error();
-    target = std::move(*made);
+    sheet = std::move(*made);
     return {};
 }
 
@@ -113,22 +152,57 @@ Result<double> LevelPictures::Impl::near_plane(const std::vector<std::size_t>& o
     return render::near_plane(all, view);
 }
 
-Result<LevelPictures::Impl::Drawn> LevelPictures::Impl::draw(const std::vector<render::Item>& items,
-                                                             const vdtree::View& view, double near) {
+Result<void> LevelPictures::Impl::clear_sheet() {
+    rows = SheetRows(sheet->width(), sheet->height());
+    placed.clear();
+    vdtree::View whole;
+    whole.width = sheet->width(), whole.height = sheet->height();
+    return render::draw({}, {.view = whole}, *sheet, {.colour = glm::vec4(session.background())});
+}
+
+// Draws a part of the view's window to a place on the sheet. The image gets its box now, and the rest when the sheet is
+// read, until which it must stay where it is.
+Result<void> LevelPictures::Impl::draw(std::span<const render::Item> items, const vdtree::View& view, double near,
+                                       const render::PixelBox& part, LevelImage& image) {
+    image.box = {part.left, part.top, part.left + part.width, part.top + part.height};
+    if (image.box.is_empty()) return {};
+    auto at = rows.place(part.width, part.height);
+    if (!at) {
+        if (auto read = read_sheet(); !read) return read;
+        if (auto cleared = clear_sheet(); !cleared) return cleared;
+        at = rows.place(part.width, part.height); // no part is larger than the sheet
+    }
     const auto start = vdtree::Clock::now();
-    if (auto drawn = render::draw(items, {.view = view, .near_plane = near}, *target,
-                                  {.colour = glm::vec4(session.background())});
-        !drawn)
-        return drawn.error();
+    const render::Camera camera{.view = view, .near_plane = near, .tile = render::Tile{part, at->x, at->y}};
+    if (auto drawn = render::draw(items, camera, *sheet, {.colour = {}, .depth = false}); !drawn) return drawn;
     times.draw_ms += vdtree::ms_since(start);
     ++times.drawings;
-    const auto read_start = vdtree::Clock::now();
-    auto pixels = render::read_pixels(*target);
+    placed.push_back({&image, *at});
+    return {};
+}
+
+// The images get luminance for values.
+Result<void> LevelPictures::Impl::read_sheet() {
+    if (placed.empty()) return {};
+    const auto start = vdtree::Clock::now();
+    const render::PixelBox used{0, 0, sheet->width(), rows.used()};
+    const auto pixels = render::read_pixels(*sheet, 0, used);
     if (!pixels) return pixels.error();
-    auto depth = render::read_depth(*target);
+    const auto depth = render::read_depth(*sheet, used);
     if (!depth) return depth.error();
-    times.read_ms += vdtree::ms_since(read_start);
-    return Drawn{std::move(*pixels), std::move(*depth)};
+    for (const auto& [image, at] : placed)
+        for (int y = 0; y < image->box.height(); ++y) {
+            const auto row =
+                (static_cast<std::size_t>(at.y) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(used.width) +
+                static_cast<std::size_t>(at.x);
+            for (std::size_t i = row; i < row + static_cast<std::size_t>(image->box.width()); ++i) {
+                image->values.push_back((*pixels)[i].a);
+                image->depth.push_back((*depth)[i]);
+            }
+        }
+    placed.clear();
+    times.read_ms += vdtree::ms_since(start);
+    return {};
 }
 
 float LevelPictures::Impl::value_of(float luminance, SelectionQuality quality) const {
@@ -139,10 +213,41 @@ float LevelPictures::Impl::value_of(float luminance, SelectionQuality quality) c
     return static_cast<float>(std::round(255 * std::clamp(perception::encode(display, relative), 0.0, 1.0)));
 }
 
+namespace {
+
+// The image in the rectangle of what it shows alone. Values are counted by `value_of`, of luminance.
+template <class ValueOf>
+LevelImage trimmed(const LevelImage& image, ValueOf&& value_of) {
+    const auto width = static_cast<std::size_t>(image.box.width());
+    LevelImage result;
+    for (int y = 0; y < image.box.height(); ++y) {
+        const float* const row = image.depth.data() + static_cast<std::size_t>(y) * width;
+        const float* const end = row + width;
+        const float* const first = std::find_if(row, end, [](float d) { return d > 0; });
+        if (first == end) continue;
+        const float* after = end;
+        while (!(after[-1] > 0)) --after;
+        const int left = image.box.left, top = image.box.top + y;
+        result.box = united(result.box,
+                            {left + static_cast<int>(first - row), top, left + static_cast<int>(after - row), top + 1});
+    }
+    for (int y = result.box.top; y < result.box.bottom; ++y) {
+        const std::size_t row = static_cast<std::size_t>(y - image.box.top) * width;
+        for (int x = result.box.left; x < result.box.right; ++x) {
+            const std::size_t at = row + static_cast<std::size_t>(x - image.box.left);
+            result.depth.push_back(image.depth[at]);
+            result.values.push_back(image.depth[at] > 0 ? value_of(image.values[at]) : 0);
+        }
+    }
+    return result;
+}
+
+} // namespace
+
 Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQuality quality) {
     if (auto valid = vdtree::validate_perspective(view, "A search for levels"); !valid) return valid.error();
     Impl& own = *impl_;
-    if (auto made = own.need_target(view); !made) return made.error();
+    if (auto made = own.need_sheet(view); !made) return made.error();
     std::vector<std::size_t> objects;
     for (std::size_t i = 0; i < own.spheres.size(); ++i)
         if (is_in_sight(own.spheres[i], view)) objects.push_back(i);
@@ -152,48 +257,41 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
     if (!near) return near.error();
     LayeredPicture picture;
     picture.width = view.width, picture.height = view.height;
-    auto behind = own.draw(*background, view, *near);
-    if (!behind) return behind.error();
-    picture.background_depth = std::move(behind->depth);
-    float last = -1, last_value = 0; // most of it is one value
-    for (const glm::vec4& pixel : behind->pixels) {
-        if (pixel.a != last) last = pixel.a, last_value = own.value_of(last, quality);
-        picture.background.push_back(last_value);
-    }
+    if (auto cleared = own.clear_sheet(); !cleared) return cleared.error();
+    LevelImage behind;
+    if (auto drawn = own.draw(*background, view, *near, {0, 0, view.width, view.height}, behind); !drawn)
+        return drawn.error();
+    picture.objects.reserve(objects.size());
     for (const std::size_t object : objects) {
-        ObjectImages images;
+        const auto& cuts = own.levels[object]->cuts;
+        ObjectImages& images = picture.objects.emplace_back();
         images.object = object;
         images.triangles = own.triangles[object];
-        bool is_there = false;
-        for (int level = 0; level < own.levels[object]->chain.size(); ++level) {
-            const auto item = own.item(object, level, view);
+        images.levels.resize(cuts.size());
+        for (std::size_t level = 0; level < cuts.size(); ++level) {
+            const auto item = own.item(object, static_cast<int>(level), view);
             if (!item) return item.error();
-            const auto drawn = own.draw({*item}, view, *near);
-            if (!drawn) return drawn.error();
-            own.times.triangles += images.triangles[static_cast<std::size_t>(level)];
-            LevelImage& image = images.levels.emplace_back();
-            for (int y = 0; y < view.height; ++y) {
-                const float* const row =
-                    drawn->depth.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width);
-                const float* const end = row + view.width;
-                const float* const first = std::find_if(row, end, [](float d) { return d > 0; });
-                if (first == end) continue;
-                const float* after = end;
-                while (!(after[-1] > 0)) --after;
-                image.box = united(image.box, {static_cast<int>(first - row), y, static_cast<int>(after - row), y + 1});
-            }
-            for (int y = image.box.top; y < image.box.bottom; ++y)
-                for (int x = image.box.left; x < image.box.right; ++x) {
-                    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +
-                                           static_cast<std::size_t>(x);
-                    const bool covers = drawn->depth[at] > 0;
-                    image.depth.push_back(drawn->depth[at]);
-                    image.values.push_back(covers ? own.value_of(drawn->pixels[at].a, quality) : 0);
-                }
-            is_there = is_there || !image.box.is_empty();
+            const auto part = render::pixels_of({&*item, 1}, view);
+            if (!part) return part.error();
+            if (auto drawn = own.draw({&*item, 1}, view, *near, *part, images.levels[level]); !drawn)
+                return drawn.error();
+            if (part->width > 0 && part->height > 0) own.times.triangles += images.triangles[level];
         }
-        if (is_there) picture.objects.push_back(std::move(images));
     }
+    if (auto read = own.read_sheet(); !read) return read.error();
+
+    picture.background_depth = std::move(behind.depth);
+    float last = -1, last_value = 0; // most of it is one value
+    for (const float luminance : behind.values) {
+        if (luminance != last) last = luminance, last_value = own.value_of(last, quality);
+        picture.background.push_back(last_value);
+    }
+    for (ObjectImages& images : picture.objects)
+        for (LevelImage& image : images.levels)
+            image = trimmed(image, [&](float luminance) { return own.value_of(luminance, quality); });
+    std::erase_if(picture.objects, [](const ObjectImages& images) {
+        return std::ranges::all_of(images.levels, [](const LevelImage& image) { return image.box.is_empty(); });
+    });
     return picture;
 }
 

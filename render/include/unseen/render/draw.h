@@ -36,8 +36,15 @@ struct Item {
     glm::vec2 stipple = {0, 1};
 };
 
+// A part of a camera's window, and where in the target its top left comes to lie. So a target of any size holds many
+// small pictures side by side, which come back together.
+struct Tile {
+    PixelBox part;
+    int left = 0, top = 0; // pixels of the target
+};
+
 struct Camera {
-    vdtree::View view;                  // its window is as large as the target
+    vdtree::View view;                  // its window is as large as the target, unless a tile is drawn
     glm::dvec2 point = glm::dvec2(0.5); // of each pixel, from its top left, that is drawn
     // Distance, world units; none: just before the items. One for draws that share depth; of perspective views alone.
     std::optional<double> near_plane = {};
@@ -47,6 +54,8 @@ struct Camera {
     // first light in r, and so on; 1 of what is not lit, of lights that there are not, and where no item is. It is of
     // ColourFormat::shares8 or in floats, and not the attachment of the colours. None: it is not drawn.
     std::optional<int> shadow_mask = {};
+    // Nothing but this is drawn and cleared: of the library's own targets, without a mask of shadows.
+    std::optional<Tile> tile = {};
 };
 
 // What a draw begins with.
@@ -70,6 +79,10 @@ struct DrawnDepth {
 // error.
 Result<void> draw(std::span<const Item> items, const Camera& camera, Target& target, const Clear& clear = {},
                   int attachment = 0);
+
+// The part of the view's window that items can show in, with a margin for rounding; of no width or height: none. All of
+// it where a part of an item may lie behind the eye.
+Result<PixelBox> pixels_of(std::span<const Item> items, const vdtree::View& view);
 
 // The near plane that draw() chooses. It cuts off nothing but what is nearer to the eye than 1e-4 of the size of an
 // item around the eye. Of perspective views alone: orthographic ones show what is behind the eye, too.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <glm/vec4.hpp>
@@ -31,6 +32,11 @@ struct ForeignFramebuffer {
     unsigned id = 0;            // 0: the window's
     bool is_for_display = true; // colours are encoded as sRGB, by the framebuffer or by the shaders; a is 1
     bool top_row_first = false; // the order of rows in memory
+};
+
+// A part of a picture: pixels from its top left.
+struct PixelBox {
+    int left = 0, top = 0, width = 0, height = 0;
 };
 
 // Move-only. Owns its attachments and a handle to its context.
@@ -68,11 +74,12 @@ private:
 Result<void> resolve(const Target& from, Target& to);
 
 // Row-major from the top left. They wait for the GPU. They fail on targets with samples, and where there is no such
-// attachment.
-Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment = 0);
+// attachment. `part`: lies in the target; none: all of it.
+Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment = 0,
+                                           const std::optional<PixelBox>& part = {});
 Result<std::vector<float>> read_luminance(const Target& target, int attachment = 0); // not of targets for displays
 Result<std::vector<float>> read_colour(const Target& target, int attachment = 0);    // three values a pixel
-Result<std::vector<float>> read_depth(const Target& target);
+Result<std::vector<float>> read_depth(const Target& target, const std::optional<PixelBox>& part = {});
 
 // The largest window that this GL can draw to, in pixels a side. Needs a current context.
 int largest_target_side();
