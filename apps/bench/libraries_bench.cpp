@@ -54,7 +54,7 @@ vdtree::Mesh cut_to(const vdtree::VertexTree& tree, vdtree::Index triangles) {
     return vdtree::extract_mesh(cut);
 }
 
-vdtree::Mesh whole(const vdtree::VertexTree& tree) {
+vdtree::Mesh whole_mesh_of(const vdtree::VertexTree& tree) {
     vdtree::Cut cut(tree);
     cut.unfold_all();
     return vdtree::extract_mesh(cut);
@@ -101,7 +101,7 @@ Result<LibrariesBenchResult> bench_libraries(const std::vector<std::string>& mes
                 } else {
                     const auto tree = vdtree::read_tree(folder.tree());
                     if (!tree) return tree.error();
-                    const auto examined = meshio::examine(whole(*tree).view());
+                    const auto examined = meshio::examine(whole_mesh_of(*tree).view());
                     if (!examined) return examined.error();
                     const auto budget =
                         std::max<vdtree::Index>(1, static_cast<vdtree::Index>(original.triangles.size()) / kept_one_in);

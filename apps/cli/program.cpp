@@ -34,12 +34,12 @@ std::vector<std::string> verb_names(const CLI::App& app) {
     return names;
 }
 
-std::vector<std::string> option_names(const CLI::App& app) {
+std::vector<std::string> names_of_options(const CLI::App& app) {
     std::vector<std::string> names;
     for (const CLI::Option* option : app.get_options())
         for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
     for (const CLI::App* group : parts_of(app, false)) {
-        const auto more = option_names(*group);
+        const auto more = names_of_options(*group);
         names.insert(names.end(), more.begin(), more.end());
     }
     return names;
@@ -58,7 +58,7 @@ std::string complaint_about(const std::string& word, const CLI::App& app, const 
     const auto hint = program.hints.find(word);
     if (hint != program.hints.end()) return "there is no verb or option '" + word + "': " + hint->second;
     const std::string near =
-        suggestion(word.substr(0, word.find('=')), is_option ? option_names(app) : verb_names(app));
+        suggestion(word.substr(0, word.find('=')), is_option ? names_of_options(app) : verb_names(app));
     return std::string("there is no ") + (is_option ? "option '" : "verb '") + word + "'" + (near.empty() ? "." : near);
 }
 

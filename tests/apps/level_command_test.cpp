@@ -125,7 +125,8 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
     // One object is in no layers.
     ASSERT_EQ(run({"scene", "make", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
     for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, "--no-shadows"});
+        const Outcome drawn = run({"render", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o",
+                                   show + ".png", "--show", show, "--no-shadows"});
         EXPECT_EQ(drawn.status, 0) << drawn.err;
     }
 }
