@@ -10,6 +10,8 @@ namespace level_command_test {
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
 
+constexpr int width = 80, height = 60; // pixels
+
 class LevelCommandTest : public CommandTest {
 protected:
     void SetUp() override {
@@ -21,7 +23,8 @@ protected:
         fs::remove(path("probe.png"));
     }
     Outcome render(std::vector<std::string> more) const {
-        std::vector<std::string> words = {"render", "scene.glb", "--size", "128x96"};
+        std::vector<std::string> words = {"render", "scene.glb", "--size",
+                                          std::to_string(width) + "x" + std::to_string(height)};
         words.insert(words.end(), more.begin(), more.end());
         return run(words);
     }
@@ -43,7 +46,7 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
     EXPECT_EQ(frame["masked_layers"], 5);
     EXPECT_EQ(frame["surface_passes"], 7 + 5) << "5 layers, the background, the depth; and masks";
     EXPECT_GT(frame["full_screen_passes"], 5);
-    EXPECT_GT(frame["texture_bytes"], 128 * 96 * 16 * 6);
+    EXPECT_GT(frame["texture_bytes"], width * height * 16 * 6);
     EXPECT_LT(frame["triangles"], json["source_triangles"]);
     for (const char* stage : {"layers", "combinations", "maps", "depth", "control"}) EXPECT_GE(frame["ms"][stage], 0);
     std::uint64_t triangles = 0;
@@ -60,7 +63,7 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
     }
     const auto picture = unseen::perception::read_image(path("still.png"));
     ASSERT_TRUE(picture);
-    EXPECT_EQ(picture->image.width, 128);
+    EXPECT_EQ(picture->image.width, width);
     // Luminance for judging, and a summary for people.
     const Outcome judged = render({"--method", "perceptual", "--maps", "rpg99", "-o", "still.pfm"});
     ASSERT_EQ(judged.status, 0) << judged.err;
@@ -120,7 +123,7 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
         const auto picture = unseen::perception::read_image(path(show + ".png"));
         ASSERT_TRUE(picture);
         const int panels = show == "levels" ? 1 : show == "layers" ? 6 : 5;
-        EXPECT_GE(picture->image.width, panels * 128 + (panels - 1) * 4) << show;
+        EXPECT_GE(picture->image.width, panels * width + (panels - 1) * 4) << show;
     }
     // One object is in no layers.
     ASSERT_EQ(run({"scene", "make", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
