@@ -16,8 +16,9 @@
 namespace unseen::session {
 namespace {
 
-// Corners that a member does before all talk to each other again.
-constexpr std::size_t corners_at_a_time = 12;
+// Corners that a member does before all talk to each other again: what others did since is lost where the first is killed,
+// and who is done first waits.
+constexpr std::size_t corners_at_a_time = 48;
 constexpr double walker_eye = 1.7; // world units above the lowest object
 constexpr int default_cells = 10;  // along the longer side
 
@@ -265,11 +266,14 @@ public:
         for (std::size_t at = 0; at < open.size();) {
             const std::size_t left = open.size() - at,
                               each = std::clamp<std::size_t>((left + members - 1) / members, 1, corners_at_a_time);
-            // Neighbours cost about the same, so members take turns.
+            // Neighbours cost about the same, so members take turns, to and fro: else one would have every other column of
+            // the grid.
             const auto part = [&](std::size_t member) {
                 std::vector<LatticePoint> own;
-                for (std::size_t i = at + member; i < std::min(at + members * each, open.size()); i += members)
-                    own.push_back(open[i]);
+                for (std::size_t turn = 0; turn < each; ++turn) {
+                    const std::size_t i = at + turn * members + (turn % 2 == 0 ? member : members - 1 - member);
+                    if (i < open.size()) own.push_back(open[i]);
+                }
                 return own;
             };
             std::vector<int> asked;
