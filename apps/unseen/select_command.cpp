@@ -246,7 +246,7 @@ CLI::App* add_precompute(CLI::App& verb, const std::shared_ptr<SelectArguments>&
     sub->add_option("--window", o.window_px, "Of the cameras, a side (default: 256)")
         ->type_name("PIXELS")
         ->check(whole(11, 8192));
-    sub->add_option("--threads", o.threads, "That search; the result is the same (default: all cores)")
+    sub->add_option("--threads", o.threads, "One draws, the others search; the result is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, 1024));
     sub->add_flag("--anew", a->begins_anew, "Do not go on from what an interrupted search left");

@@ -93,14 +93,14 @@ vdtree::View camera_view(const Selections& s, const LatticePoint& at, std::size_
     return view;
 }
 
-// Draws on this thread and searches on others.
+// Draws on this thread and searches on others, or on this one where it is the only one.
 class Corners {
 public:
     Corners(const Session& session, const Selections& frame, LevelPictures& pictures, int threads,
             PrecomputeReport& report)
         : session_(session), frame_(frame), pictures_(pictures), report_(report),
-          threads_(threads > 0 ? static_cast<std::size_t>(threads)
-                               : std::max<std::size_t>(std::thread::hardware_concurrency(), 1)) {}
+          searching_(threads > 0 ? static_cast<std::size_t>(threads) - 1
+                                 : std::max<std::size_t>(std::thread::hardware_concurrency(), 2) - 1) {}
 
     // One after the other, in their order. `is_done` returns whether to go on.
     template <class Done>
@@ -123,13 +123,14 @@ public:
             return goes_on;
         };
         while (finished < places.size()) {
-            if (next < places.size() * directions && open.size() < threads_ + 1) {
+            if (next < places.size() * directions && open.size() < searching_ + 1) {
                 auto picture =
                     pictures_.draw(camera_view(frame_, places[next / directions], next % directions), frame_.quality);
                 if (!picture) return picture.error(); // futures wait for their threads
                 ++next;
-                open.push_back(
-                    std::async(std::launch::async, [this, shown = std::move(*picture)] { return search(shown); }));
+                // On this thread it is done when it is asked for.
+                open.push_back(std::async(searching_ > 0 ? std::launch::async : std::launch::deferred,
+                                          [this, shown = std::move(*picture)] { return search(shown); }));
                 continue;
             }
             const auto goes_on = finish_one();
@@ -175,7 +176,7 @@ private:
     const Selections& frame_;
     LevelPictures& pictures_;
     PrecomputeReport& report_;
-    std::size_t threads_;
+    std::size_t searching_; // threads
 };
 
 // ---- several processes ------------------------------------------------------------------------------------------------

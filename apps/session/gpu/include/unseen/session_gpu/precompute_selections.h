@@ -30,7 +30,7 @@ struct PrecomputeOptions {
         {}; // y of cameras on the ground, world units; none: the scene's camera's, or 1.7
     // The box of the grid, world units; none: around the middles of all objects.
     std::optional<glm::dvec3> low = {}, high = {};
-    int threads = 0; // that search while the next camera is drawn; 0: as many as there are cores
+    int threads = 0; // one draws, the others search; 1: by turns; 0: as many as there are cores
     // With the share that is done, after each corner. Returning false stops: what is done is kept.
     std::function<bool(double share, const char* stage)> progress = {};
 };
