@@ -55,6 +55,32 @@ private:
     int left_ = 0, top_ = 0, bottom_ = 0; // of the row that is being filled
 };
 
+// The image in the rectangle of what it shows alone.
+LevelImage trimmed(const LevelImage& image) {
+    const auto width = static_cast<std::size_t>(image.box.width());
+    LevelImage result;
+    for (int y = 0; y < image.box.height(); ++y) {
+        const float* const row = image.depth.data() + static_cast<std::size_t>(y) * width;
+        const float* const end = row + width;
+        const float* const first = std::find_if(row, end, [](float d) { return d > 0; });
+        if (first == end) continue;
+        const float* after = end;
+        while (!(after[-1] > 0)) --after;
+        const int left = image.box.left, top = image.box.top + y;
+        result.box = united(result.box,
+                            {left + static_cast<int>(first - row), top, left + static_cast<int>(after - row), top + 1});
+    }
+    for (int y = result.box.top; y < result.box.bottom; ++y) {
+        const std::size_t row = static_cast<std::size_t>(y - image.box.top) * width;
+        for (int x = result.box.left; x < result.box.right; ++x) {
+            const std::size_t at = row + static_cast<std::size_t>(x - image.box.left);
+            result.depth.push_back(image.depth[at]);
+            result.values.push_back(image.values[at]);
+        }
+    }
+    return result;
+}
+
 } // namespace
 
 struct LevelPictures::Impl {
@@ -62,6 +88,7 @@ struct LevelPictures::Impl {
     struct Placed {
         LevelImage* image; // its box is that of the tile
         glm::ivec2 at;
+        bool is_trimmed; // to what it shows alone
     };
 
     Impl(const render::Context& context_, Session& session_)
@@ -75,7 +102,7 @@ struct LevelPictures::Impl {
                               const vdtree::View& view) const;
     Result<void> clear_sheet();
     Result<void> draw(std::span<const render::Item> items, const vdtree::View& view, double near,
-                      const render::PixelBox& part, LevelImage& image);
+                      const render::PixelBox& part, LevelImage& image, bool is_trimmed = true);
     Result<void> read_sheet();
     float value_of(float luminance, SelectionQuality quality) const;
 
@@ -163,7 +190,7 @@ Result<void> LevelPictures::Impl::clear_sheet() {
 // Draws a part of the view's window to a place on the sheet. The image gets its box now, and the rest when the sheet is
 // read, until which it must stay where it is.
 Result<void> LevelPictures::Impl::draw(std::span<const render::Item> items, const vdtree::View& view, double near,
-                                       const render::PixelBox& part, LevelImage& image) {
+                                       const render::PixelBox& part, LevelImage& image, bool is_trimmed) {
     image.box = {part.left, part.top, part.left + part.width, part.top + part.height};
     if (image.box.is_empty()) return {};
     auto at = rows.place(part.width, part.height);
@@ -177,7 +204,7 @@ Result<void> LevelPictures::Impl::draw(std::span<const render::Item> items, cons
     if (auto drawn = render::draw(items, camera, *sheet, {.colour = {}, .depth = false}); !drawn) return drawn;
     times.draw_ms += vdtree::ms_since(start);
     ++times.drawings;
-    placed.push_back({&image, *at});
+    placed.push_back({&image, *at, is_trimmed});
     return {};
 }
 
@@ -190,7 +217,7 @@ Result<void> LevelPictures::Impl::read_sheet() {
     if (!pixels) return pixels.error();
     const auto depth = render::read_depth(*sheet, used);
     if (!depth) return depth.error();
-    for (const auto& [image, at] : placed)
+    for (const auto& [image, at, is_trimmed] : placed) {
         for (int y = 0; y < image->box.height(); ++y) {
             const auto row =
                 (static_cast<std::size_t>(at.y) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(used.width) +
@@ -200,6 +227,8 @@ Result<void> LevelPictures::Impl::read_sheet() {
                 image->depth.push_back((*depth)[i]);
             }
         }
+        if (is_trimmed) *image = trimmed(*image);
+    }
     placed.clear();
     times.read_ms += vdtree::ms_since(start);
     return {};
@@ -212,37 +241,6 @@ float LevelPictures::Impl::value_of(float luminance, SelectionQuality quality) c
         return static_cast<float>(perception::to_luminance(display, relative).value());
     return static_cast<float>(std::round(255 * std::clamp(perception::encode(display, relative), 0.0, 1.0)));
 }
-
-namespace {
-
-// The image in the rectangle of what it shows alone. Values are counted by `value_of`, of luminance.
-template <class ValueOf>
-LevelImage trimmed(const LevelImage& image, ValueOf&& value_of) {
-    const auto width = static_cast<std::size_t>(image.box.width());
-    LevelImage result;
-    for (int y = 0; y < image.box.height(); ++y) {
-        const float* const row = image.depth.data() + static_cast<std::size_t>(y) * width;
-        const float* const end = row + width;
-        const float* const first = std::find_if(row, end, [](float d) { return d > 0; });
-        if (first == end) continue;
-        const float* after = end;
-        while (!(after[-1] > 0)) --after;
-        const int left = image.box.left, top = image.box.top + y;
-        result.box = united(result.box,
-                            {left + static_cast<int>(first - row), top, left + static_cast<int>(after - row), top + 1});
-    }
-    for (int y = result.box.top; y < result.box.bottom; ++y) {
-        const std::size_t row = static_cast<std::size_t>(y - image.box.top) * width;
-        for (int x = result.box.left; x < result.box.right; ++x) {
-            const std::size_t at = row + static_cast<std::size_t>(x - image.box.left);
-            result.depth.push_back(image.depth[at]);
-            result.values.push_back(image.depth[at] > 0 ? value_of(image.values[at]) : 0);
-        }
-    }
-    return result;
-}
-
-} // namespace
 
 Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQuality quality) {
     if (auto valid = vdtree::validate_perspective(view, "A search for levels"); !valid) return valid.error();
@@ -259,7 +257,7 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
     picture.width = view.width, picture.height = view.height;
     if (auto cleared = own.clear_sheet(); !cleared) return cleared.error();
     LevelImage behind;
-    if (auto drawn = own.draw(*background, view, *near, {0, 0, view.width, view.height}, behind); !drawn)
+    if (auto drawn = own.draw(*background, view, *near, {0, 0, view.width, view.height}, behind, false); !drawn)
         return drawn.error();
     picture.objects.reserve(objects.size());
     for (const std::size_t object : objects) {
@@ -288,7 +286,8 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
     }
     for (ObjectImages& images : picture.objects)
         for (LevelImage& image : images.levels)
-            image = trimmed(image, [&](float luminance) { return own.value_of(luminance, quality); });
+            for (std::size_t i = 0; i < image.values.size(); ++i)
+                image.values[i] = image.depth[i] > 0 ? own.value_of(image.values[i], quality) : 0;
     std::erase_if(picture.objects, [](const ObjectImages& images) {
         return std::ranges::all_of(images.levels, [](const LevelImage& image) { return image.box.is_empty(); });
     });
