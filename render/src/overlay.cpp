@@ -100,8 +100,7 @@ Result<void> Overlay::Impl::draw(const Target::Impl& target, glm::ivec2 corner, 
 
     const Output output = target.output(attachment);
     set_fixed_state(target);
-    glScissor(box.left, box.top, box.width, box.height);
-    glEnable(GL_SCISSOR_TEST);
+    set_scissor(box);
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_CULL_FACE);
     glEnable(GL_BLEND);

@@ -68,10 +68,7 @@ void SampleSum::Impl::begin(float background_) {
 void SampleSum::Impl::add(const PixelBox* only) {
     ++count;
     set_fixed_state(sum.impl());
-    if (only) {
-        glScissor(only->left, only->top, only->width, only->height);
-        glEnable(GL_SCISSOR_TEST);
-    }
+    if (only) set_scissor(*only);
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_CULL_FACE);
     glEnable(GL_BLEND);

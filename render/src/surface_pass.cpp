@@ -136,6 +136,11 @@ void set_fixed_state(const Target::Impl& target) {
     glEnable(GL_MULTISAMPLE);
 }
 
+void set_scissor(const PixelBox& box) {
+    glScissor(box.left, box.top, box.width, box.height);
+    glEnable(GL_SCISSOR_TEST);
+}
+
 Result<std::vector<Projection>> projections_of(std::span<const Item> items, const vdtree::View& view,
                                                std::optional<double> near_plane) {
     std::vector<Projection> projections;
@@ -263,15 +268,11 @@ PixelBox SurfacePass::pixels_of(std::span<const glm::dvec2> points) const {
 void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count,
                        const PixelBox* only) const {
     set_fixed_state(target);
-    std::optional<PixelBox> box;
-    if (only) box = *only;
     if (tile_) {
         glViewport(tile_->left - tile_->part.left, tile_->top - tile_->part.top, view_.width, view_.height);
-        box = PixelBox{tile_->left, tile_->top, tile_->part.width, tile_->part.height};
-    }
-    if (box) {
-        glScissor(box->left, box->top, box->width, box->height);
-        glEnable(GL_SCISSOR_TEST);
+        set_scissor({tile_->left, tile_->top, tile_->part.width, tile_->part.height});
+    } else if (only) {
+        set_scissor(*only);
     }
     if (output_ == Output::display) glEnable(GL_FRAMEBUFFER_SRGB);
     target.bind(attachment_, mask_);

@@ -38,6 +38,9 @@ private:
 // it.
 void set_fixed_state(const Target::Impl& target);
 
+// After which nothing else is drawn or cleared, until the fixed state is set again.
+void set_scissor(const PixelBox& box);
+
 // Lights as the shader wants them: see surface.vert.
 struct LightUniforms {
     glm::vec4 material = glm::vec4(0), eye = glm::vec4(0);

@@ -255,7 +255,7 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
     request.purpose = session::Purpose::picture;
     std::vector<vdtree::Cut> full;
     full.emplace_back(session->tree()).unfold_all();
-    constexpr int frames = 60, judged_every = 20;
+    constexpr int frames = 60, judged_every = 15;
     for (int frame = 0; frame <= frames; ++frame) {
         const double x = -4 + 3.0 * frame / frames;
         setting.eye.x = setting.target.x = x;

@@ -273,7 +273,7 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
             if (!part) return part.error();
             if (auto drawn = own.draw({&*item, 1}, view, *near, *part, images.levels[level]); !drawn)
                 return drawn.error();
-            if (part->width > 0 && part->height > 0) own.times.triangles += images.triangles[level];
+            if (!images.levels[level].box.is_empty()) own.times.triangles += images.triangles[level];
         }
     }
     if (auto read = own.read_sheet(); !read) return read.error();

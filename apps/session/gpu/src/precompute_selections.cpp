@@ -100,7 +100,7 @@ public:
             PrecomputeReport& report)
         : session_(session), frame_(frame), pictures_(pictures), report_(report),
           searching_(threads > 0 ? static_cast<std::size_t>(threads) - 1
-                                 : std::max<std::size_t>(std::thread::hardware_concurrency(), 2) - 1) {}
+                                 : std::max<std::size_t>(std::thread::hardware_concurrency(), 1) - 1) {}
 
     // One after the other, in their order. `is_done` returns whether to go on.
     template <class Done>
