@@ -76,23 +76,43 @@ struct Picture {
     }
 };
 
-// The nearest surface at each sample.
+// The nearest surface at each sample, and the light that comes from it: under several lights, or one.
+constexpr std::size_t most_lights = LitStages::lights + 1;
 struct Surfaces {
     std::vector<float> height; // towards the eye; none: nothing is there
-    std::vector<float> light;
+    std::array<std::vector<float>, most_lights> light;
 
-    void clear() {
+    void clear(std::size_t lights) {
         height.assign(samples * samples, nothing);
-        light.assign(samples * samples, 0.0f);
+        for (std::size_t i = 0; i < lights; ++i) light[i].assign(samples * samples, 0.0f);
     }
 };
 
 // A triangle over samples.
+template <std::size_t lights>
 struct Shown {
-    Float4 a, b, c;         // samples: to the right, up, towards the eye
-    float of_a, of_b, of_c; // relative luminances
-    glm::vec2 v_by, w_by;   // how the shares of b and c grow, by sample
-    std::size_t first, end; // rows
+    Float4 a, b, c;                             // samples: to the right, up, towards the eye
+    std::array<float, lights> of_a, of_b, of_c; // relative luminances
+    glm::vec2 v_by, w_by;                       // how the shares of b and c grow, by sample
+    std::size_t first, end;                     // rows
+};
+
+// Its texture, of texels no wider than the samples are apart: the cells' means smooth them.
+struct ShownTexture {
+    const TexturedLight& light;
+    std::size_t level;
+    glm::vec2 of_a, by_b, by_c; // texture coordinates: of a, and how they grow with the shares of b and c
+
+    template <std::size_t lights>
+    ShownTexture(const Shown<lights>& t, const TexturedLight& texture, const std::array<glm::vec2, 3>& uv)
+        : light(texture), of_a(uv[0]), by_b(uv[1] - uv[0]), by_c(uv[2] - uv[0]) {
+        const glm::vec2 size = texture.texture->size(), along_x = (by_b * t.v_by.x + by_c * t.w_by.x) * size,
+                        along_y = (by_b * t.v_by.y + by_c * t.w_by.y) * size;
+        const std::size_t first_wider = texture.texture->level_of(
+            std::max({std::abs(along_x.x), std::abs(along_x.y), std::abs(along_y.x), std::abs(along_y.y)}));
+        level = first_wider > 0 ? first_wider - 1 : 0;
+    }
+    UNSEEN_INLINE float at(float v, float w) const { return light.texture->nearest(level, of_a + v * by_b + w * by_c); }
 };
 
 // How many samples of a row, or rows, lie before a place: the rounding of floats that every processor has.
@@ -109,9 +129,10 @@ UNSEEN_INLINE float offset_of_row(std::size_t row) {
     return all - static_cast<float>(static_cast<int>(all));
 }
 
-// Samples of a row are looked at by registers, `Floats`, whether they lie in the triangle or not.
-template <class Floats>
-UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* lights) {
+// Samples of a row are looked at by registers, `Floats`, whether they lie in the triangle or not; a texture only where it
+// is seen.
+template <class Floats, std::size_t lights>
+UNSEEN_INLINE void draw_rows(const Shown<lights>& t, const ShownTexture* texture, Surfaces& surfaces) {
     constexpr std::size_t width = sizeof(Floats) / sizeof(float);
     static_assert(samples % width == 0);
     Floats lane;
@@ -130,51 +151,45 @@ UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* lights) {
         const std::size_t x0 = count_before(low + t.a[0] - offset), x1 = count_before(high + t.a[0] - offset);
         const auto from = static_cast<float>(x0), to = static_cast<float>(x1);
         for (std::size_t begin = x0 / width * width; begin < x1; begin += width) {
-            float *const height = heights + y * samples + begin, *const light = lights + y * samples + begin;
+            const std::size_t first = y * samples + begin;
+            float* const height = surfaces.height.data() + first;
             const Floats x = lane + static_cast<float>(begin), px = x + offset - t.a[0];
             const Floats v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
-            const Floats h = u * t.a[2] + v * t.b[2] + w * t.c[2], l = u * t.of_a + v * t.of_b + w * t.of_c;
-            Floats old_height, old_light;
+            const Floats h = u * t.a[2] + v * t.b[2] + w * t.c[2];
+            Floats old_height;
             std::memcpy(&old_height, height, sizeof(Floats));
-            std::memcpy(&old_light, light, sizeof(Floats));
             const auto is_seen = (x >= from) & (x < to) & (h > old_height);
-            const Floats new_height = is_seen ? h : old_height, new_light = is_seen ? l : old_light;
+            Floats its_texture{};
+            if (texture)
+                for (std::size_t i = 0; i < width; ++i)
+                    if (is_seen[i]) its_texture[i] = texture->at(v[i], w[i]);
+            const Floats new_height = is_seen ? h : old_height;
             std::memcpy(height, &new_height, sizeof(Floats));
-            std::memcpy(light, &new_light, sizeof(Floats));
+            for (std::size_t k = 0; k < lights; ++k) {
+                float* const light = surfaces.light[k].data() + first;
+                const Floats own = u * t.of_a[k] + v * t.of_b[k] + w * t.of_c[k],
+                             l = texture ? texture->light.with_texture(own, its_texture) : own;
+                Floats old_light;
+                std::memcpy(&old_light, light, sizeof(Floats));
+                const Floats new_light = is_seen ? l : old_light;
+                std::memcpy(light, &new_light, sizeof(Floats));
+            }
         }
     }
 }
-void draw_plain(const Shown& t, float* heights, float* lights) { draw_rows<Float4>(t, heights, lights); }
+template <std::size_t lights>
+void draw_plain(const Shown<lights>& t, const ShownTexture* texture, Surfaces& surfaces) {
+    draw_rows<Float4>(t, texture, surfaces);
+}
 #if defined(UNSEEN_EIGHT_WIDE)
-UNSEEN_AVX2 void draw_avx2(const Shown& t, float* heights, float* lights) { draw_rows<Float8>(t, heights, lights); }
-#else
-constexpr auto draw_avx2 = draw_plain;
-#endif
-
-// The same with a texture, sample by sample, of texels no wider than the samples are apart: the cells' means smooth them.
-void draw_textured(const Shown& t, const TexturedLight& light, const std::array<glm::vec2, 3>& uv, float* heights,
-                   float* lights) {
-    const glm::vec2 ub = uv[1] - uv[0], uc = uv[2] - uv[0], size = light.texture->size();
-    const glm::vec2 along_x = (ub * t.v_by.x + uc * t.w_by.x) * size, along_y = (ub * t.v_by.y + uc * t.w_by.y) * size;
-    const float texels = std::max({std::abs(along_x.x), std::abs(along_x.y), std::abs(along_y.x), std::abs(along_y.y)});
-    const std::size_t first_wider = light.texture->level_of(texels), level = first_wider > 0 ? first_wider - 1 : 0;
-    const float left = std::min({t.a[0], t.b[0], t.c[0]}), right = std::max({t.a[0], t.b[0], t.c[0]});
-    for (std::size_t y = t.first; y < t.end; ++y) {
-        const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - t.a[1];
-        const std::size_t x0 = count_before(left - offset), x1 = count_before(right - offset);
-        for (std::size_t x = x0; x < x1; ++x) {
-            const float px = static_cast<float>(x) + offset - t.a[0];
-            const float v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
-            if (!(v >= 0 && w >= 0 && u >= 0)) continue;
-            const float height = u * t.a[2] + v * t.b[2] + w * t.c[2];
-            const std::size_t sample = y * samples + x;
-            if (!(height > heights[sample])) continue;
-            heights[sample] = height;
-            lights[sample] = light.with_texture(u * t.of_a + v * t.of_b + w * t.of_c,
-                                                light.texture->nearest(level, uv[0] + v * ub + w * uc));
-        }
-    }
+template <std::size_t lights>
+UNSEEN_AVX2 void draw_avx2(const Shown<lights>& t, const ShownTexture* texture, Surfaces& surfaces) {
+    draw_rows<Float8>(t, texture, surfaces);
 }
+#else
+template <std::size_t lights>
+constexpr auto draw_avx2 = draw_plain<lights>;
+#endif
 
 class Painter {
 public:
@@ -183,47 +198,53 @@ public:
         : light_(light), camera_(camera), positions_(tree.positions()), uvs_(tree.uvs()),
           closedness_(tree.closedness()), surfaces_(surfaces) {}
 
-    // Triangles over nodes, which are as bright as `luminance` says.
-    template <class Luminance>
-    Picture draw(std::span<const Triangle> triangles, const Luminance& luminance) {
-        surfaces_.clear();
-        for (const Triangle& t : triangles) draw(t, luminance);
-        return cells();
+    // Triangles over nodes, which are as bright under each light as `luminance` says.
+    template <std::size_t lights, class Luminance>
+    std::array<Picture, lights> draw(std::span<const Triangle> triangles, const Luminance& luminance) {
+        static_assert(lights <= most_lights);
+        surfaces_.clear(lights);
+        for (const Triangle& t : triangles) draw_one<lights>(t, luminance);
+        return cells<lights>();
     }
 
 private:
     // The means of the samples, four cells at a time.
-    Picture cells() const {
+    template <std::size_t lights>
+    std::array<Picture, lights> cells() const {
         static_assert(cell_samples == 4 && side % 4 == 0);
         constexpr float share = 1.0f / (cell_samples * cell_samples);
-        Picture picture;
+        std::array<Picture, lights> pictures;
         for (std::size_t cell = 0; cell < side * side; cell += 4) {
             const std::size_t first = cell / side * cell_samples * samples + cell % side * cell_samples;
-            Float4 light{}, covered{};
-            for (std::size_t y = 0; y < cell_samples; ++y) {
-                const auto columns_of = [&](const std::vector<float>& plane, Float4* columns) {
+            const auto mean = [&](const std::vector<float>& plane, const auto& of_sample, Raster& to) {
+                Float4 sum{};
+                for (std::size_t y = 0; y < cell_samples; ++y) {
+                    Float4 columns[cell_samples];
                     load_columns(
                         [&](std::size_t lane) { return plane.data() + first + y * samples + lane * cell_samples; },
                         columns);
-                };
-                Float4 lights[cell_samples], heights[cell_samples];
-                columns_of(surfaces_.light, lights);
-                columns_of(surfaces_.height, heights);
-                for (std::size_t x = 0; x < cell_samples; ++x) {
-                    light += lights[x];
-                    covered += heights[x] > nothing ? Float4{1, 1, 1, 1} : Float4{};
+                    for (const Float4& column : columns) sum += of_sample(column);
                 }
-            }
-            light *= share, covered *= share;
-            std::memcpy(picture.light.values.data() + cell, &light, sizeof light);
-            std::memcpy(picture.cover.values.data() + cell, &covered, sizeof covered);
+                sum *= share;
+                std::memcpy(to.values.data() + cell, &sum, sizeof sum);
+            };
+            mean(
+                surfaces_.height,
+                [](Float4 height) {
+                    return height > nothing ? Float4{1, 1, 1, 1} : Float4{};
+                },
+                pictures[0].cover);
+            for (std::size_t k = 0; k < lights; ++k)
+                mean(
+                    surfaces_.light[k], [](Float4 light) { return light; }, pictures[k].light);
         }
-        return picture;
+        for (std::size_t k = 1; k < lights; ++k) pictures[k].cover = pictures[0].cover;
+        return pictures;
     }
 
-    template <class Luminance>
-    void draw(const Triangle& corners, const Luminance& luminance) {
-        Shown t;
+    template <std::size_t lights, class Luminance>
+    void draw_one(const Triangle& corners, const Luminance& luminance) {
+        Shown<lights> t;
         t.a = camera_.place(positions_[corners[0]]);
         t.b = camera_.place(positions_[corners[1]]);
         t.c = camera_.place(positions_[corners[2]]);
@@ -240,10 +261,10 @@ private:
         t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
         t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
         t.of_a = luminance(corners[0]), t.of_b = luminance(corners[1]), t.of_c = luminance(corners[2]);
+        std::optional<ShownTexture> texture;
         if (light_.texture)
-            return draw_textured(t, light_, {uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]},
-                                 surfaces_.height.data(), surfaces_.light.data());
-        (has_avx2() ? draw_avx2 : draw_plain)(t, surfaces_.height.data(), surfaces_.light.data());
+            texture.emplace(t, light_, std::array{uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]});
+        (has_avx2() ? draw_avx2<lights> : draw_plain<lights>)(t, texture ? &*texture : nullptr, surfaces_);
     }
 
     const TexturedLight& light_;
@@ -399,7 +420,8 @@ public:
 
 private:
     Picture draw(Painter& painter, std::span<const Triangle> triangles) const {
-        return painter.draw(triangles, [&](NodeId node) -> float { return luminance_[node]; });
+        return std::move(
+            painter.draw<1>(triangles, [&](NodeId node) { return std::array<float, 1>{luminance_[node]}; })[0]);
     }
 
     std::span<const Unorm16> luminance_;
@@ -456,20 +478,28 @@ private:
 
     void draw(Painter& painter, std::span<const Triangle> triangles, const Camera& camera, Seen& seen) const {
         constexpr float golden_angle = 2.39996323f;
-        for (std::size_t i = 0; i < from_view.size(); ++i) {
-            const float around = golden_angle * static_cast<float>(camera.number * from_view.size() + i);
-            const glm::vec3 towards =
-                std::cos(from_view[i]) * camera.towards +
-                std::sin(from_view[i]) * (std::cos(around) * camera.right + std::sin(around) * camera.up);
-            seen.lit[i] = painter.draw(triangles, [&](NodeId node) {
-                const glm::vec4& vertex = normals_[node];
-                const float facing = glm::dot(glm::vec3(vertex), towards);
-                return facing > 0 ? facing * vertex.w : 0.0f;
-            });
+        std::array<glm::vec3, LitStages::lights> towards;
+        for (std::size_t i = 0; i < towards.size(); ++i) {
+            const float around = golden_angle * static_cast<float>(camera.number * towards.size() + i);
+            towards[i] = std::cos(from_view[i]) * camera.towards +
+                         std::sin(from_view[i]) * (std::cos(around) * camera.right + std::sin(around) * camera.up);
         }
+        const auto draw_lit = [&]<std::size_t pictures>() { // the last one painted, if there is one more
+            auto drawn = painter.draw<pictures>(triangles, [&](NodeId node) {
+                const glm::vec4& vertex = normals_[node];
+                std::array<float, pictures> luminance;
+                luminance.back() = vertex.w;
+                for (std::size_t i = 0; i < towards.size(); ++i)
+                    luminance[i] = std::max(glm::dot(glm::vec3(vertex), towards[i]), 0.0f) * vertex.w;
+                return luminance;
+            });
+            std::move(drawn.begin(), drawn.begin() + LitStages::lights, seen.lit.begin());
+            return drawn;
+        };
         if (has_albedo_) {
-            seen.painted = painter.draw(triangles, [&](NodeId node) { return normals_[node].w; });
+            seen.painted = std::move(draw_lit.template operator()<LitStages::lights + 1>().back());
         } else {
+            draw_lit.template operator()<LitStages::lights>();
             seen.painted = seen.lit.front();
             for (std::size_t i = 0; i < seen.painted.light.values.size(); ++i)
                 seen.painted.light.values[i] = normals_.front().w * seen.painted.cover.values[i];

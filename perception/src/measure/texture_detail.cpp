@@ -84,46 +84,29 @@ void TextureDetail::find_contrasts(std::size_t number) {
     }
 }
 
-float TextureDetail::mean_at(const Level& level, std::int64_t x, std::int64_t y) const {
-    const auto column = static_cast<std::size_t>(wrapped_texel(x, level.width, wrap_u_)),
-               row = static_cast<std::size_t>(wrapped_texel(y, level.height, wrap_v_));
-    return level.means[row * level.width + column];
-}
-
 float TextureDetail::bilinear(const Level& level, double u, double v) const {
     const double x = u * level.width - 0.5, y = v * level.height - 0.5;
     if (!(std::abs(x) < farthest_coordinate) || !(std::abs(y) < farthest_coordinate)) return levels_.back().means[0];
     const double fx = std::floor(x), fy = std::floor(y);
     const auto i = static_cast<std::int64_t>(fx), j = static_cast<std::int64_t>(fy);
     const auto s = static_cast<float>(x - fx), t = static_cast<float>(y - fy);
-    float corners[4];
-    if (i >= 0 && j >= 0 && i + 1 < level.width && j + 1 < level.height) { // most
-        const float* const first = level.means.data() + static_cast<std::size_t>(j) * level.width + i;
-        corners[0] = first[0], corners[1] = first[1], corners[2] = first[level.width],
-        corners[3] = first[level.width + 1];
-    } else {
-        for (int k = 0; k < 4; ++k) corners[k] = mean_at(level, i + k % 2, j + k / 2);
-    }
-    return (1 - t) * ((1 - s) * corners[0] + s * corners[1]) + t * ((1 - s) * corners[2] + s * corners[3]);
+    const std::int64_t left = wrapped_texel(i, level.width, wrap_u_),
+                       right = wrapped_texel(i + 1, level.width, wrap_u_);
+    const float *const low = level.means.data() + wrapped_texel(j, level.height, wrap_v_) * level.width,
+                       *const high = level.means.data() + wrapped_texel(j + 1, level.height, wrap_v_) * level.width;
+    return (1 - t) * ((1 - s) * low[left] + s * low[right]) + t * ((1 - s) * high[left] + s * high[right]);
 }
 
 float TextureDetail::at(std::size_t level, glm::vec2 uv) const {
     return bilinear(levels_[std::min(level, levels_.size() - 1)], static_cast<double>(uv.x), static_cast<double>(uv.y));
 }
 
-float TextureDetail::nearest(std::size_t number, glm::vec2 uv) const {
-    const Level& level = levels_[std::min(number, levels_.size() - 1)];
-    const float x = uv.x * static_cast<float>(level.width), y = uv.y * static_cast<float>(level.height);
+float TextureDetail::nearest_outside(const Level& level, float x, float y) const {
     constexpr auto farthest = static_cast<float>(farthest_coordinate);
     if (!(std::abs(x) < farthest) || !(std::abs(y) < farthest)) return levels_.back().means[0];
-    const auto whole = [](float at) {
-        const auto towards_zero = static_cast<std::int64_t>(at);
-        return towards_zero - (static_cast<float>(towards_zero) > at);
-    };
-    const std::int64_t i = whole(x), j = whole(y);
-    if (i >= 0 && j >= 0 && i < level.width && j < level.height)
-        return level.means[static_cast<std::size_t>(j) * level.width + static_cast<std::size_t>(i)];
-    return mean_at(level, i, j);
+    const auto column = wrapped_texel(static_cast<std::int64_t>(std::floor(x)), level.width, wrap_u_),
+               row = wrapped_texel(static_cast<std::int64_t>(std::floor(y)), level.height, wrap_v_);
+    return level.means[static_cast<std::size_t>(row * level.width + column)];
 }
 
 std::size_t TextureDetail::level_of(float texels) const {

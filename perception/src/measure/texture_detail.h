@@ -26,7 +26,7 @@ public:
 
     // The mean luminance of a level's texels, bilinear, as renderers filter; beyond 0..1 as the texture repeats.
     float at(std::size_t level, glm::vec2 uv) const;
-    // Likewise, but of the nearest texel.
+    // Likewise, but of the nearest texel. There must be such a level.
     float nearest(std::size_t level, glm::vec2 uv) const;
     // The level whose texels are the first to be no narrower than so many of the texture's own.
     std::size_t level_of(float texels) const;
@@ -50,7 +50,7 @@ private:
     };
 
     void find_contrasts(std::size_t level);
-    float mean_at(const Level& level, std::int64_t x, std::int64_t y) const;
+    float nearest_outside(const Level& level, float x, float y) const;
     float bilinear(const Level& level, double u, double v) const;
     static std::size_t runs_of(float lo, float hi, std::uint32_t size, vdtree::Wrap wrap, Run (&runs)[2]);
 
@@ -58,5 +58,14 @@ private:
     vdtree::Wrap wrap_u_, wrap_v_;
     std::vector<Level> levels_;
 };
+
+// Inline, for millions of samples.
+inline float TextureDetail::nearest(std::size_t number, glm::vec2 uv) const {
+    const Level& level = levels_[number];
+    const float width = static_cast<float>(level.width), height = static_cast<float>(level.height);
+    const float x = uv.x * width, y = uv.y * height;
+    if (!(x >= 0 && y >= 0 && x < width && y < height)) return nearest_outside(level, x, y); // repeated, or no number
+    return level.means[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)];
+}
 
 } // namespace unseen::perception

@@ -70,13 +70,11 @@ Result<void> validate(const TextureView& texture) {
 }
 
 std::int64_t wrapped_texel(std::int64_t i, std::int64_t size, Wrap wrap) noexcept {
-    const auto modulo = [i](std::int64_t n) { return (i % n + n) % n; };
-    switch (wrap) {
-    case Wrap::clamp: return std::clamp<std::int64_t>(i, 0, size - 1);
-    case Wrap::mirror: return std::min(modulo(2 * size), 2 * size - 1 - modulo(2 * size));
-    case Wrap::repeat: break;
-    }
-    return modulo(size);
+    if (i >= 0 && i < size) return i; // most; divisions take long
+    if (wrap == Wrap::clamp) return i < 0 ? 0 : size - 1;
+    const std::int64_t period = wrap == Wrap::mirror ? 2 * size : size, rest = i % period;
+    const std::int64_t within = rest < 0 ? rest + period : rest;
+    return within < size ? within : period - 1 - within; // mirrored
 }
 
 glm::vec4 linear_colour(Texel texel) noexcept {
