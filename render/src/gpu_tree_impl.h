@@ -1,6 +1,7 @@
 // What trees and cuts hold on the GPU.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -25,6 +26,12 @@ namespace unseen::render {
 struct Box {
     glm::vec3 low = glm::vec3(std::numeric_limits<float>::infinity()), high = -low;
     void include(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
+    std::array<glm::dvec3, 8> corners() const {
+        std::array<glm::dvec3, 8> all;
+        for (std::size_t i = 0; i < 8; ++i)
+            all[i] = glm::vec3(i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z);
+        return all;
+    }
 };
 
 // Vertices that are drawn elsewhere than where they belong.

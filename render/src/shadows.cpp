@@ -35,6 +35,10 @@ constexpr double ball_margin = 1e-3;
 // Lights are the same for two items where they differ by no more than rounding from frame to frame, in radii of the ball
 // and in radians.
 constexpr double same_light = 1e-5;
+// Around what receives shadows: looks take two, and samples of pixels lie about the surface.
+constexpr int texels_around = 8;
+// Beyond a window's border, in halves of a map's side: what may cover a texel of it by the rounding of single floats.
+constexpr double border_rounding = 1e-4;
 constexpr std::uint64_t texel_bytes = 4;
 constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
 
@@ -79,6 +83,28 @@ double tangent_of(const CastingLight& light, int size) {
     return window_share(size) * (is_wide(light) ? 1 : std::tan(std::acos(std::clamp(light.outer_cosine, 0.0, 1.0))));
 }
 
+glm::dmat4 ball_from_unit_of(const GpuCut& cut, const vdtree::Similarity& placement, const Ball& ball) {
+    const GpuTree::Impl& tree = cut.tree().impl();
+    glm::dmat4 ball_from_unit(glm::mat3_cast(placement.rotation) * (placement.scale * tree.frame.unit));
+    ball_from_unit[3] = glm::dvec4(placement.to_world(tree.tree.origin() + tree.frame.centre) - ball.centre, 1);
+    return ball_from_unit;
+}
+
+// Whether all of it lies beyond one side of a map's window, or behind the light.
+bool is_outside(const Box& box, const glm::dmat4& clip_from_unit, const Shadows::Impl::Window& window) {
+    const glm::dvec2 low = window.low - border_rounding, high = window.high + border_rounding;
+    bool is_left = true, is_right = true, is_below = true, is_above = true, is_behind = true;
+    for (const glm::dvec3& corner : box.corners()) {
+        const glm::dvec4 clip = clip_from_unit * glm::dvec4(corner, 1);
+        is_left &= clip.x < low.x * clip.w;
+        is_right &= clip.x > high.x * clip.w;
+        is_below &= clip.y < low.y * clip.w;
+        is_above &= clip.y > high.y * clip.w;
+        is_behind &= clip.w <= 0;
+    }
+    return is_left || is_right || is_below || is_above || is_behind;
+}
+
 bool is_same(const CastingLight& a, const CastingLight& b, const Ball& ball) {
     if (a.kind != b.kind || std::abs(a.outer_cosine - b.outer_cosine) > same_light) return false;
     if (a.kind != Kind::point && !(glm::length(a.direction - b.direction) <= same_light)) return false;
@@ -104,10 +130,7 @@ Ball ball_around(std::span<const Item> items) {
     std::vector<glm::dvec3> corners;
     for (const Item& item : items) {
         const GpuTree::Impl& tree = item.cut.tree().impl();
-        const Box& box = item.cut.impl().box;
-        for (int corner = 0; corner < 8; ++corner) {
-            const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
-                                corner & 4 ? box.high.z : box.low.z);
+        for (const glm::dvec3& at : item.cut.impl().box.corners()) {
             corners.push_back(item.placement.to_world(tree.tree.origin() + tree.frame.centre + tree.frame.unit * at));
             low = glm::min(low, corners.back()), high = glm::max(high, corners.back());
         }
@@ -124,6 +147,31 @@ bool Shadows::Impl::Caster::is_same(const Caster& other) const {
     return &cut.impl() == &other.cut.impl() && changes == other.changes && glides == other.glides &&
            placement.scale == other.placement.scale && placement.rotation == other.placement.rotation &&
            placement.translation == other.placement.translation;
+}
+
+bool Shadows::Impl::Window::holds(const Window& other) const {
+    return other.is_empty() ||
+           (other.low.x >= low.x && other.low.y >= low.y && other.high.x <= high.x && other.high.y <= high.y);
+}
+
+Shadows::Impl::Window Shadows::Impl::window_of(const Layer& layer, const Receivers& receivers) const {
+    const Window whole;
+    if (!receivers) return whole;
+    Window window{glm::dvec2(std::numeric_limits<double>::infinity()),
+                  glm::dvec2(-std::numeric_limits<double>::infinity())};
+    for (const Item& item : *receivers) {
+        const Box& box = item.cut.impl().box;
+        const glm::dmat4 clip_from_unit = layer.clip_from_ball * ball_from_unit_of(item.cut, item.placement, ball);
+        if (is_outside(box, clip_from_unit, whole)) continue;
+        for (const glm::dvec3& corner : box.corners()) {
+            const glm::dvec4 clip = clip_from_unit * glm::dvec4(corner, 1);
+            const glm::dvec2 at = glm::dvec2(clip) / clip.w;
+            if (!(clip.w > 0 && std::isfinite(at.x) && std::isfinite(at.y))) return whole; // around the light
+            window.low = glm::min(window.low, at), window.high = glm::max(window.high, at);
+        }
+    }
+    const double around = 2.0 * texels_around / options.size;
+    return {glm::max(window.low - around, whole.low), glm::min(window.high + around, whole.high)};
 }
 
 Result<void> Shadows::Impl::reserve(std::size_t wanted) {
@@ -185,23 +233,32 @@ void Shadows::Impl::aim() {
 }
 
 void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
+    const Window& window = layers[layer].window;
+    if (window.is_empty()) return;
+    if (window.is_whole()) {
+        glDisable(GL_SCISSOR_TEST);
+    } else {
+        const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(options.size)),
+                         end = glm::ceil((window.high + 1.0) / 2.0 * static_cast<double>(options.size));
+        set_scissor({static_cast<int>(first.x), static_cast<int>(first.y), static_cast<int>(end.x - first.x),
+                     static_cast<int>(end.y - first.y)});
+    }
     glNamedFramebufferTextureLayer(framebuffer.id(), GL_DEPTH_ATTACHMENT, maps.id(), 0, static_cast<GLint>(layer));
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer.id());
     const GLfloat infinitely_far = 0;
     glClearNamedFramebufferfv(framebuffer.id(), GL_DEPTH, 0, &infinitely_far);
     program.use();
+    const glm::dmat4 clip_from_ball =
+        glm::translate(glm::dmat4(1), glm::dvec3(shift, 0)) * layers[layer].clip_from_ball;
     for (const Caster& caster : drawn) {
         GpuCut::Impl& cut = caster.cut.impl();
         GpuTree::Impl& tree = cut.tree.impl();
         if (cut.indices.count() == 0) continue;
+        const glm::dmat4 clip_from_unit = clip_from_ball * ball_from_unit_of(caster.cut, caster.placement, ball);
+        if (is_outside(cut.box, clip_from_unit, window)) continue; // of six maps around a light, most
         cut.uploaded_bytes += tree.put(cut.glides);
         program.use(); // putting vertices takes another one
-        glm::dmat4 ball_from_unit(glm::mat3_cast(caster.placement.rotation) *
-                                  (caster.placement.scale * tree.frame.unit));
-        ball_from_unit[3] =
-            glm::dvec4(caster.placement.to_world(tree.tree.origin() + tree.frame.centre) - ball.centre, 1);
-        const glm::dmat4 shifted = glm::translate(glm::dmat4(1), glm::dvec3(shift, 0));
-        program.set(0, glm::mat4(shifted * layers[layer].clip_from_ball * ball_from_unit));
+        program.set(0, glm::mat4(clip_from_unit));
         glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
         glBindVertexArray(tree.arrays.id());
         for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call)
@@ -227,6 +284,7 @@ void Shadows::Impl::draw(const Program& program) {
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); // depth is reversed
     for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(program, layer);
+    glDisable(GL_SCISSOR_TEST);
     glQueryCounter(ended.id(), GL_TIMESTAMP);
 }
 
@@ -240,7 +298,7 @@ Result<void> Shadows::Impl::shift_texels(glm::dvec2 by) {
     return {};
 }
 
-Result<void> Shadows::Impl::update(std::span<const Item> casters) {
+Result<void> Shadows::Impl::update(std::span<const Item> casters, const Receivers& receivers) {
     std::vector<Caster> now;
     now.reserve(casters.size());
     std::optional<std::vector<CastingLight>> found; // of the first item that is lit
@@ -268,7 +326,8 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters) {
     const bool is_known = lit == lights && around.centre == ball.centre && around.radius == ball.radius &&
                           std::equal(now.begin(), now.end(), drawn.begin(), drawn.end(),
                                      [](const Caster& a, const Caster& b) { return a.is_same(b); });
-    if (is_known) return shift_texels(glm::dvec2(0.5));
+    const auto is_drawn = [&](const Layer& layer) { return layer.window.holds(window_of(layer, receivers)); };
+    if (is_known && std::all_of(layers.begin(), layers.end(), is_drawn)) return shift_texels(glm::dvec2(0.5));
     lights.clear(); // until it is done
     drawn.clear();
     int wanted = 0;
@@ -278,6 +337,7 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters) {
     ball = around;
     reach = ball.radius > 0 ? ball.radius : 1; // all in one point
     aim();
+    for (Layer& layer : layers) layer.window = window_of(layer, receivers);
     if (lights.empty()) return {};
     const auto program = context.impl().programs.surface({.output = Output::depth});
     if (!program) return lights.clear(), program.error();
@@ -301,9 +361,8 @@ Result<void> Shadows::Impl::check(const Item& item) const {
 ShadowUniforms Shadows::Impl::uniforms_of(const Item& item) const {
     const GpuTree::Impl& tree = item.cut.tree().impl();
     const double unit = item.placement.scale * tree.frame.unit;
-    glm::dmat4 ball_from_unit(glm::mat3_cast(item.placement.rotation) * unit);
     const glm::dvec3 middle = item.placement.to_world(tree.tree.origin() + tree.frame.centre);
-    ball_from_unit[3] = glm::dvec4(middle - ball.centre, 1);
+    const glm::dmat4 ball_from_unit = ball_from_unit_of(item.cut, item.placement, ball);
     ShadowUniforms uniforms;
     uniforms.world_from_unit = glm::mat4(glm::dmat4(glm::mat3_cast(item.placement.rotation)));
     const glm::dmat3 unit_from_world = glm::transpose(glm::mat3_cast(item.placement.rotation));
@@ -346,8 +405,8 @@ Shadows::Shadows(Shadows&&) noexcept = default;
 Shadows& Shadows::operator=(Shadows&&) noexcept = default;
 Shadows::~Shadows() = default;
 
-Result<void> Shadows::update(std::span<const Item> casters) {
-    return in_context(impl_->context, "Drawing shadow maps", [&] { return impl_->update(casters); });
+Result<void> Shadows::update(std::span<const Item> casters, const std::optional<std::span<const Item>>& receivers) {
+    return in_context(impl_->context, "Drawing shadow maps", [&] { return impl_->update(casters, receivers); });
 }
 
 ShadowFacts Shadows::counts() const noexcept {

@@ -49,16 +49,26 @@ struct Shadows::Impl {
         vdtree::Similarity placement;
         bool is_same(const Caster& other) const;
     };
+    // Of a map, in coordinates of -1 to 1.
+    struct Window {
+        glm::dvec2 low = glm::dvec2(-1), high = glm::dvec2(1);
+        bool is_empty() const { return !(low.x < high.x && low.y < high.y); }
+        bool is_whole() const { return low == glm::dvec2(-1) && high == glm::dvec2(1); }
+        bool holds(const Window& other) const;
+    };
     struct Layer {
         glm::dmat4 clip_from_ball = glm::dmat4(1); // places relative to the ball's centre
+        Window window = {};                        // what is drawn of it
     };
+    using Receivers = std::optional<std::span<const Item>>; // none: anything
 
-    Result<void> update(std::span<const Item> casters);
+    Result<void> update(std::span<const Item> casters, const Receivers& receivers);
     // Draws the maps of the last update's casters with their texels elsewhere, by so many in 0..1 of them; 0.5: as
     // update() does. Needs a current context.
     Result<void> shift_texels(glm::dvec2 by);
     Result<void> reserve(std::size_t layers);
     void aim();
+    Window window_of(const Layer& layer, const Receivers& receivers) const;
     void draw(const Program& program);
     void draw_layer(const Program& program, std::size_t layer);
 

@@ -232,9 +232,7 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
 
 void ShownPixels::add(const Projection& projection, const Box& box, glm::dvec2 point) {
     const glm::dmat4 clip_from_unit(jittered(projection, view_, point));
-    for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
-                            corner & 4 ? box.high.z : box.low.z);
+    for (const glm::dvec3& at : box.corners()) {
         const glm::dvec4 clip = clip_from_unit * glm::dvec4(at, 1);
         const glm::dvec2 pixel((clip.x / clip.w + 1) / 2 * view_.width, (1 - clip.y / clip.w) / 2 * view_.height);
         if (!(clip.w > 0 && std::isfinite(pixel.x) && std::isfinite(pixel.y))) {

@@ -314,6 +314,59 @@ TEST_F(ShadowTest, MapsAreDrawnAgainOnlyWhereSomethingChanged) {
     EXPECT_EQ(shadows->facts().bytes, 0u);
 }
 
+// Maps that are drawn where a pebble lies alone have the same shadows on it, to the bit.
+TEST_F(ShadowTest, AreTheSameWhereTheyAreLookedFor) {
+    const Scene pebble(shapes::icosphere(2));
+    GpuCut ground(*GpuTree::create(context(), floor.tree)), above(*GpuTree::create(context(), board.tree)),
+        stone(*GpuTree::create(context(), pebble.tree));
+    ASSERT_TRUE(ground.follow(floor.cut));
+    ASSERT_TRUE(above.follow(board.cut));
+    ASSERT_TRUE(stone.follow(pebble.cut));
+    const LightSource lights[] = {sun({1, 0.3, 1}), lamp({0.1, 0.2, 1}), lamp({0.35, 0, 0.2}),
+                                  torch({0.5, 0.5, 2}, {0, 0, 0}, 40)};
+    auto target = Target::create(context(), window_px, window_px, {.colours = {2, ColourFormat::rgba32f}});
+    for (const LightSource& light : lights) {
+        const auto item = [&](const GpuCut& cut, double scale, glm::dvec3 at) {
+            Item made{cut, {}, Shading::smooth, false, Lighting{.lights = {light}}};
+            made.placement.scale = scale;
+            made.placement.translation = at;
+            made.lighting->lights[0].position = (light.position - at) / scale - cut.tree().tree().origin();
+            return made;
+        };
+        std::vector<Item> items = {item(ground, 1, {0, 0, 0}), item(above, 1, {0, 0, 0})};
+        for (const glm::dvec3 at : {glm::dvec3(-0.5, -0.1, 0.1), glm::dvec3(0, 0, 0.1), glm::dvec3(0.2, 0.3, 0.3),
+                                    glm::dvec3(0.35, 0, 0.3), glm::dvec3(0.7, 0, 0.1)})
+            items.push_back(item(stone, 0.1, at));
+        const Ball bounds = ball_around(items);
+        auto all = Shadows::create(context(), {.size = map_px, .bounds = bounds}),
+             some = Shadows::create(context(), {.size = map_px, .bounds = bounds});
+        ASSERT_TRUE(all->update(items));
+        bool is_any_dark = false;
+        for (std::size_t i = 2; i < items.size(); ++i) {
+            const std::span<const Item> own(&items[i], 1);
+            const auto mask = [&](const Shadows& shadows) {
+                EXPECT_TRUE(render::draw(own, {.view = from_above(), .shadows = &shadows, .shadow_mask = 1}, *target));
+                return *read_pixels(*target, 1);
+            };
+            ASSERT_TRUE(some->update(items, own));
+            const std::vector<glm::vec4> expected = mask(*all);
+            EXPECT_EQ(mask(*some), expected);
+            for (const glm::vec4& pixel : expected) is_any_dark |= pixel[0] < 0.5f;
+        }
+        EXPECT_TRUE(is_any_dark);
+        // What is there is not drawn again, and what is not is.
+        auto redraws = [&, fresh = Shadows::create(context(), {.size = map_px, .bounds = bounds})](
+                           const std::optional<std::span<const Item>>& receivers) mutable {
+            EXPECT_TRUE(fresh->update(items, receivers));
+            return fresh->facts().redraws;
+        };
+        EXPECT_EQ(redraws(std::span<const Item>(&items.back(), 1)), 1u);
+        EXPECT_EQ(redraws(std::span<const Item>(&items.back(), 1)), 1u);
+        EXPECT_EQ(redraws(std::nullopt), 2u);
+        EXPECT_EQ(redraws(std::span<const Item>(&items[2], 1)), 2u);
+    }
+}
+
 TEST_F(ShadowTest, RefusesWhatCannotBe) {
     for (const int size : {0, 1 << 20}) {
         const auto shadows = Shadows::create(context(), {.size = size});

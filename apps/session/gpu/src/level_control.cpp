@@ -152,7 +152,8 @@ struct LevelControl::Impl {
     render::LuminanceTexture luminance_of(const render::Target& target) const;
     Result<void> map(int left_out);
     Result<void> combine(int left_out);
-    Result<void> cast(const std::vector<render::Item>& casters, std::optional<render::Shadows>& shadows) const;
+    Result<void> cast(const std::vector<render::Item>& casters, std::optional<render::Shadows>& shadows,
+                      const std::optional<std::span<const render::Item>>& receivers = std::nullopt) const;
     std::vector<char> find_shaded(const render::LayerSplit& split, const std::vector<std::size_t>& in_sight) const;
     std::uint64_t shadow_redraws() const;
     render::ThresholdTexture thresholds_texture(int left_out) const;
@@ -292,13 +293,14 @@ Result<void> LevelControl::Impl::map(int left_out) {
 
 // ---- shadows
 
-Result<void> LevelControl::Impl::cast(const std::vector<render::Item>& from, std::optional<render::Shadows>& to) const {
+Result<void> LevelControl::Impl::cast(const std::vector<render::Item>& from, std::optional<render::Shadows>& to,
+                                      const std::optional<std::span<const render::Item>>& receivers) const {
     if (!to) {
         auto made = render::Shadows::create(context, {.bounds = reach});
         if (!made) return made.error();
         to = std::move(*made);
     }
-    return to->update(from);
+    return to->update(from, receivers);
 }
 
 // By layer: whether anything that is not in it may cast a shadow on one of its objects.
@@ -329,11 +331,11 @@ Result<void> LevelControl::Impl::combine(int left_out) {
     const auto layer = static_cast<std::size_t>(left_out);
     if (!shadows || left_out < 0 || layer >= is_shaded.size() || !is_shaded[layer])
         return passes->layers.combine(left_out);
-    std::vector<render::Item> others;
+    std::vector<render::Item> others, of_layer;
     for (std::size_t i = 0; i < casters.size(); ++i)
-        if (caster_layers[i] != left_out) others.push_back(casters[i]);
+        (caster_layers[i] == left_out ? of_layer : others).push_back(casters[i]);
     if (std::ranges::none_of(others, is_in_casting_light)) return passes->layers.combine(left_out);
-    if (auto drawn = cast(others, other_shadows); !drawn) return drawn;
+    if (auto drawn = cast(others, other_shadows, of_layer); !drawn) return drawn;
     return passes->layers.combine(left_out, &*other_shadows);
 }
 
@@ -605,10 +607,13 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         // Shadows are those of the better levels as well, or what a better level's surface has of a worse one's shadow on
         // itself would count. All else casts its own.
         if (!casters.empty()) {
-            std::vector<render::Item> better = casters;
-            for (std::size_t i = 0; i < in_sight.size(); ++i)
-                if (frame.tested_with[in_sight[i]] >= 0) better[in_sight[i]].cut = tested[i].cut;
-            if (auto drawn = cast(better, other_shadows); !drawn) return drawn.error();
+            std::vector<render::Item> better = casters, compared;
+            for (std::size_t i = 0; i < in_sight.size(); ++i) {
+                if (frame.tested_with[in_sight[i]] < 0) continue;
+                better[in_sight[i]].cut = tested[i].cut;
+                compared.push_back(tested[i]);
+            }
+            if (auto drawn = cast(better, other_shadows, compared); !drawn) return drawn.error();
         }
         if (auto drawn = passes->counts.draw_depth(all, {.view = view,
                                                          .near_plane = layers.near_plane(),

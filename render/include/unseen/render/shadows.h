@@ -55,7 +55,11 @@ public:
     // Draws the maps where the casters, their cuts or the lights are others than before; else does nothing. The lights
     // are those of the items' lighting, which must be the same in the world for all that are lit. Fails where they are
     // not, where draw() does, and where memory runs out.
-    Result<void> update(std::span<const Item> casters);
+    //
+    // `receivers`: what shadows will be looked for on until the next update, where that is not all; the maps are drawn
+    // where these lie alone, which costs less. On other items there are then any shadows.
+    Result<void> update(std::span<const Item> casters,
+                        const std::optional<std::span<const Item>>& receivers = std::nullopt);
 
     ShadowFacts facts() const;           // waits for the GPU
     ShadowFacts counts() const noexcept; // the same without draw_ms; waits for nothing
