@@ -4,7 +4,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace calibrate_window_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -135,4 +135,4 @@ TEST_F(CalibrateWindowTest, TheChartStaysUntilAKey) {
     EXPECT_TRUE(unseen::perception::read_image(path("c.png")));
 }
 
-} // namespace
+} // namespace calibrate_window_test

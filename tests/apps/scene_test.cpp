@@ -14,7 +14,7 @@
 #include "mesh_files.h"
 #include "shapes.h"
 
-namespace {
+namespace scene_test {
 
 using namespace unseen;
 using namespace unseen::app::testing;
@@ -422,4 +422,4 @@ TEST_F(SceneTest, MakesScenesOfEachKind) {
     EXPECT_EQ(run({"scene", "make", "museum", "-o", "x.glb", "--mesh", "gone.ply"}).status, 1);
 }
 
-} // namespace
+} // namespace scene_test

@@ -3,7 +3,7 @@
 
 #include <unseen/perception/image.h>
 
-namespace {
+namespace study_window_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -81,4 +81,4 @@ TEST_F(StudyWindowTest, SaysWhichPictureItCannotShow) {
     }
 }
 
-} // namespace
+} // namespace study_window_test

@@ -4,7 +4,7 @@
 #include "mesh_files.h"
 #include "user_file.h"
 
-namespace {
+namespace scan_test {
 
 using namespace unseen::app::testing;
 using mesh_files::little;
@@ -318,4 +318,4 @@ TEST_F(ScanUsers, ParaViewsPolygons) {
                 << out;
 }
 
-} // namespace
+} // namespace scan_test

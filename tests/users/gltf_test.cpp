@@ -3,7 +3,7 @@
 #include "gltf_scene.h"
 #include "painted_file.h"
 
-namespace {
+namespace gltf_test {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
@@ -250,4 +250,4 @@ TEST_F(GltfUsers, OtherFormatsGetTheCoordinatesThatAreDrawn) {
     EXPECT_TRUE(look_the_same("hills.glb", "hills.vdt"));
 }
 
-} // namespace
+} // namespace gltf_test

@@ -9,7 +9,7 @@
 #include <glm/vec2.hpp>
 #include <unseen/perception/image.h>
 
-namespace {
+namespace view_test {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
@@ -393,4 +393,4 @@ TEST_F(ViewCommandTest, ThePictureThatWasAskedForDecidesTheStatus) {
     EXPECT_THAT(errors(), HasSubstr("last.png"));
 }
 
-} // namespace
+} // namespace view_test

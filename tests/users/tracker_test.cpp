@@ -3,7 +3,7 @@
 
 #include "user_file.h"
 
-namespace {
+namespace tracker_test {
 
 using namespace unseen::app::testing;
 
@@ -76,4 +76,4 @@ TEST_F(TrackerUsers, BlinksHoldTheGaze) {
     }
 }
 
-} // namespace
+} // namespace tracker_test

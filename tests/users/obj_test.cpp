@@ -2,7 +2,7 @@
 #include "obj_file.h"
 #include "painted_file.h"
 
-namespace {
+namespace obj_test {
 
 using namespace unseen::app::testing;
 using ::testing::ElementsAre;
@@ -144,4 +144,4 @@ TEST_F(ObjUsers, ImagesCoordinatesAndGroups) {
     }
 }
 
-} // namespace
+} // namespace obj_test
