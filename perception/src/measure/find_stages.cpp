@@ -490,7 +490,7 @@ private:
                 std::array<float, pictures> luminance;
                 luminance.back() = vertex.w;
                 for (std::size_t i = 0; i < towards.size(); ++i)
-                    luminance[i] = std::max(glm::dot(glm::vec3(vertex), towards[i]), 0.0f) * vertex.w;
+                    luminance[i] = std::max(0.0f, glm::dot(glm::vec3(vertex), towards[i])) * vertex.w;
                 return luminance;
             });
             std::move(drawn.begin(), drawn.begin() + LitStages::lights, seen.lit.begin());
