@@ -56,8 +56,8 @@ public:
     // are those of the items' lighting, which must be the same in the world for all that are lit. Fails where they are
     // not, where draw() does, and where memory runs out.
     //
-    // `receivers`: what shadows will be looked for on until the next update, where that is not all; the maps are drawn
-    // where these lie alone, which costs less. On other items there are then any shadows.
+    // `receivers`: the items that will be drawn with these shadows until the next update; default: any. The maps are drawn
+    // only where the receivers lie, which costs less. Other items would have wrong shadows.
     Result<void> update(std::span<const Item> casters,
                         const std::optional<std::span<const Item>>& receivers = std::nullopt);
 
