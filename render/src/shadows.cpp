@@ -235,14 +235,10 @@ void Shadows::Impl::aim() {
 void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
     const Window& window = layers[layer].window;
     if (window.is_empty()) return;
-    if (window.is_whole()) {
-        glDisable(GL_SCISSOR_TEST);
-    } else {
-        const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(options.size)),
-                         end = glm::ceil((window.high + 1.0) / 2.0 * static_cast<double>(options.size));
-        set_scissor({static_cast<int>(first.x), static_cast<int>(first.y), static_cast<int>(end.x - first.x),
-                     static_cast<int>(end.y - first.y)});
-    }
+    const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(options.size)),
+                     end = glm::ceil((window.high + 1.0) / 2.0 * static_cast<double>(options.size));
+    set_scissor({static_cast<int>(first.x), static_cast<int>(first.y), static_cast<int>(end.x - first.x),
+                 static_cast<int>(end.y - first.y)});
     glNamedFramebufferTextureLayer(framebuffer.id(), GL_DEPTH_ATTACHMENT, maps.id(), 0, static_cast<GLint>(layer));
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer.id());
     const GLfloat infinitely_far = 0;

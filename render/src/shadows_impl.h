@@ -53,7 +53,6 @@ struct Shadows::Impl {
     struct Window {
         glm::dvec2 low = glm::dvec2(-1), high = glm::dvec2(1);
         bool is_empty() const { return !(low.x < high.x && low.y < high.y); }
-        bool is_whole() const { return low == glm::dvec2(-1) && high == glm::dvec2(1); }
         bool holds(const Window& other) const;
     };
     struct Layer {
