@@ -15,7 +15,10 @@ Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyB
     session::Session& session = subject.session;
     // Each gaze asks for criteria of its own, of every object: with many that takes minutes.
     constexpr std::size_t most_objects = 16;
-    if (session.scene().objects.size() > most_objects) return AccuracyPoints();
+    if (session.scene().objects.size() > most_objects) {
+        subject.left_out.push_back("all of it, for it has more than " + std::to_string(most_objects) + " objects.");
+        return AccuracyPoints();
+    }
     session::Request request{.purpose = session::Purpose::picture};
     request.reasons = false;
     // Whatever happens, the session is left without a gaze, as it was.
@@ -58,23 +61,27 @@ Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyB
     return points;
 }
 
-Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const AccuracyBenchOptions&) {
-    auto renderer = session::SceneRenderer::create(subject.context, subject.session);
-    if (!renderer) return renderer.error();
+Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
+    constexpr int frames = 16;
+    auto judge = session::PictureJudge::create(subject.context, subject.session, view_on_walk(subject.view, frames),
+                                               options.samples);
+    if (!judge) return judge.error();
     AccuracyPoints points;
     double without = 0;
     for (const int served : {0, 1, 2, 4, 8}) { // frames; 0: no pictures
         TreeWalkOptions how;
-        how.frames = 16;
+        how.frames = frames;
         how.first_counted = 3;
+        how.judge = &*judge;
         if (served > 0) how.occlusion = session::MovingOcclusionOptions{.frames = served};
-        const auto walk = walk_tree(subject.session, subject.context, *renderer, subject.view, how);
+        const auto walk = walk_tree(subject.session, subject.context, judge->renderer(), subject.view, how);
         if (!walk) return walk.error();
         if (served == 0) without = std::max(walk->triangles, 1.0);
         points.push_back({.name = served == 0
                                       ? "no pictures"
                                       : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames"),
-                          .values = {static_cast<double>(walk->pictures) / (how.frames + 1), walk->triangles / without},
+                          .values = {static_cast<double>(walk->pictures) / (how.frames + 1), walk->triangles / without,
+                                     walk->verdict->v, static_cast<double>(walk->verdict->visible)},
                           .is_default = served == session::MovingOcclusionOptions().frames});
     }
     return points;

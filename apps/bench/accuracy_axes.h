@@ -19,7 +19,8 @@ struct AccuracySubject {
     const render::Context& context;
     vdtree::View view;
     bool is_scene = false;
-    double build_s = 0, measure_s = 0; // of its trees, and of what their folds change; from files 0
+    double build_s = 0, measure_s = 0;      // of its trees, and of what their folds change; from files 0
+    std::vector<std::string> left_out = {}; // by an axis: names of points and why, as sentences
 };
 
 using AccuracyPoints = std::vector<AccuracyPoint>;

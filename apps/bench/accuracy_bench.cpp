@@ -69,7 +69,7 @@ const std::vector<AxisMeasure>& all_axes() {
         {{"measurement",
           "fold measurement",
           "What the errors of folds are measured by, and whether what folds by them shows.",
-          {"seconds", "V", "triangles", "pixels visible", "triangles from 8 times as far"},
+          {"seconds", "V", "triangles", "pixels visible", "triangles from 8 times as far", "V from there"},
           {{0, 1}, {2, 1}}},
          Of::meshes,
          measurement_points},
@@ -103,7 +103,7 @@ const std::vector<AxisMeasure>& all_axes() {
           "trees",
           "How vertices are clustered, and by how many threads: the surface at a tenth of the triangles.",
           {"seconds to build", "mean distance of vertices from the surface, millionths of the extent",
-           "V, drawn in the default view", "bytes a triangle"}},
+           "V, drawn in the default view", "bytes a triangle", "us a frame, followed at 1 px"}},
          Of::meshes,
          tree_points},
         {{"gaze",
@@ -115,8 +115,9 @@ const std::vector<AxisMeasure>& all_axes() {
          gaze_age_points},
         {{"depth",
           "age of a picture of depth",
-          "How long one picture of depth serves a moving eye: what it may not hide for that.",
-          {"pictures a frame", "triangles kept, of those without occlusion"}},
+          "How long one picture of depth serves a moving eye, what it may not hide for that, and whether what it hides "
+          "shows at the end of a walk.",
+          {"pictures a frame", "triangles kept, of those without occlusion", "V", "pixels visible"}},
          Of::scenes,
          depth_age_points}};
     return axes;
@@ -193,7 +194,8 @@ void find_fronts(const std::vector<AccuracyAxis>& axes, std::vector<AccuracyPoin
 
 // ---- tables
 
-BenchTable axis_table(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points) {
+BenchTable axis_table(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& points,
+                      const std::vector<AccuracyGap>& gaps) {
     BenchTable table;
     table.title = axis.name + ": " + axis.question;
     std::vector<std::string> header = {"of", ""};
@@ -209,6 +211,8 @@ BenchTable axis_table(const AccuracyAxis& axis, const std::vector<AccuracyPoint>
         table.rows.push_back(std::move(row));
     }
     table.notes.push_back("* on the front: no other costs less and is nearer to the truth.");
+    for (const AccuracyGap& gap : gaps)
+        if (gap.axis == axis.key) table.notes.push_back("Not measured of " + gap.subject + ": " + gap.what);
     return table;
 }
 
@@ -294,7 +298,10 @@ Json to_json(const AccuracyBenchResult& result) {
                           {"pareto", p.is_on_front},
                           {"note", p.note}});
     }
-    return {{"axes", std::move(axes)}, {"points", std::move(points)}};
+    Json gaps = Json::array();
+    for (const AccuracyGap& gap : result.gaps)
+        gaps.push_back({{"axis", gap.axis}, {"subject", gap.subject}, {"what", gap.what}});
+    return {{"axes", std::move(axes)}, {"points", std::move(points)}, {"not_measured", std::move(gaps)}};
 }
 
 } // namespace
@@ -362,6 +369,8 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
             const auto start = BenchClock::now();
             if (auto ok = add(axis->axis, loaded->subject.name, axis->measure(loaded->subject, options)); !ok)
                 return ok.error();
+            for (std::string& what : std::exchange(loaded->subject.left_out, {}))
+                result.gaps.push_back({axis->axis.key, loaded->subject.name, std::move(what)});
             seconds.push_back({{"axis", axis->axis.key},
                                {"subject", loaded->subject.name},
                                {"seconds", number_or_null(seconds_since(start))}});
@@ -373,7 +382,7 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
     });
     find_fronts(result.axes, result.points);
     result.tables.push_back(defaults_table(result.axes, result.points));
-    for (const AccuracyAxis& axis : result.axes) result.tables.push_back(axis_table(axis, result.points));
+    for (const AccuracyAxis& axis : result.axes) result.tables.push_back(axis_table(axis, result.points, result.gaps));
     result.json = to_json(result);
     result.json["seconds"] = std::move(seconds);
     return result;

@@ -16,7 +16,7 @@ struct AccuracyBenchOptions {
     std::vector<std::string> models = {}; // meshes, trees and scenes; none: what is installed, and made scenes
     bool has_scenes = false;              // the made ones, too, where there are models
     std::vector<std::string> only = {};   // keys of axes; none: all
-    double seconds = 45;                  // for each model's ways to fold
+    double seconds = 300;                 // for each model's ways to fold, at most
     int samples = 64;                     // of pictures that are judged
     int window_px = 512;
     std::uint64_t scene_triangles = 200'000; // of each made scene, about
@@ -46,9 +46,16 @@ struct AccuracyPoint {
     double error() const { return values[1]; }
 };
 
+// What was asked for and not measured.
+struct AccuracyGap {
+    std::string axis, subject; // as of points
+    std::string what;          // names of points and why, as a sentence
+};
+
 struct AccuracyBenchResult {
     std::vector<AccuracyAxis> axes; // those that were asked for
     std::vector<AccuracyPoint> points;
+    std::vector<AccuracyGap> gaps;
     std::vector<BenchTable> tables; // what the defaults buy, then an axis each
     Json json;
 };

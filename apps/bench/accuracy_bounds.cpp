@@ -363,7 +363,8 @@ Result<AccuracyPoints> facing_points(AccuracySubject& subject, const AccuracyBen
     const vdtree::SoundTree& tree = *sound;
     constexpr Index most_leaves = 64; // larger nodes are silhouettes from nearly everywhere
     const std::vector<NodeId> nodes = some_nodes(tree, options.nodes, [&](NodeId node) {
-        return tree.leaf_end()[node] - tree.first_leaf()[node] <= most_leaves && tree.bounds()[node].ring.radius > 0;
+        const bool moves = tree.support_spheres()[node].radius > 0; // else the fold changes nothing, and none asks
+        return moves && tree.leaf_end()[node] - tree.first_leaf()[node] <= most_leaves;
     });
     if (nodes.empty()) return AccuracyPoints();
     const Rings around(tree);
@@ -450,10 +451,12 @@ Result<AccuracyPoints> facing_points(AccuracySubject& subject, const AccuracyBen
     add(
         "the tree's own slabs and masks", sizeof(vdtree::NormalSlabs) + sizeof(vdtree::NormalMask),
         [&](std::size_t k, const Sight& s) {
+            if (tree.bounds()[nodes[k]].flags & vdtree::irregular_ring) return Facing::mixed;
             return facing(
                 tree.bounds()[nodes[k]].slabs, [&] { return tree.mask(nodes[k]); }, s.to_eye, s.distance, s.radius);
         },
-        "of more triangles: one more ring, and what folds nearby make of them", false);
+        "of more triangles: one more ring, and what folds nearby make of them; borders are outlines from everywhere",
+        false);
     return points;
 }
 

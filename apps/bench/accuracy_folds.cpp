@@ -74,10 +74,12 @@ public:
         }
         double triangles = 0;
         for (const vdtree::Cut& cut : cuts) triangles += cut.triangle_count();
+        const bool is_of_subject = &renderer == &judge_.renderer();
+        const double shift_mm = is_of_subject ? 1e3 * session::largest_shift(subject_.session, cuts) : unknown;
         return AccuracyPoint{
             .name = name,
             .values = {median(std::move(times)), verdict->v, triangles, static_cast<double>(verdict->visible),
-                       static_cast<double>(verdict->second_visible), 1 - verdict->ssim, unknown, preparation_s, bytes},
+                       static_cast<double>(verdict->second_visible), 1 - verdict->ssim, shift_mm, preparation_s, bytes},
             .note = note};
     }
 
@@ -222,6 +224,10 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
     tradeoff.samples = tradeoff.least_samples = options.samples; // what is seen must not depend on what else runs
     const auto measured = session::measure_tradeoff(subject.session, subject.context, subject.view, tradeoff);
     if (!measured) return measured.error();
+    for (const std::string& name : measured->left_out) { // a name, or a name and why
+        const bool is_for_time = name.find(": ") == std::string::npos;
+        subject.left_out.push_back(is_for_time ? name + ": no time was left (--seconds)." : name);
+    }
     const TreeBytes bytes = bytes_a_triangle(subject.session);
     AccuracyPoints points;
     for (const session::TradeoffPoint& p : measured->points) {

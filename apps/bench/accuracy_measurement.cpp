@@ -24,15 +24,40 @@ Result<vdtree::VertexTree> without_stages(const vdtree::VertexTree& tree) {
                                 std::vector<std::uint8_t>(tree.interior_count()));
 }
 
+struct Judged {
+    double triangles;
+    session::PictureVerdict verdict;
+};
+Result<Judged> judged(session::Session& session, session::SceneRenderer& renderer, const vdtree::View& view,
+                      const session::PictureJudge& judge) {
+    const auto made = session.simplify(view, {.purpose = session::Purpose::picture, .reasons = false});
+    if (!made) return made.error();
+    const auto frame = renderer.draw(session::drawn_cuts(made->cuts), view, judge.drawing());
+    if (!frame) return frame.error();
+    const auto verdict = judge.judge(*frame);
+    if (!verdict) return verdict.error();
+    return Judged{static_cast<double>(made->stats.triangles), *verdict};
+}
+
 } // namespace
 
 Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    // Measured once for each way: larger meshes take minutes.
-    constexpr vdtree::Index most_triangles = 200'000;
+    // Measured once for each way: larger meshes take too many minutes.
+    constexpr vdtree::Index most_triangles = 1'000'000;
     const vdtree::VertexTree& tree = subject.session.tree();
-    if (tree.triangle_count() > most_triangles || !tree.texture().empty()) return AccuracyPoints();
-    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
+    if (tree.triangle_count() > most_triangles || !tree.texture().empty()) {
+        subject.left_out.push_back(tree.texture().empty()
+                                       ? "all of it, for it has more than " + grouped(most_triangles) + " triangles."
+                                       : "all of it, for it has a texture.");
+        return AccuracyPoints();
+    }
+    constexpr double times_as_far = 8;
+    vdtree::View far = subject.view;
+    far.eye = far.target + times_as_far * (far.eye - far.target);
+    const auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
     if (!judge) return judge.error();
+    const auto judge_far = session::PictureJudge::create(subject.context, subject.session, far, options.samples);
+    if (!judge_far) return judge_far.error();
     AccuracyPoints points;
     const auto add = [&](const std::string& name, const std::function<Result<vdtree::VertexTree>()>& measure,
                          const std::string& note, bool is_default) -> Result<void> {
@@ -42,25 +67,16 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
         const double seconds = seconds_since(start);
         auto session = session::Session::create(session::Scene::of(std::move(*measured)), subject.session.observer());
         if (!session) return session.error();
-        session::Request request{.purpose = session::Purpose::picture};
-        request.reasons = false;
-        const auto made = session->simplify(subject.view, request);
-        if (!made) return made.error();
-        constexpr double times_as_far = 8;
-        vdtree::View far = subject.view;
-        far.eye = far.target + times_as_far * (far.eye - far.target);
-        const auto made_far = session->simplify(far, request);
-        if (!made_far) return made_far.error();
         auto renderer = session::SceneRenderer::create(subject.context, *session);
         if (!renderer) return renderer.error();
-        const auto frame = renderer->draw(session::drawn_cuts(made->cuts), subject.view, judge->drawing());
-        if (!frame) return frame.error();
-        const auto verdict = judge->judge(*frame);
-        if (!verdict) return verdict.error();
+        const auto near = judged(*session, *renderer, subject.view, *judge);
+        if (!near) return near.error();
+        const auto from_far = judged(*session, *renderer, far, *judge_far);
+        if (!from_far) return from_far.error();
         points.push_back(
             {.name = name,
-             .values = {seconds, verdict->v, static_cast<double>(made->stats.triangles),
-                        static_cast<double>(verdict->visible), static_cast<double>(made_far->stats.triangles)},
+             .values = {seconds, near->verdict.v, near->triangles, static_cast<double>(near->verdict.visible),
+                        from_far->triangles, from_far->verdict.v},
              .note = note,
              .is_default = is_default});
         return {};

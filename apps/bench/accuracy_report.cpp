@@ -106,6 +106,9 @@ std::string to_html(const AccuracyBenchResult& result) {
             for (const auto& columns : axis.plots) html += svg_of(lay_out(axis, points, columns));
             html += "<details><summary>as a table</summary>" + html_table(axis, points) + "</details>";
         }
+        for (const AccuracyGap& gap : result.gaps)
+            if (gap.axis == axis.key)
+                html += "<p>Not measured of " + html_text(gap.subject) + ": " + html_text(gap.what) + "</p>";
     }
     return html + "</body></html>\n";
 }

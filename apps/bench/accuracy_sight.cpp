@@ -324,8 +324,9 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
         "thresholds are " + rounded(median_ratio(rpg99->threshold, *modern), 2) + " x modern's at the median pixel",
         false);
 
+    const std::string twin = ", a twin: the picture is rounded before";
     const auto add_modern = [&](const std::string& name, const perception::Image& image, int block, std::size_t bands,
-                                double bytes, bool is_default) -> Result<void> {
+                                double bytes, bool is_default, const std::string& note = {}) -> Result<void> {
         perception::JudgeOptions how = judging;
         how.display = display_of(block);
         if (how.gaze_px) *how.gaze_px /= static_cast<double>(block);
@@ -349,7 +350,7 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
         });
         if (!ms) return ms.error();
         add(name, *ms, map_errors(map, image.width, block, *modern), bytes,
-            std::to_string(tables->bands.size()) + " bands", is_default);
+            std::to_string(tables->bands.size()) + " bands" + note, is_default);
         return {};
     };
     const auto bytes_of = [&](const perception::Image& image, double each) {
@@ -358,7 +359,7 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
     constexpr double of_picture = 4, of_half = 2, of_map = 4; // bytes
     const perception::Image half = block_means(picture, 2), quarter = block_means(picture, 4);
     if (auto ok = add_modern("modern", picture, 1, 0, of_picture + of_map, true); !ok) return ok.error();
-    if (auto ok = add_modern("modern, 16 bits", in_half_floats(picture), 1, 0, of_half + of_map, false); !ok)
+    if (auto ok = add_modern("modern, 16 bits", in_half_floats(picture), 1, 0, of_half + of_map, false, twin); !ok)
         return ok.error();
     if (auto ok = add_modern("modern, half the resolution", half, 2, 0, bytes_of(half, of_picture + of_map), false);
         !ok)
@@ -371,8 +372,8 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
             !ok)
             return ok.error();
 
-    const auto add_rpg99 = [&](const std::string& name, const perception::Image& image, int block,
-                               double bytes) -> Result<void> {
+    const auto add_rpg99 = [&](const std::string& name, const perception::Image& image, int block, double bytes,
+                               const std::string& note = {}) -> Result<void> {
         const auto tables = perception::rpg99_tables(image.width, rpg99_options(image.width, block));
         if (!tables) return tables.error();
         auto up = render::LuminanceImage::create(subject.context, image.width, image.height, image.values);
@@ -389,11 +390,12 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
             return {};
         });
         if (!ms) return ms.error();
-        add(name, *ms, map_errors(map, image.width, block, rpg99->threshold), bytes, "against rpg99's", false);
+        add(name, *ms, map_errors(map, image.width, block, rpg99->threshold), bytes, "against rpg99's" + note, false);
         return {};
     };
     if (auto ok = add_rpg99("rpg99", picture, 1, of_picture + of_map); !ok) return ok.error();
-    if (auto ok = add_rpg99("rpg99, 16 bits", in_half_floats(picture), 1, of_half + of_map); !ok) return ok.error();
+    if (auto ok = add_rpg99("rpg99, 16 bits", in_half_floats(picture), 1, of_half + of_map, twin); !ok)
+        return ok.error();
     if (auto ok = add_rpg99("rpg99, half the resolution", half, 2, bytes_of(half, of_picture + of_map)); !ok)
         return ok.error();
     if (auto ok = add_rpg99("rpg99, a quarter", quarter, 4, bytes_of(quarter, of_picture + of_map)); !ok)

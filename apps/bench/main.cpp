@@ -641,7 +641,7 @@ Command accuracy_command(CLI::App& app) {
     verb->add_option("--only", a->options.only, "These axes alone, of " + keys + "; may be given again (default: all)")
         ->type_name("AXIS")
         ->check(one_of(accuracy_axis_keys()));
-    verb->add_option("--seconds", a->options.seconds, "For the ways to fold of each model (default: 45)")
+    verb->add_option("--seconds", a->options.seconds, "For the ways to fold of each model, at most (default: 300)")
         ->type_name("T")
         ->check(positive());
     verb->add_option("--window", a->options.window_px, "Its side (default: 512)")

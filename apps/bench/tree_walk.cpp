@@ -52,6 +52,14 @@ Result<TreeWalk> walk_tree(const session::Session& session, const render::Contex
         walk.triangles += static_cast<double>(report->stats.triangles) / counted;
         walk.frame_ms += 1e3 * seconds_since(start) / counted;
     }
+    if (options.judge) {
+        const auto frame = renderer.draw(session::drawn_cuts(follower, session.scene().objects.size()),
+                                         view_on_walk(first, options.frames), options.judge->drawing());
+        if (!frame) return frame.error();
+        auto verdict = options.judge->judge(*frame);
+        if (!verdict) return verdict.error();
+        walk.verdict = *verdict;
+    }
     if (!occlusion) return walk;
     walk.pictures = occlusion->facts().pictures;
     walk.occlusion_ms = occlusion->facts().milliseconds / static_cast<double>(occlusion->facts().frames);

@@ -59,6 +59,9 @@ Result<std::vector<MeasuredSensitivity>> parse_sensitivities(std::string_view te
                 const auto found = std::find(fields.begin(), fields.end(), column_names[c]);
                 if (found == fields.end())
                     return invalid_argument(where + "there is no column " + std::string(column_names[c]) + ".");
+                if (std::find(found + 1, fields.end(), column_names[c]) != fields.end())
+                    return invalid_argument(where + "the column " + std::string(column_names[c]) +
+                                            " is there twice: remove or rename one of them.");
                 columns[c] = static_cast<std::size_t>(found - fields.begin());
             }
             has_header = true;

@@ -770,6 +770,24 @@ TEST_F(SimplifyTest, AFileThatMayNotBeWrittenToIsRefused) {
     EXPECT_THAT(files(), ::testing::Each(Not(StartsWith("."))));
 }
 
+TEST_F(SimplifyTest, AFolderThatMayNotBeWrittenToIsRefused) {
+    fs::create_directory(path("locked"));
+    fs::permissions(path("locked"), fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
+                                        fs::perms::others_exec);
+    fs::permissions(folder(), fs::perms::all);
+    std::string nobody;
+    if (::geteuid() == 0) nobody = "setpriv --reuid=65534 --regid=65534 --clear-groups ";
+    if (run_shell(nobody + "'" UNSEEN_COMMAND "' --version").status != 0) GTEST_SKIP() << "nobody cannot run it";
+    for (const std::string words : {"simplify ball.vdt --triangles 100 -o locked/o.ply", "build ball.obj -o locked/o.vdt",
+                                    "simplify ball.vdt --triangles 100 -o o.ply --json locked/o.json"}) {
+        const Outcome refused = run_shell(nobody + "'" UNSEEN_COMMAND "' " + words);
+        EXPECT_EQ(refused.status, 1) << words;
+        EXPECT_THAT(refused.err, AllOf(IsAnErrorForPeople(), HasSubstr("locked"), HasSubstr("Permission denied"))) << words;
+        EXPECT_TRUE(fs::is_empty(path("locked"))) << words;
+        EXPECT_FALSE(fs::exists(path("o.ply"))) << words;
+    }
+}
+
 // Before there is anything to be waited for: here, a look at what is read.
 TEST_F(UsageTest, NamesThatCannotBeAreRefusedFirst) {
     const std::string name(300, 'a');

@@ -1,7 +1,13 @@
-// unseen build --memory: the same tree in less memory, and one clear sentence where memory or the disk is too small.
+// unseen build --memory: the same tree in less memory, and one clear sentence where memory or the disk is too small. And
+// trees that are too large to be read into memory.
 #include <csignal>
+#include <vector>
+
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "run_command.h"
+#include "shapes.h"
 
 namespace {
 
@@ -48,6 +54,31 @@ protected:
 
     static constexpr const char* limit = "0.1";
 };
+
+// Trees of 256 MiB and more are read in place.
+TEST_F(MemoryTest, ATreeCutShortWhileItIsDrawnIsAnError) {
+    const auto tree = unseen::vdtree::build_tree(unseen::shapes::bumpy_sphere(4).view());
+    ASSERT_TRUE(tree);
+    constexpr std::size_t ballast = (std::size_t{256} << 20) / sizeof(float);
+    const auto heavy =
+        tree->with_attribute("ballast", unseen::vdtree::AttributeDomain::tree, std::vector<float>(ballast, 1.0f));
+    ASSERT_TRUE(heavy);
+    ASSERT_TRUE(unseen::vdtree::write_tree(path("heavy.vdt"), *heavy));
+    if (run({"render", "heavy.vdt", "--pixels", "1", "-o", "o.png"}).err.find("No OpenGL") != std::string::npos)
+        GTEST_SKIP() << "no OpenGL";
+    const fs::path log = folder().string() + ".log";
+    const pid_t process = start(
+        {"render", "heavy.vdt", "--pixels", "1", "--path", "orbit:0.01:1000000", "--csv", "frames.csv"}, log, log);
+    ASSERT_GT(process, 0);
+    const fs::path maps = "/proc/" + std::to_string(process) + "/maps";
+    for (int i = 0; i < 3000 && read_text(maps).find("heavy.vdt") == std::string::npos; ++i) usleep(10'000);
+    usleep(300'000); // the first frames
+    fs::resize_file(path("heavy.vdt"), 0);
+    EXPECT_EQ(wait_for(process), 1);
+    EXPECT_THAT(read_text(log), HasSubstr("heavy.vdt' was cut short while it was read: write it anew"));
+    EXPECT_THAT(files(), UnorderedElementsAre("heavy.vdt", "o.png"));
+    for (const fs::path& file : {log, fs::path(log.string() + ".in")}) fs::remove(file);
+}
 
 TEST_F(MemoryTest, TheTreeIsTheSame) {
     write_large();

@@ -241,6 +241,7 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     RecordProperty("eyeratio", std::to_string(seen.max_ratio));
     EXPECT_GT(seen.visible_pixels, 0) << seen.max_ratio;
 }
+
 // From where nothing of the shadow is seen past its edge and into its middle, frame by frame.
 TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
     Setting setting = settings()[6];
@@ -273,6 +274,37 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
         ASSERT_TRUE(difference);
         EXPECT_EQ(difference->visible_pixels, 0) << "frame " << frame << ": " << difference->max_ratio;
     }
+}
+
+// What a cut made from scratch keeps for its shadows is told by its own view, whatever was looked at before.
+TEST_P(ShadowCut, FromScratchDependsOnNoViewBefore) {
+    const Setting setting = settings()[GetParam()];
+    const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
+    const vdtree::View view = view_of(setting);
+    session::Request request;
+    request.purpose = session::Purpose::picture;
+    const auto triangles_of = [&](session::Session& session) {
+        const auto made = session.simplify(view, request);
+        EXPECT_TRUE(made);
+        const auto indices = made ? made->cuts[0].indices() : std::span<const vdtree::NodeId>();
+        return std::vector<vdtree::NodeId>(indices.begin(), indices.end());
+    };
+    auto unused = session::Session::create(scene_of(setting, ball, ground, true));
+    ASSERT_TRUE(unused);
+    const auto first = triangles_of(*unused);
+    EXPECT_EQ(triangles_of(*unused), first);
+
+    auto used = session::Session::create(scene_of(setting, ball, ground, true));
+    ASSERT_TRUE(used);
+    session::Follower follower(*used);
+    for (const double degrees : {0.0, 0.5, 1.0, 20.0}) {
+        ASSERT_TRUE(follower.follow(vdtree::orbited(view, degrees), request));
+        EXPECT_EQ(triangles_of(*used), first) << degrees;
+    }
+    request.threshold = 0.5;
+    ASSERT_TRUE(used->simplify(view, request));
+    ASSERT_TRUE(unused->simplify(view, request));
+    EXPECT_EQ(triangles_of(*used), triangles_of(*unused));
 }
 
 INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 12),

@@ -2,13 +2,11 @@
 // of bad ones.
 #include "run_command.h"
 
-#include <cstdio> // what jpeglib.h counts on
 #include <functional>
-
-#include <jpeglib.h>
 
 #include <unseen/perception/image.h>
 
+#include "jpeg_file.h"
 #include "tree_file.h"
 
 namespace texture_command_test {
@@ -19,6 +17,7 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using unseen::perception::Image;
+using unseen::support::jpeg;
 using unseen::perception::read_image;
 
 class TextureCommandTest : public CommandTest {
@@ -54,36 +53,6 @@ protected:
     void write_png(const std::string& name, const Image& image) const {
         const auto written = unseen::perception::write_image(path(name), image);
         ASSERT_TRUE(written) << written.error().message;
-    }
-    std::string jpeg(const Image& image) const {
-        jpeg_compress_struct info{};
-        jpeg_error_mgr errors{};
-        info.err = jpeg_std_error(&errors);
-        jpeg_create_compress(&info);
-        unsigned char* bytes = nullptr;
-        unsigned long size = 0;
-        jpeg_mem_dest(&info, &bytes, &size);
-        info.image_width = static_cast<JDIMENSION>(image.width);
-        info.image_height = static_cast<JDIMENSION>(image.height);
-        info.input_components = 3;
-        info.in_color_space = JCS_RGB;
-        jpeg_set_defaults(&info);
-        jpeg_set_quality(&info, 95, TRUE);
-        jpeg_start_compress(&info, TRUE);
-        while (info.next_scanline < info.image_height) {
-            std::vector<JSAMPLE> row;
-            for (int i = 0; i < 3 * image.width; ++i)
-                row.push_back(
-                    static_cast<JSAMPLE>(255 * image.values[static_cast<std::size_t>(
-                                                   static_cast<int>(info.next_scanline) * 3 * image.width + i)]));
-            JSAMPROW rows = row.data();
-            jpeg_write_scanlines(&info, &rows, 1);
-        }
-        jpeg_finish_compress(&info);
-        std::string out(reinterpret_cast<const char*>(bytes), size);
-        jpeg_destroy_compress(&info);
-        std::free(bytes);
-        return out;
     }
     // Pictures are drawn as they are, without light.
     Json build(const std::string& mesh, std::vector<std::string> more = {}) const {

@@ -1,14 +1,29 @@
-// Fuzz target for the readers of images, PNG, PFM and EXR: any bytes must give an error, or an image whose values are
-// numbers and as many as it says. tests/README.md tells how to build and run it.
+// Fuzz target for the readers of images, PNG, PFM and EXR, and of textures, which may be JPEG, too: any bytes must give an
+// error, or an image whose values are numbers and as many as it says. tests/README.md tells how to build and run it.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <vector>
 
+#include <string_view>
+
 #include <unseen/perception/image.h>
 
+#include "texture_image.h"
+
+namespace {
+
+void read_texture(std::string_view bytes) {
+    const auto texture = unseen::session::decode_texture(bytes, "fuzz", true);
+    if (texture ? texture->texels.empty() || !unseen::vdtree::validate(texture->view()) : texture.error().message.empty())
+        std::abort();
+}
+
+} // namespace
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    read_texture({reinterpret_cast<const char*>(data), size});
     const auto read = unseen::perception::decode_image(std::vector<unsigned char>(data, data + size), "fuzz");
     if (!read) {
         if (read.error().message.empty()) std::abort();

@@ -17,6 +17,8 @@
 
 #include "built.h"
 #include "compressed_glb.h"
+#include "jpeg_file.h"
+#include "mesh_files.h"
 #include "shapes.h"
 #include "vtk_files.h"
 
@@ -68,6 +70,22 @@ void make_meshes(const fs::path& folder) {
           "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
           "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
           "\"nodes\":[0]}]}");
+    write(folder / "colours.mtl",
+          "\10newmtl a\nKd 0.5 0.25 1\nd 0.5\nmap_Kd -s 2 2 1 -o 0 0 0 images/a.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n");
+}
+
+// Read as a scene: instances, a camera, lights.
+void make_scene(const fs::path& folder) {
+    const std::string json = mesh_files::gltf_triangle_json(
+        R"([{"mesh":0,"name":"a","translation":[1,0,0],"children":[1]},{"mesh":0,"scale":[2,2,2]},)"
+        R"({"camera":0,"rotation":[0,0.7071068,0,0.7071068]},)"
+        R"({"extensions":{"KHR_lights_punctual":{"light":1}}}])",
+        R"({"byteLength":42})",
+        R"(,"cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}],)"
+        R"("extensionsUsed":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[)"
+        R"({"type":"directional","intensity":3,"color":[1,0.5,0]},{"type":"spot","intensity":7,"range":4,)"
+        R"("spot":{"innerConeAngle":0.2,"outerConeAngle":0.5}}]}})");
+    write(folder / "scene.glb", '\4' + mesh_files::glb(json, mesh_files::gltf_triangle_data()));
 }
 
 void make_vtk(const fs::path& folder) {
@@ -141,6 +159,7 @@ void make_images(const fs::path& folder) {
         expect(unseen::perception::write_image(folder / ("grey" + std::string(ending)), grey));
         expect(unseen::perception::write_image(folder / ("colours" + std::string(ending)), colours));
     }
+    write(folder / "colours.jpg", unseen::support::jpeg(colours));
 }
 
 // The first byte chooses the reader: see text_fuzz.cpp.
@@ -181,6 +200,7 @@ void make_texts(const fs::path& folder) {
     write(folder / "path.csv",
           "\11eye_x,eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\n0,0,5,0,0,0,3,4\n1,0,5,0,0,"
           "0,3,4\n");
+    write(folder / "photometer.csv", "\12code,cdm2\n# of a display\n0,0.5\n128,20\n255,100\n");
     fs::remove(plain);
 }
 
@@ -223,6 +243,7 @@ int main(int count, char** arguments) try {
     for (const char* target : {"mesh", "tree", "follow", "image", "text", "selection"})
         fs::create_directories(folder / target);
     make_meshes(folder / "mesh");
+    make_scene(folder / "mesh");
     make_vtk(folder / "mesh");
     make_trees(folder / "tree");
     make_drives(folder / "follow");

@@ -1,4 +1,5 @@
-// Fuzz target for the mesh readers: any bytes may come in, and only a valid mesh or an error may come out.
+// Fuzz target for the readers of meshes, scenes and materials: any bytes may come in, and only a valid mesh or an error
+// may come out.
 // tests/README.md tells how to build and run it. With other compilers than clang define UNSEEN_FUZZ_STANDALONE for a
 // main() that runs the files named on the command line.
 #include "mesh_readers.h"
@@ -17,18 +18,30 @@
 namespace {
 
 // Formats without a signature go by the name's ending; the first byte chooses it.
-constexpr const char* names[] = {"fuzz.ply",  "fuzz.obj", "fuzz.off", "fuzz.stl",
-                                 "fuzz.gltf", "fuzz",     "fuzz.vtp", "fuzz.vtk"};
+constexpr const char* names[] = {"fuzz.ply", "fuzz.obj", "fuzz.off", "fuzz.stl", "fuzz.gltf",
+                                 "fuzz",     "fuzz.vtp", "fuzz.vtk", "fuzz.mtl"};
+
+// Materials lie beside an OBJ file; no folder is read here, and so they come by themselves.
+void read_materials(std::string_view bytes, const char* name) {
+    unseen::meshio::MtlContents contents;
+    const auto read = unseen::meshio::read_mtl(bytes, name, true, contents);
+    if (!read && read.error().message.empty()) std::abort();
+}
 
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size == 0) return 0;
     const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
+    const char* const name = names[data[0] % std::size(names)];
+    if (std::string_view(name).ends_with(".mtl")) {
+        read_materials(bytes, name);
+        return 0;
+    }
     unseen::meshio::ReadOptions options;
     options.skip_bad = data[0] >= 128;
-    if (std::string_view(names[data[0] % std::size(names)]).ends_with(".gltf")) { // as a scene, too
-        auto scene = unseen::meshio::SceneFile::from_bytes(std::string(bytes), "fuzz.gltf", options);
+    if (std::string_view(name).ends_with(".gltf")) { // as a scene, too
+        auto scene = unseen::meshio::SceneFile::from_bytes(std::string(bytes), name, options);
         if (!scene && scene.error().message.empty()) std::abort();
         std::set<std::int32_t> meshes;
         if (scene)
@@ -38,7 +51,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
             if (read && *read && !unseen::vdtree::validate((*read)->mesh.view())) std::abort();
         }
     }
-    const auto result = unseen::meshio::read_mesh_bytes(bytes, names[data[0] % std::size(names)], options);
+    const auto result = unseen::meshio::read_mesh_bytes(bytes, name, options);
     if (!result) {
         if (result.error().message.empty()) std::abort();
         return 0;

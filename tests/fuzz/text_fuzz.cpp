@@ -1,5 +1,5 @@
 // Fuzz target for what people and other programs write down: profiles of displays, observers and lights, sensitivities,
-// a calibration that goes on, studies and their answers, recorded gazes, camera paths. Any bytes, after one that chooses
+// a calibration that goes on, studies and their answers, recorded gazes, camera paths, photometers. Any bytes, after one that chooses
 // the reader, must give an error with a message, or something valid. tests/README.md tells how to build and run it.
 #include <cstddef>
 #include <cstdint>
@@ -48,10 +48,11 @@ void read_as(unsigned reader, const std::filesystem::path& file) {
         expect(app::CameraPath::read(file.string(), {0, 1, 0}),
                [](const auto& path) { return !path.poses_from(vdtree::View()).empty(); });
         break;
+    case 10: expect(calibration::read_photometer(file), anything); break;
     default: break;
     }
 }
-constexpr unsigned readers = 10;
+constexpr unsigned readers = 11;
 
 } // namespace
 

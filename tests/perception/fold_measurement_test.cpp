@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <random>
 #include <span>
@@ -394,6 +395,18 @@ TEST(FoldErrors, AreFiniteForHardMeshes) {
             for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.bias})
                 ASSERT_TRUE(std::isfinite(value) && value >= 0);
     }
+}
+
+// However many triangles meet in one edge: the time goes with them, not with their square.
+TEST(FoldErrors, TakeTimeInProportionToAFan) {
+    const auto cpu_seconds = [](int pages) {
+        const VertexTree tree = support::built(shapes::non_manifold_fan(pages));
+        const std::clock_t start = std::clock();
+        EXPECT_TRUE(measure_folds(tree));
+        return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+    };
+    const double few = cpu_seconds(200), many = cpu_seconds(1600);
+    EXPECT_LT(many, 24 * few) << "8 is linear, 64 the square";
 }
 
 TEST(FoldErrors, AreKeptInTheFile) {

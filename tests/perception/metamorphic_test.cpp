@@ -221,17 +221,16 @@ TEST_F(Metamorphic, AStillViewIsAFixedPoint) {
         for (const View& view : views) {
             const Viewpoint viewpoint = viewpoint_of(tree, view, options_for(view));
             ASSERT_TRUE(cut.follow(criterion, viewpoint, options));
-            const auto before = support::sorted_triangles(cut);
+            const std::vector<NodeId> before(cut.indices().begin(), cut.indices().end());
             const std::uint64_t version = cut.index_version();
-            cut.indices();
             for (int again = 0; again < 3; ++again) {
                 const auto stats = cut.follow(criterion, viewpoint, options);
                 ASSERT_TRUE(stats);
                 EXPECT_EQ(stats->node_tests + stats->folds + stats->unfolds, 0u);
                 EXPECT_TRUE(cut.changes().empty());
             }
-            EXPECT_EQ(support::sorted_triangles(cut), before);
-            EXPECT_GE(cut.index_version(), version);
+            EXPECT_TRUE(std::ranges::equal(cut.indices(), before)) << "in the same order";
+            EXPECT_EQ(cut.index_version(), version);
         }
     }
 }

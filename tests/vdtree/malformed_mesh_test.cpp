@@ -1,11 +1,16 @@
 // Files that lie, end early or were damaged: one clear sentence, no crash, no allocation out of proportion.
 #include <unseen/meshio/mesh_io.h>
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "compressed_glb.h"
 #include "largest_allocation.h"
 #include "mesh_files.h"
 #include "mesh_readers.h"
+#include "shapes.h"
+#include "temp_folder.h"
 #include "text_scanner.h"
+#include "tree_file.h"
 #include "vtk_files.h"
 
 #include <cstdint>
@@ -737,6 +742,47 @@ TEST(MalformedMesh, FurtherMeshesLoadOrFailAsExpected) {
     }
     fs::remove(temporary);
     EXPECT_GT(files, 0) << folder << " is empty";
+}
+
+// Tables of sections that claim what is not there: one section, or each, the whole file or more than any disk has.
+TEST(MalformedTree, AsksForNoMoreMemoryThanItsFileIsWorth) {
+    using support::TreeFile;
+    const auto tree = build_tree(shapes::cube(1).view());
+    ASSERT_TRUE(tree);
+    const support::TempFolder folder;
+    const fs::path file = folder / "t.vdt";
+    ASSERT_TRUE(write_tree(file, *tree));
+    const std::string good = support::read_bytes(file);
+    const std::size_t sections = TreeFile::parse(good).sections.size();
+    const auto claim = [](std::string& bytes, std::size_t section, std::uint64_t size) {
+        const std::size_t entry = TreeFile::header_bytes + section * TreeFile::entry_bytes;
+        const auto each = support::load<std::uint32_t>(bytes, entry + TreeFile::element_bytes_at);
+        support::store(bytes, entry + TreeFile::offset_at, std::uint64_t{0});
+        support::store(bytes, entry + TreeFile::count_at, size / each);
+    };
+    const auto expect_refused = [&](std::string bytes, std::size_t section) {
+        TreeFile::seal(bytes);
+        support::write_bytes(file, bytes);
+        largest_allocation = 0;
+        const auto read = read_tree(file);
+        EXPECT_LE(largest_allocation.load(), allowed_bytes + allowed_bytes_per_byte * bytes.size()) << section;
+        ASSERT_FALSE(read) << section;
+        EXPECT_THAT(read.error().message, HasSubstr("t.vdt")) << section;
+    };
+    constexpr std::uint64_t no_disk = std::uint64_t{1} << 50;
+    for (const std::uint64_t size : {std::uint64_t{good.size()}, no_disk}) {
+        std::string all = good;
+        for (std::size_t i = 0; i < sections; ++i) {
+            std::string one = good;
+            claim(one, i, size);
+            expect_refused(std::move(one), i);
+            claim(all, i, size);
+        }
+        expect_refused(std::move(all), sections);
+    }
+    std::string longer = good;
+    support::store(longer, TreeFile::file_bytes_at, no_disk);
+    expect_refused(std::move(longer), sections);
 }
 
 } // namespace

@@ -100,7 +100,9 @@ TEST(Numerics, NodesBehindTheEye) {
     std::vector<NodeId> nodes(tree.interior_count());
     for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
     std::vector<Visibility> seen(nodes.size());
-    for (int round = 0; round < 50; ++round) {
+    constexpr double fields[] = {1, 90, 120, 179.9};
+    for (int round = 0; round < 80; ++round) {
+        view.fov_y_degrees = fields[round % 4];
         view.eye = random_direction(random) * random_between(random, 0.5, 1.5);
         view.target = view.eye + random_direction(random);
         FrustumVisibility(tree, view)(tree, nodes, seen);
@@ -304,6 +306,8 @@ TEST(Numerics, SliversAndTrianglesWithoutArea) {
             // Of an open surface either side may be the outer one.
             EXPECT_LT(std::min(glm::distance(normal, truth), glm::distance(-normal, truth)), bound) << round;
         }
+        const NormalMask mask = tree.mask(VertexTree::root());
+        EXPECT_TRUE(mask.contains(normal_cell(truth)) || mask.contains(normal_cell(-truth))) << round;
     }
     EXPECT_GT(naive_lost, rounds * 9 / 10);
     // Without an area there is no direction, and no facing to be wrong about.

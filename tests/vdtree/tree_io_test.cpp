@@ -517,22 +517,6 @@ TEST_F(TreeIo, SurvivesRandomLies) {
     EXPECT_GT(accepted, 100);    // normals, masks, slabs and small changes of values
 }
 
-TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {
-    // A table in which every section claims the whole file: at most so often its size.
-    const std::string good = bytes_of(built(shapes::cube(1)));
-    std::string bad = good;
-    const std::size_t sections = TreeFile::parse(good).sections.size();
-    for (std::size_t i = 0; i < sections; ++i) {
-        const std::size_t entry = TreeFile::header_bytes + i * TreeFile::entry_bytes;
-        support::store(bad, entry + TreeFile::offset_at, std::uint64_t{0});
-        support::store(
-            bad, entry + TreeFile::count_at,
-            std::uint64_t{bad.size() / support::load<std::uint32_t>(bad, entry + TreeFile::element_bytes_at)});
-    }
-    TreeFile::seal(bad);
-    EXPECT_FALSE(read_bytes(bad));
-}
-
 // ---- mapped files
 
 // The node at which the triangles of a tree are the most.

@@ -340,16 +340,17 @@ bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
                                    : outline_shifts(tree, tree.displacement(), {}, nullptr);
     }
     const auto reach = reach_of(sight, decision, base->edges);
-    if (!is_new && state.reach == reach) return false;
+    const bool is_first = !state.reach;
+    if (state.reach == reach) return false;
     state.reach = reach;
-    if (!is_new) {
+    if (!is_first) {
         const auto needed = shadowing_outlines(sight.object, state.shifts, *reach, threshold);
         const auto most = static_cast<std::size_t>((1 + most_kept_too_many) * static_cast<double>(count(needed)));
         if (contains(state.kept, needed) && count(state.kept) <= most) return false;
     }
     const double share = reach->moves() ? share_left_to_motion : 1;
     auto kept = shadowing_outlines(sight.object, state.shifts, *reach, share * threshold);
-    const bool is_other = is_new || kept != state.kept;
+    const bool is_other = is_first || kept != state.kept;
     state.kept = std::move(kept);
     return is_other;
 }

@@ -289,6 +289,7 @@ const vdtree::Geomorph* Follower::geomorph(std::size_t object) const {
 Result<Simplification> Session::simplify(const vdtree::View& view, const Request& request) {
     Request once = request;
     once.hysteresis = 1; // with no cut before, nothing is to keep still
+    const State::OneView one_view(*state_);
     Follower follower(*this);
     auto report = follower.follow(view, once);
     if (!report) return report.error();

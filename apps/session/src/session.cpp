@@ -262,6 +262,22 @@ Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
     return {};
 }
 
+Session::State::OneView::OneView(State& state)
+    : state_(state), shadows_(state.shadows_), reach_(std::exchange(state.scene_shadows_.reach, nullptr)) {
+    for (ShadowState& shadow : state.shadows_) {
+        shadow.reach.reset();
+        shadow.kept.clear();
+        shadow.criterion.reset();
+        shadow.hidden.reset();
+    }
+}
+
+Session::State::OneView::~OneView() {
+    if (!reach_) return; // nobody has followed anything yet, so this view serves as the first
+    state_.shadows_ = std::move(shadows_);
+    state_.scene_shadows_.reach = std::move(reach_);
+}
+
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
     if (const auto valid = vdtree::validate(view); !valid) return valid.error();
     window_ = window_of(view);

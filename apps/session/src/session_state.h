@@ -34,6 +34,20 @@ public:
     // Of all objects, then of the backdrop.
     Result<std::shared_ptr<const vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
 
+    // While it lives, shadows are decided as if no view had been looked at before. Then followers' views count again.
+    class OneView {
+    public:
+        explicit OneView(State& state);
+        OneView(const OneView&) = delete;
+        OneView& operator=(const OneView&) = delete;
+        ~OneView();
+
+    private:
+        State& state_;
+        std::vector<ShadowState> shadows_;
+        std::shared_ptr<const ShadowReach> reach_;
+    };
+
     Scene scene;
     Observer observer;
     Messages messages;

@@ -57,19 +57,6 @@ std::vector<Way> ways(const Session& session) {
     return all;
 }
 
-double largest_shift(const Session& session, const std::vector<vdtree::Cut>& cuts) {
-    double most = 0;
-    for (std::size_t i = 0; i < cuts.size(); ++i) {
-        const vdtree::VertexTree& tree = cuts[i].tree();
-        const auto displacement = tree.displacement();
-        float in_mesh = 0;
-        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
-            if (cuts[i].is_active(node)) in_mesh = std::max(in_mesh, displacement[node]);
-        most = std::max(most, session.scene().objects[i].placement.scale * static_cast<double>(in_mesh));
-    }
-    return most;
-}
-
 class Measurement {
 public:
     static Result<Measurement> create(Session& session, const render::Context& context, const vdtree::View& view,
@@ -206,6 +193,19 @@ void recommend(std::vector<TradeoffPoint>& points) {
 }
 
 } // namespace
+
+double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts) {
+    double most = 0;
+    for (std::size_t i = 0; i < cuts.size(); ++i) {
+        const vdtree::VertexTree& tree = cuts[i].tree();
+        const auto displacement = tree.displacement();
+        float in_mesh = 0;
+        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+            if (cuts[i].is_active(node)) in_mesh = std::max(in_mesh, displacement[node]);
+        most = std::max(most, session.scene().objects[i].placement.scale * static_cast<double>(in_mesh));
+    }
+    return most;
+}
 
 Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& context, const vdtree::View& view,
                                   const TradeoffOptions& options) {

@@ -101,9 +101,10 @@ public:
     // do so by themselves.
     Result<std::vector<Plan>> prepare(const vdtree::View& view, const Request& request);
 
-    // The cuts that meet the request, from scratch. A budget is shared by all objects, so that the largest fold cost is
-    // the least; other goals go object by object, before the luminance of all of them. With several objects, budgets
-    // can be neither filled nor limited in time. Cost: a microsecond for each node test.
+    // The cuts that meet the request, from scratch: those of this view, whatever was looked at before. A budget is shared
+    // by all objects, so that the largest fold cost is the least; other goals go object by object, before the luminance
+    // of all of them. With several objects, budgets can be neither filled nor limited in time. Cost: a microsecond for
+    // each node test.
     Result<Simplification> simplify(const vdtree::View& view, const Request& request = {});
     Result<Simplification> simplify(const Request& request = {}) { return simplify(default_view(), request); }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,8 +35,8 @@ struct TradeoffPoint {
                   second_visible_pixels = 0; // against the full model, by the judge and the second one
     double v = 0, second_v = 0;              // the largest difference, in thresholds
     double ssim = 1;                         // of code values
-    double shift = 0;         // world units: how far a vertex of the full model is from what stands for it, at most
-    bool is_on_front = false; // no other point has fewer triangles and a smaller V
+    double shift = 0;                        // see largest_shift()
+    bool is_on_front = false;                // no other point has fewer triangles and a smaller V
     bool is_recommended = false;
 };
 
@@ -45,6 +46,9 @@ struct Tradeoff {
     int samples = 0;                        // of the pictures that were judged
     double measuring_s = 0;                 // of the errors of folds, before all points; next to 0 where they are kept
 };
+
+// World units: how far a vertex of the full model is from what stands for it in cuts of the session's trees, at most.
+double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts);
 
 // Measures points in the order of what they tell: the full model, the default test at several thresholds, the others,
 // budgets. Recommended is, of the points that hold for moving views and show nothing to either judge, the one whose
