@@ -77,12 +77,12 @@ Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const Accuracy
         const auto walk = walk_tree(subject.session, subject.context, judge->renderer(), subject.view, how);
         if (!walk) return walk.error();
         if (served == 0) without = std::max(walk->triangles, 1.0);
-        points.push_back({.name = served == 0
-                                      ? "no pictures"
-                                      : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames"),
-                          .values = {static_cast<double>(walk->pictures) / (how.frames + 1), walk->triangles / without,
-                                     walk->verdict->v, static_cast<double>(walk->verdict->visible)},
-                          .is_default = served == session::MovingOcclusionOptions().frames});
+        points.push_back(
+            {.name = served == 0 ? "no pictures"
+                                 : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames"),
+             .values = {walk->triangles / without, walk->verdict->v, static_cast<double>(walk->verdict->visible),
+                        static_cast<double>(walk->pictures) / (how.frames + 1)},
+             .is_default = served == session::MovingOcclusionOptions().frames});
     }
     return points;
 }

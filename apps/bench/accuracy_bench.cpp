@@ -117,7 +117,7 @@ const std::vector<AxisMeasure>& all_axes() {
           "age of a picture of depth",
           "How long one picture of depth serves a moving eye, what it may not hide for that, and whether what it hides "
           "shows at the end of a walk.",
-          {"pictures a frame", "triangles kept, of those without occlusion", "V", "pixels visible"}},
+          {"triangles kept, of those without occlusion", "V", "pixels visible", "pictures a frame"}},
          Of::scenes,
          depth_age_points}};
     return axes;
