@@ -61,6 +61,43 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
     EXPECT_EQ(error(points, "modern, CPU"), 0);
     EXPECT_LT(error(points, "16 frames old, margin of 8 deg"), 1) << "what a margin promises";
     EXPECT_EQ(named(points, "quadric, one thread")["values"][1], named(points, "quadric, two threads")["values"][1]);
+    // Choices that nothing above looks at.
+    for (const char* name : {"luebke-hallen",
+                             "luebke-hallen-safe",
+                             "1 px, extent",
+                             "1 px, displacement",
+                             "imperceptible, threshold 2",
+                             "imperceptible, by this picture",
+                             "budget of 5%",
+                             "discrete levels, where nobody sees them",
+                             "table, 16 an axis, cubic",
+                             "table, 32 an axis, linear",
+                             "table, 32 an axis, cubic",
+                             "table, 64 an axis, cubic",
+                             "around the centroid",
+                             "Ritter",
+                             "mask of 6 x 4 x 4",
+                             "mask of 6 x 12 x 12",
+                             "slabs",
+                             "cone",
+                             "without conserving light",
+                             "without stages",
+                             "modern, 16 bits",
+                             "modern, half the resolution",
+                             "modern, a quarter",
+                             "modern, 1 band",
+                             "modern, 5 bands",
+                             "rpg99",
+                             "rpg99, 16 bits",
+                             "imperceptible, from scratch",
+                             "imperceptible, followed, 1 ms at most",
+                             "budget, exact",
+                             "budget, hysteresis 2",
+                             "double",
+                             "octree, all cores",
+                             "of this frame",
+                             "4 frames old"})
+        named(points, name);
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(read_text(path("points.csv")), '\n')), points.size() + 1);
     const std::string page = read_text(path("page.html"));
     EXPECT_THAT(page, HasSubstr("<svg"));

@@ -676,6 +676,18 @@ TEST_F(BuildTest, SaysWhatItWrote) {
     EXPECT_THAT(run({"build", "ball.obj", "-o", "ball.vdt", "--verbose"}).out, HasSubstr("bytes a triangle"));
 }
 
+TEST_F(SimplifyTest, ABudgetMayBeMoreThanThereAre) {
+    const std::uint64_t whole = simplify({"--full"})["triangles"];
+    for (const std::string budget : {"4294967295", "4294967296", "18446744073709551615"}) {
+        const Json report = simplify({"--triangles", budget, "--fill-budget"});
+        EXPECT_EQ(report["triangles"], whole) << budget;
+    }
+    const Outcome none = run({"simplify", "ball.vdt", "-o", "o.ply", "--triangles", "1"});
+    EXPECT_EQ(none.status, 1);
+    EXPECT_THAT(none.err, AllOf(IsAnErrorForPeople(), HasSubstr("No triangle is left")));
+    EXPECT_FALSE(fs::exists(path("o.ply")));
+}
+
 TEST_F(SimplifyTest, ABudgetMayBeAShare) {
     const int count = simplify({"--triangles", "368"})["triangles"];
     EXPECT_LE(count, 368);
@@ -772,17 +784,19 @@ TEST_F(SimplifyTest, AFileThatMayNotBeWrittenToIsRefused) {
 
 TEST_F(SimplifyTest, AFolderThatMayNotBeWrittenToIsRefused) {
     fs::create_directory(path("locked"));
-    fs::permissions(path("locked"), fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read |
-                                        fs::perms::others_exec);
+    fs::permissions(path("locked"),
+                    fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read | fs::perms::others_exec);
     fs::permissions(folder(), fs::perms::all);
     std::string nobody;
     if (::geteuid() == 0) nobody = "setpriv --reuid=65534 --regid=65534 --clear-groups ";
     if (run_shell(nobody + "'" UNSEEN_COMMAND "' --version").status != 0) GTEST_SKIP() << "nobody cannot run it";
-    for (const std::string words : {"simplify ball.vdt --triangles 100 -o locked/o.ply", "build ball.obj -o locked/o.vdt",
-                                    "simplify ball.vdt --triangles 100 -o o.ply --json locked/o.json"}) {
+    for (const std::string words :
+         {"simplify ball.vdt --triangles 100 -o locked/o.ply", "build ball.obj -o locked/o.vdt",
+          "simplify ball.vdt --triangles 100 -o o.ply --json locked/o.json"}) {
         const Outcome refused = run_shell(nobody + "'" UNSEEN_COMMAND "' " + words);
         EXPECT_EQ(refused.status, 1) << words;
-        EXPECT_THAT(refused.err, AllOf(IsAnErrorForPeople(), HasSubstr("locked"), HasSubstr("Permission denied"))) << words;
+        EXPECT_THAT(refused.err, AllOf(IsAnErrorForPeople(), HasSubstr("locked"), HasSubstr("Permission denied")))
+            << words;
         EXPECT_TRUE(fs::is_empty(path("locked"))) << words;
         EXPECT_FALSE(fs::exists(path("o.ply"))) << words;
     }

@@ -201,14 +201,16 @@ Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(const Sight& sig
     const SceneShadows::EdgesKey edges_key{
         key.width, key.height, key.fov_y_degrees, key.shift, ambient, key.farthest_gaze_px, key.csf};
     SceneShadows& all = sight.scene_shadows;
-    if (all.edges && all.edges_key == edges_key) return all.edges;
+    std::erase_if(all.known_edges, [](const auto& known) { return known.edges.expired(); });
+    const auto found = std::ranges::find(all.known_edges, edges_key, &SceneShadows::KnownEdges::key);
+    if (found != all.known_edges.end()) return all.last_edges = found->edges.lock();
     perception::FoldTestOptions options = test_options(sight, decision.request);
     if (key.farthest_gaze_px) options.gaze_px = vdtree::axis_px(sight.view) + glm::dvec2(*key.farthest_gaze_px, 0);
     auto made = perception::ShadowEdges::create(sight.view, options, ambient);
     if (!made) return made.error();
-    all.edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
-    all.edges_key = edges_key;
-    return all.edges;
+    all.last_edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
+    all.known_edges.push_back({edges_key, all.last_edges});
+    return all.last_edges;
 }
 
 vdtree::Lighting in_world(vdtree::Lighting lighting, const Object& object) {

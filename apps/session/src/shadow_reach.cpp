@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -350,11 +351,16 @@ private:
     std::vector<float> values_;            // by level, slab, row and column
 };
 
+namespace {
+std::atomic<std::uint64_t> count_of_reaches{0};
+} // namespace
+
 ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                          std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
                          std::span<const vdtree::Plane> window, bool moves)
     : lighting_(lit.lighting), edges_(std::move(edges)), eye_(eye), window_(window.begin(), window.end()),
       moves_(moves), edge_(receivers.edge_) {
+    count_of_reaches.fetch_add(1, std::memory_order_relaxed);
     if (receivers.balls().empty()) return;
     const glm::dvec3 middle = receivers.balls().front().sphere.centre;
     for (const Ball& ball : receivers.balls())
@@ -365,6 +371,8 @@ ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& l
 }
 
 ShadowReach::~ShadowReach() = default;
+
+std::uint64_t ShadowReach::made() noexcept { return count_of_reaches.load(std::memory_order_relaxed); }
 
 namespace {
 

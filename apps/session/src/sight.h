@@ -37,7 +37,8 @@ struct SceneShadows {
     const std::vector<std::shared_ptr<ObjectCache>>& caches;
     std::optional<ShadowReceivers> receivers = {};
     std::optional<LitReceivers> lit = {}; // for the last lights
-    // For views like this one; and what it is of.
+    // How shadows' edges are seen in views like this one. The same object for the same key, however long ago it was made:
+    // objects go by one reach only where their criteria have the same.
     struct EdgesKey {
         int width = 0, height = 0;
         double fov_y_degrees = 0;
@@ -46,9 +47,14 @@ struct SceneShadows {
         std::optional<double> farthest_gaze_px = {};
         std::shared_ptr<const perception::CsfTable> csf = {};
         bool operator==(const EdgesKey&) const = default;
-    } edges_key = {};
-    std::shared_ptr<const perception::ShadowEdges> edges = {};
-    std::shared_ptr<const ShadowReach> reach = {}; // of the last views
+    };
+    struct KnownEdges {
+        EdgesKey key;
+        std::weak_ptr<const perception::ShadowEdges> edges;
+    };
+    std::vector<KnownEdges> known_edges = {};                       // that criteria go by
+    std::shared_ptr<const perception::ShadowEdges> last_edges = {}; // also where none does any more
+    std::shared_ptr<const ShadowReach> reach = {};                  // of the last views
 };
 
 // Of an object whose lights cast shadows.
