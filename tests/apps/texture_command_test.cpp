@@ -17,8 +17,8 @@ using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using unseen::perception::Image;
-using unseen::support::jpeg;
 using unseen::perception::read_image;
+using unseen::support::jpeg;
 
 class TextureCommandTest : public CommandTest {
 protected:
