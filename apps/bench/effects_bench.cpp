@@ -56,21 +56,22 @@ std::vector<Variation> variations() {
     all.push_back({"no hidden folding", "what is behind spheres inside the solid is kept", plain, true, true, false,
                    false, false});
     all.push_back({"no contrast",
-                   "every fold counts as one against anything in the scene: what knowing luminance saves",
+                   "every fold counts as one against anything in the scene. That is what knowing luminance saves",
                    [](const session::Session& session, const perception::FoldTestOptions& options) {
                        return with_classes(session, options, [](vdtree::FoldClass& c) { c.interior = c.silhouette; });
                    }});
-    all.push_back({"no silhouettes", "outlines count like what lies inside: not safe; what keeping them costs",
+    all.push_back({"no silhouettes",
+                   "outlines count like what lies inside. That is not safe, and tells what keeping them costs",
                    [](const session::Session& session, const perception::FoldTestOptions& options) {
                        return with_classes(session, options, [](vdtree::FoldClass& c) { c.silhouette = c.interior; });
                    }});
-    all.push_back({"chroma", "with contrast of colour; no difference where all is grey",
+    all.push_back({"chroma", "with contrast of colour. Where all is grey it makes no difference",
                    [](const session::Session& session, perception::FoldTestOptions options) {
                        options.chroma = true;
                        return plain(session, options);
                    }});
     all.push_back({"dynamic light",
-                   "bounds over the normals in a ring in place of baked luminances: ambient 0.2, and two "
+                   "bounds over the normals in a ring in place of baked luminances. Light: ambient 0.2, and two "
                    "directional lights, 0.8 and 0.2",
                    nullptr, true, true, false, true});
     all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
@@ -193,7 +194,7 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
     result.table.rows[1].push_back("of");
     for (std::size_t i = 0; i < all.size(); ++i) {
         result.table.rows[i + 2].push_back(all[i].name);
-        result.table.notes.push_back(all[i].name + ": " + all[i].note);
+        result.table.notes.push_back(all[i].name + ": " + all[i].note + ".");
     }
     const Pinned pinned;
     for (auto& [name, tree] : *trees) {

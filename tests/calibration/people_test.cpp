@@ -250,7 +250,8 @@ TEST(People, AreReadWithErrorsThatNameTheLine) {
     };
     EXPECT_THAT(message(""), HasSubstr("columns' names"));
     EXPECT_THAT(message("a,b\n"), HasSubstr("t.csv:1: there is no column dataset"));
-    EXPECT_THAT(message("sensitivity," + header + "1,x,1,0,0,20,1,5\n"), HasSubstr("column sensitivity is there twice"));
+    EXPECT_THAT(message("sensitivity," + header + "1,x,1,0,0,20,1,5\n"),
+                HasSubstr("column sensitivity is there twice"));
     EXPECT_THAT(message(header + "x,1,0,0,20,1\n"), HasSubstr("t.csv:2: there are only 6 fields"));
     EXPECT_THAT(message(header + "x,1,0,0,20,1,nan\n"), HasSubstr("sensitivity must be a number above 0"));
     EXPECT_THAT(message(header + "x,0,0,0,20,1,5\n"), HasSubstr("frequency_cpd"));

@@ -1,6 +1,7 @@
 // Fuzz target for what people and other programs write down: profiles of displays, observers and lights, sensitivities,
-// a calibration that goes on, studies and their answers, recorded gazes, camera paths, photometers. Any bytes, after one that chooses
-// the reader, must give an error with a message, or something valid. tests/README.md tells how to build and run it.
+// a calibration that goes on, studies and their answers, recorded gazes, camera paths, tables of photometers. Any bytes,
+// after one that chooses the reader, must give an error with a message, or something valid. tests/README.md tells how to
+// build and run it.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
