@@ -16,7 +16,8 @@ namespace {
 
 void read_texture(std::string_view bytes) {
     const auto texture = unseen::session::decode_texture(bytes, "fuzz", true);
-    if (texture ? texture->texels.empty() || !unseen::vdtree::validate(texture->view()) : texture.error().message.empty())
+    if (texture ? texture->texels.empty() || !unseen::vdtree::validate(texture->view())
+                : texture.error().message.empty())
         std::abort();
 }
 
