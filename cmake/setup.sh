@@ -37,7 +37,7 @@ install_packages() {
 configure_release() {
     say "Configuring (preset release)"
     mkdir -p build
-    cmake --preset release -DUNSEEN_BUILD_BENCHMARKS="${UNSEEN_BUILD_BENCHMARKS:-OFF}" >build/configure.log 2>&1 || {
+    cmake --preset release >build/configure.log 2>&1 || {
         grep -A8 'CMake Error' build/configure.log >&2
         die "CMake could not configure the build, see build/configure.log"
     }
