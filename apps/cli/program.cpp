@@ -137,12 +137,14 @@ int run(int argc, char** argv, const Program& program, const FunctionRef<std::ve
     app.footer(program.examples);
     app.set_version_flag("--version", std::string(program.name) + " " + program.version);
     app.require_subcommand(1);
+    // Ends after the options were read: tests check with it that the documentation's commands are accepted.
+    const CLI::Option* parse_only = app.add_flag("--parse-only")->group("");
     try {
         const std::vector<Command> commands = verbs(app);
         if (argc > 1 && std::string_view(argv[1]) == "help")
             return help(app, program, std::span<char* const>(argv, static_cast<std::size_t>(argc)).subspan(2));
         app.parse(argc, argv);
-        return run(commands);
+        return parse_only->count() > 0 ? exit_done : run(commands);
     } catch (const CLI::ParseError& error) {
         return report_usage(app, program, error);
     } catch (const std::bad_alloc& error) {
