@@ -507,7 +507,7 @@ private:
         if constexpr (is_textured) {
             if (!is_shown || tree_.bounds()[node].ring.radius > longest_shown * width)
                 scratch.slide = std::max(scratch.slide, worst.slide);
-            find_detail(node, width, scratch, worst, record);
+            find_detail(node, width, scratch, record);
         }
     }
 
@@ -578,8 +578,7 @@ private:
 
     // What the texture's detail changes: what is finer than the pictures' cells by sliding over the surface, and all of
     // it by the surface's shift, seen from aside.
-    void find_detail(NodeId node, float width, const Scratch& scratch, const Difference& worst,
-                     const FoldRecord& record) {
+    void find_detail(NodeId node, float width, const Scratch& scratch, const FoldRecord& record) {
         const TextureDetail& texture = *lights_.front().texture;
         UvBox box;
         for (const auto* surface : {&scratch.before, &scratch.after, &scratch.fine_before, &scratch.fine_after})
@@ -589,18 +588,10 @@ private:
         const bool is_dense = scratch.density.least > 0 && std::isfinite(scratch.density.most);
         const float height = std::max(record.shift, record.mean_distance);
         const float aside = height > 0 ? height * scratch.density.most : 0.0f;
-        (void)worst;
         FoldTexture& found = found_[0].textures[node];
         found.mean = scratch.density.mean;
         const float slide_in_widths = is_dense ? scratch.slide / (scratch.density.least * width) : 1.0f;
         found.slide = std::max(found.slide, slide_in_widths < 1 ? slide_in_widths : 1.0f);
-        if (getenv("DBG"))
-            fprintf(
-                stderr,
-                "node %u leaves %u width %g ring %g slide %g aside %g worst %g shift %g lv %zu dens %g %g amp %g %g\n",
-                node, leaf_end_[node] - first_leaf_[node], width, tree_.bounds()[node].ring.radius, scratch.slide,
-                aside, worst.slide, record.shift, scratch.level[0], scratch.density.least, scratch.density.most,
-                record.farthest, worst.luminance[0]);
         const std::size_t measured_from = *std::min_element(scratch.level.begin(), scratch.level.end());
         for (std::size_t level = 0; level < texture.level_count(); ++level) {
             const float texel = std::exp2(static_cast<float>(level)); // in the texture's own
