@@ -103,7 +103,7 @@ std::uint64_t search_key(const Selections& selections);
 // sight and that are not of the last level everywhere.
 bool corners_differ(std::span<const SelectionCorner* const> corners, double levels);
 
-// Binary, see docs/selection.md. Written to a temporary name and renamed.
+// Binary, see docs/file-format.md. Written to a temporary name and renamed.
 Result<void> write_selections(const std::filesystem::path& file, const Selections& selections);
 // Nothing that a file says is believed: counts are checked against its size before memory is taken, and every number
 // against its range. Errors name the file and the byte.
