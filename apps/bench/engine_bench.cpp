@@ -688,30 +688,7 @@ private:
         building_.push_back({"peak bytes a triangle while building", "B",
                              "the whole process, from reading the mesh on; the larger of both", largest_peak,
                              target("build, peak bytes a triangle"), false, 0});
-        if (auto measured = measure_out_of_core(); !measured) return measured;
         measure_ranks(*mesh);
-        return {};
-    }
-
-    Result<void> measure_out_of_core() {
-        BenchRow row{
-            "out-of-core build over in-core", "x", "", {}, target("build, out of core over in core, x"), false, 2};
-        const std::uint64_t size = options_.sizes.back();
-        const auto mesh = mesh_file(shop_, base_, size);
-        if (!mesh) return mesh.error();
-        const auto in_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1"});
-        if (!in_core) return in_core.error();
-        constexpr double largest = 28e6, gib = 4; // the same share of the mesh where it is smaller
-        // In proportion to the mesh, but not below what any build takes.
-        constexpr double least_gib = 0.125;
-        const double memory = std::max(gib * static_cast<double>(size) / largest, least_gib);
-        const auto out_of_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1", "--memory", shortest(memory)});
-        if (!out_of_core) return out_of_core.error();
-        row.value = out_of_core->wall_seconds / in_core->wall_seconds;
-        row.note = size_name(size) + " triangles, --memory " + rounded(memory, 3) + ", peak " +
-                   rounded(out_of_core->peak_bytes / (1 << 30), 3) + " GiB against " +
-                   rounded(in_core->peak_bytes / (1 << 30), 3);
-        building_.push_back(row);
         return {};
     }
 

@@ -6,7 +6,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <thread>
 
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -18,13 +17,11 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "build_team.h"
-#include "memory_plan.h"
 #include "model_file.h"
 #include "option_names.h"
 #include "options.h"
 #include "other_libraries.h"
 #include "output_files.h"
-#include "paged_memory.h"
 #include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
@@ -39,7 +36,6 @@ struct BuildArguments {
     std::string clusterer_name = "quadric";
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
-    double memory_gib = 0; // 0: no limit
     bool repairs = false;
     double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's and the part's diagonal
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
@@ -97,13 +93,6 @@ meshio::ReadOptions reading(const BuildArguments& a) {
     return options;
 }
 
-// Threads of this process while all members work.
-int threads(const BuildArguments& a, const ProcessTeam* team) {
-    if (a.threads > 0) return a.threads;
-    if (team) return std::max(1, team->cores() / team->members_on_machine());
-    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 // Members of a team share the cores of their machine; the first one gets all of them when the others are done.
 vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     vdtree::BuildOptions options;
@@ -112,7 +101,7 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     options.prelit = a.texture.is_prelit;
     if (team && team->size() > 1) {
         options.team = team;
-        options.threads = threads(a, team);
+        options.threads = a.threads > 0 ? a.threads : std::max(1, team->cores() / team->members_on_machine());
         options.threads_alone = a.threads == 0 ? team->cores() : a.threads * team->members_on_machine();
     }
     return options;
@@ -137,19 +126,12 @@ Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const
                                        options);
 }
 
-// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words. What is repaired
-// is told in `repair`.
+// The mesh, if a tree can be built of it. `read_file` reads it, with or without printing. `repair` receives what was
+// repaired.
 template <class ReadFile>
-Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file,
-                                       Repaired& repair) {
-    const auto limit = MemoryLimit::set(a.memory_gib, a.out,
-                                        a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
-    if (!limit) return limit.error();
+Result<meshio::ReadResult> read_source(const BuildArguments& a, ReadFile&& read_file, Repaired& repair) {
     Result<meshio::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
-    if (!read) {
-        const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
-        return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
-    }
+    if (!read) return read.error();
     if (a.repairs) {
         auto repaired = repair_by_cgal(std::move(read->mesh), a.gap, a.largest_hole);
         if (!repaired) return Error{repaired.error().code, a.mesh + ": " + repaired.error().message};
@@ -157,7 +139,6 @@ Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
         repair = std::move(*repaired);
     }
     if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
-    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer()); !ok) return ok.error();
     return read;
 }
 
@@ -174,7 +155,7 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     if (!report) return report.error();
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
     Repaired repair;
-    auto read = read_source(a, team, read_textured_mesh, repair);
+    auto read = read_source(a, read_textured_mesh, repair);
     if (!read) return read.error();
     return Source{std::move(*report), std::move(*read), std::move(repair)};
 }
@@ -248,7 +229,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 // The others: they write nothing, and print nothing unless they fail alone.
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
     Repaired repair;
-    const auto read = read_source(a, &team, read_quietly, repair);
+    const auto read = read_source(a, read_quietly, repair);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
     const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer()) : 0);
     if (ok)
@@ -268,12 +249,9 @@ void keep_freed_memory() {
 }
 
 Result<int> run(const BuildArguments& a) {
-    if (a.is_by_openmesh() && a.memory_gib > 0)
-        return Error{ErrorCode::invalid_argument,
-                     "--memory does not know how much --clusterer openmesh needs: leave one of them out."};
     if (a.is_by_openmesh() && !has_openmesh()) return build_by_openmesh({}, {}).error();
     if (a.repairs && !has_cgal()) return repair_by_cgal({}, a.gap, a.largest_hole).error();
-    if (a.memory_gib == 0) keep_freed_memory();
+    keep_freed_memory();
     const auto team = ProcessTeam::join();
     if (!team) return team.error();
     ProcessTeam* members = team->get();
@@ -330,15 +308,10 @@ Command build_command(CLI::App& app) {
                    "Measure also what every fold changes under lights, for scenes with lights that stand still; else "
                    "the first of them measures it");
     add_texture_options(*verb, a->texture);
-    verb->add_option("--memory", a->memory_gib,
-                     "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
-        ->type_name("GIB")
-        ->check(positive());
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
-                 "  unseen build city.obj -o city.vdt --memory 4\n"
                  "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
                  "  unseen build parts.stl -o parts.vdt --repair --largest-hole 0.02" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));

@@ -274,9 +274,6 @@ TEST_F(BuildTest, TakesOpenMeshsDecimater) {
     ASSERT_EQ(built.status, 0) << built.err;
     EXPECT_EQ(built.json()["triangles"], ball_triangles);
     EXPECT_EQ(run({"info", "t.vdt", "--verify"}).status, 0);
-    const Outcome limited = run({"build", "ball.obj", "-o", "u.vdt", "--clusterer", "openmesh", "--memory", "1"});
-    EXPECT_EQ(limited.status, 1);
-    EXPECT_THAT(limited.err, HasSubstr("--memory"));
     write_text(path("pages.obj"), "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
     const Outcome refused = run({"build", "pages.obj", "-o", "p.vdt", "--clusterer", "openmesh"});
     EXPECT_EQ(refused.status, 1);

@@ -101,11 +101,10 @@ TEST_F(TeamTest, WhatADeadTeamLeavesIsRemovedAtTheNextStart) {
     build_alone();
     // Member 0 is killed sooner or later, perhaps while it writes.
     for (const std::string seconds : {"0.1", "0.4", "0.6"}) {
-        const Outcome built =
-            run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds +
-                            " " UNSEEN_COMMAND
-                            " build large.obj --no-fold-errors -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
-                            " build large.obj --no-fold-errors -o team.vdt --memory 0.1; fi");
+        const Outcome built = run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds +
+                                              " " UNSEEN_COMMAND
+                                              " build large.obj --no-fold-errors -o team.vdt; else exec " UNSEEN_COMMAND
+                                              " build large.obj --no-fold-errors -o team.vdt; fi");
         expect_whole_or_none(built);
     }
     const Outcome built = run({"build", "large.obj", "--no-fold-errors", "-o", "team.vdt"});
