@@ -149,7 +149,7 @@ struct Source {
     Repaired repair; // without its mesh
 };
 
-Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
+Result<Source> open_source(const BuildArguments& a) {
     if (const auto ok = check_names(a); !ok) return ok.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
@@ -189,7 +189,7 @@ Result<vdtree::VertexTree> measure_under_lights(const BuildArguments& a, const v
 
 // The first of a team, or the only one.
 Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
-    auto source = open_source(a, team);
+    auto source = open_source(a);
     if (team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
         const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer()) : 0);
