@@ -1,11 +1,11 @@
-# Compares what a page holds between two markers with what its command prints now: awk -v page=NAME -f THIS OLD NEW.
-# All numbers that are no times must be equal, and all words. Times are numbers with a unit of time, columns and rows
-# that speak of time, speed or threads, and of cells like "27,970; 1.11" the part whose name says so. Says which cells
-# differ; the exit status is 1 then.
+# Compares a page's table with what its command prints now: awk -v page=NAME -f THIS OLD NEW.
+# All words and all numbers except times must be equal. Times are numbers with a unit of time, columns and rows about time,
+# speed or threads, and in cells such as "27,970; 1.11" the part whose heading says so. Prints the cells that differ and
+# exits with status 1.
 
 function trimmed(text) { gsub(/^[ \t]+|[ \t]+$/, "", text); return text }
 
-# Whether a header, the name of a row, or a unit speaks of time.
+# Whether a heading, the name of a row, or a unit is about time.
 function is_timing(text) {
     text = " " tolower(text) " "
     gsub(/[^a-z\/%]+/, " ", text)
@@ -22,7 +22,7 @@ function differ(what, old, new) {
     differs = 1
 }
 
-# A cell; of those with parts, the parts that are no times.
+# A cell; if it has parts, those that are not times.
 function compare_cell(what, heading, old, new, i, count, old_parts, new_parts, names) {
     if (heading !~ /;/) heading = header[2] # that of all cells
     if (split(heading, names, ";") > 1 && split(old, old_parts, ";") > 1) {

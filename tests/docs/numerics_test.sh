@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Whether docs/numerics.md is true of the tests: each entry is a test of its name in a file that its section names, each test
-# of these files is an entry, and each test of `Numerics` has its naive formula.
+# docs/numerics.md matches the tests: each entry is a test of its name in a file that its section names, each test in these
+# files is an entry, and each test of `Numerics` has its naive formula.
 #
 # Usage: numerics_test.sh SOURCES
 set -euo pipefail
@@ -11,7 +11,7 @@ complain() { echo "$*"; failed=1; }
 
 # A heading or bullet as a test's name: "A bit of the eye's position" is ABitOfTheEyesPosition.
 as_name() { sed -E "s/'//g; s/[^A-Za-z0-9.]+/ /g; s/\.//g" | awk '{ for (i = 1; i <= NF; ++i) printf "%s", toupper(substr($i, 1, 1)) substr($i, 2); print "" }'; }
-# What stands under a heading of the second order.
+# The text under a second-level heading.
 section() { awk -v wanted="## $1" '/^## / { is_in = $0 == wanted } is_in' "$page"; }
 tests_of() { # suite file...
     local suite=$1

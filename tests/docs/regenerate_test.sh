@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What docs/regenerate --check finds, on a page of its own and with a command that prints what the test says.
+# docs/regenerate --check on a test page, with a command whose output the test controls.
 set -euo pipefail
 
 regenerate=$(realpath "$1")
@@ -40,7 +40,7 @@ TABLE
 } >"$work/page.md"
 
 failed=0
-# A change of what is printed, by sed; the status that the check has to end with; what it has to say.
+# Arguments: a change of the output, for sed; the expected status; the expected message.
 expect() {
     cp "$work/build/apps/table" "$work/table"
     sed -i "$1" "$work/build/apps/table"
@@ -69,7 +69,7 @@ expect 's/1.5 ms/2.25 ms/; s/1\.11/0.98/; s/3.67 | ms | must missed/0.5 | ms | a
 expect 's/812 in 3 ms/812 in 4 ms/; s/drawn in 12 ms/drawn in 9 ms/; s/side, 3 times/side, 4 times/' 0 'match their commands'
 cmp "$work/page.md" "$work/before.md" || failed=1
 
-# Without the check, the page is made anew.
+# Without --check, the page is regenerated.
 sed -i '/missing.ply/,$d' "$work/page.md"
 sed -i 's/43,304/43,306/' "$work/build/apps/table"
 UNSEEN_BUILD="$work/build" "$regenerate" "$work/page.md" 2>/dev/null

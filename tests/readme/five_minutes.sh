@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Does what README.md says to who comes to it: the lines under "Start" (but ./check) and under "Six commands", in a fresh
-# copy of the sources, on two cores. Fails where a line fails, and where all of it takes longer than five minutes
-# (UNSEEN_README_SECONDS: another limit). Packages are there already, and ccache knows the objects, as after ./check.
+# Runs the lines of README.md under "Start" (except ./check) and under "Six commands", in a fresh copy of the sources, on two
+# cores. Fails if a line fails, or if all of it takes longer than five minutes (UNSEEN_README_SECONDS: another limit).
+# Packages are installed, and ccache has the objects, as after ./check.
 set -euo pipefail
 
 source_folder=$(cd "$1" && pwd)
@@ -20,7 +20,7 @@ clean_up() {
 }
 trap clean_up EXIT
 
-# The clone, with what is not committed yet.
+# The clone, with uncommitted changes.
 clone=$work/unseen
 mkdir "$clone"
 cd "$source_folder"
@@ -41,7 +41,7 @@ commands=$(block "Six commands")
 case "$start" in *./quickstart*) ;; *) echo "README.md has no ./quickstart under Start"; exit 1 ;; esac
 count=$(printf '%s\n' "$commands" | grep -c '^unseen ') || true
 [ "$count" -ge 6 ] || { echo "README.md has $count commands under Six commands"; exit 1; }
-# A window waits for people.
+# A window would wait for a person.
 commands=$(printf '%s\n' "$commands" | sed 's/^unseen view .*/& --frames 60/')
 case "$commands" in *"--frames 60"*) ;; *) echo "README.md does not open the viewer"; exit 1 ;; esac
 
@@ -56,7 +56,7 @@ done
 DISPLAY=:$(cat "$work/display")
 [ "$DISPLAY" != : ] || skip "Xvfb does not start"
 
-# Nothing of the user's is used but what ccache keeps, under the folder of this copy.
+# Uses nothing of the user's except ccache, for the folder of this copy.
 export DISPLAY UNSEEN_CACHE="$work/cache" CCACHE_BASEDIR="$clone" CMAKE_BUILD_PARALLEL_LEVEL=2
 unset WAYLAND_DISPLAY
 printf 'set -euxo pipefail\n%s\n%s\n' "$start" "$commands" >"$work/lines.sh"
