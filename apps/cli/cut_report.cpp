@@ -122,9 +122,12 @@ std::string visibility_text(const session::Report& s, const session::Observer& o
 
     const bool is_default_display =
         display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
-    text += ": by " + describe(observer) + " and the judge (fold test " + session::name_of(s.fold_tests.front()) +
-            "), " + where + ", on " + (is_default_display ? "the default display" : "this display") + ", ";
-    if (!observer.gaze) return text + "wherever the gaze";
+    const session::FoldTest test = s.fold_tests.front();
+    text += ": by the model (fold test " + session::name_of(test) +
+            (test == session::FoldTest::luebke_hallen ? ", which misses some changes" : "") +
+            "), which can be wrong, for " + describe(observer) + ", " + where + ", on " +
+            (is_default_display ? "the default display" : "this display") + ", ";
+    if (!observer.gaze) return text + "wherever they look";
     const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };
     return text + "with the gaze at pixel " + tenths(observer.gaze->px.x) + " " + tenths(observer.gaze->px.y);
 }

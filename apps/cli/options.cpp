@@ -470,6 +470,10 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
                    "folded.");
         if (*fill && !o.budget.is_given()) refuse("--fill-budget needs --triangles N or --ratio SHARE.");
         if (o.request.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
+        if (o.masks && (*full || *pixels || (o.request.fold_test && *o.request.fold_test != session::FoldTest::error)))
+            refuse(
+                "--masking scene needs --fold-test error, and a goal that it decides: nothing else knows what masks. "
+                "Leave one of them out.");
         if (*full) kind = Goal::Kind::full;
         if (o.budget.is_given()) kind = Goal::Kind::budget;
         if (*pixels) kind = Goal::Kind::pixels;

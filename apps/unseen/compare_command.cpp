@@ -165,7 +165,7 @@ std::string judged_by(const CompareArguments& a, const Verdict& verdict, const p
     std::string text = "by the judge " + a.model_name + " and the observer " + observer_of(a);
     text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
     text += a.gaze_px ? "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y)
-                      : std::string("wherever the gaze");
+                      : std::string("wherever they look");
     return verdict.gpu.empty() ? text : text + ", on the GPU (" + verdict.gpu + ")";
 }
 

@@ -29,8 +29,8 @@ struct SimplifyArguments {
 bool is_gltf(const std::string& file) { return has_ending(file, ".glb") || has_ending(file, ".gltf"); }
 
 // The background goes whole.
-Result<std::vector<std::string>> write_scene(const std::string& file, const session::Scene& scene,
-                                             const std::vector<vdtree::Cut>& cuts) {
+Result<std::vector<Message>> write_scene(const std::string& file, const session::Scene& scene,
+                                         const std::vector<vdtree::Cut>& cuts) {
     std::vector<meshio::SceneCut> all;
     for (std::size_t i = 0; i < cuts.size(); ++i)
         all.push_back({scene.objects[i].node, scene.objects[i].mesh, &cuts[i]});
@@ -129,7 +129,11 @@ Command simplify_command(CLI::App& app) {
         "  unseen simplify museum.glb -o seen.glb --triangles 50%\n"
         "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"
         "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
-    return {verb, [a] { return run(*a); }};
+    const CLI::Option* visibility = verb->get_option("--visibility");
+    return {verb, [a, visibility] {
+                if (visibility->count() > 0) a->what.request.purpose = session::Purpose::picture;
+                return run(*a);
+            }};
 }
 
 } // namespace unseen::app

@@ -47,8 +47,12 @@ Json to_json(const session::TradeoffPoint& p) {
             {"holds_for", p.is_of_view ? "this view" : "all views"},
             {"triangles", p.triangles},
             {"make_ms", p.make_ms},
-            {"follow_ms", number_or_null(p.follow_ms)},
-            {"draw_ms", p.draw_ms},
+            {"follow_ms", number_or_null(p.follow_ms.median)},
+            {"follow_ms_from", number_or_null(p.follow_ms.low)},
+            {"follow_ms_to", number_or_null(p.follow_ms.high)},
+            {"draw_ms", p.draw_ms.median},
+            {"draw_ms_from", p.draw_ms.low},
+            {"draw_ms_to", p.draw_ms.high},
             {"visible_pixels", p.visible_pixels},
             {"v", number_or_null(p.v)},
             {"second_visible_pixels", p.second_visible_pixels},
@@ -67,11 +71,16 @@ std::string to_csv(const session::Tradeoff& tradeoff) {
         "ssim,shift_m,pareto,recommended\n";
     for (const session::TradeoffPoint& p : tradeoff.points)
         text += csv_field(p.name) + "," + options_of(p) + "," + std::to_string(p.triangles) + "," + cell(p.make_ms) +
-                "," + cell(p.follow_ms) + "," + cell(p.draw_ms) + "," + std::to_string(p.visible_pixels) + "," +
-                cell(p.v) + "," + std::to_string(p.second_visible_pixels) + "," + cell(p.second_v) + "," +
+                "," + cell(p.follow_ms.median) + "," + cell(p.draw_ms.median) + "," + std::to_string(p.visible_pixels) +
+                "," + cell(p.v) + "," + std::to_string(p.second_visible_pixels) + "," + cell(p.second_v) + "," +
                 cell(p.ssim) + "," + cell(p.shift) + "," + (p.is_on_front ? "1" : "0") + "," +
                 (p.is_recommended ? "1" : "0") + "\n";
     return text;
+}
+
+std::string timing_text(const session::Timing& ms) {
+    if (!std::isfinite(ms.median)) return "-";
+    return rounded(ms.median, 2) + " (" + rounded(ms.low, 2) + "-" + rounded(ms.high, 2) + ")";
 }
 
 void print(const session::Tradeoff& tradeoff, const session::Session& session, int wanted_samples) {
@@ -83,15 +92,15 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
                                                    "visible pixels", "V", "second judge", "V", "SSIM", ""}};
     for (const session::TradeoffPoint* p : sorted)
         rows.push_back({p->name, grouped(p->triangles), rounded(100 * p->triangles / all, 3) + "%",
-                        std::isfinite(p->follow_ms) ? rounded(p->follow_ms, 2) : "-", rounded(p->draw_ms, 3),
-                        rounded(p->make_ms, 3), grouped(p->visible_pixels), rounded(p->v, 2),
-                        grouped(p->second_visible_pixels), rounded(p->second_v, 2),
-                        std::isfinite(p->ssim) ? rounded(p->ssim, 5) : "-",
+                        timing_text(p->follow_ms), timing_text(p->draw_ms), rounded(p->make_ms, 3),
+                        grouped(p->visible_pixels), rounded(p->v, 2), grouped(p->second_visible_pixels),
+                        rounded(p->second_v, 2), std::isfinite(p->ssim) ? rounded(p->ssim, 5) : "-",
                         std::string(p->is_on_front ? "*" : "") + (p->is_recommended ? " <-" : "")});
     print_table(rows);
     print_line("* no other has both fewer triangles and a smaller V. V: the largest difference from the full model, in "
                "thresholds; from 1 on it is seen.");
-    print_line("follow and draw: a frame, with one sample a pixel, on this machine. make: from nothing" +
+    print_line("follow and draw: a frame, with one sample a pixel, on this machine; the median, and what half of the "
+               "frames took. make: from nothing" +
                (tradeoff.measuring_s > 0.5 ? ", after " + duration(1e3 * tradeoff.measuring_s) +
                                                  " that measured what folds change, once for this model."
                                            : std::string(".")));
@@ -101,7 +110,7 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
                    ", to keep to the time: V is larger for that. --seconds gives more.");
     for (const std::string& name : tradeoff.left_out) print_note("left out: " + name);
     const auto best = std::ranges::find_if(tradeoff.points, &session::TradeoffPoint::is_recommended);
-    print_line("recommended for this view, observer and machine: " + options_of(*best));
+    print_line("recommended, as the safe way with the fewest triangles that shows nothing: " + options_of(*best));
     const auto still = std::ranges::find_if(tradeoff.points, [&](const session::TradeoffPoint& p) {
         return p.is_of_view && p.visible_pixels == 0 && p.second_visible_pixels == 0 && p.triangles < best->triangles;
     });

@@ -82,6 +82,13 @@ Result<void> Context::finish() const {
     });
 }
 
+Result<void> Context::flush() const {
+    return in_context(*this, "Handing work to the GPU", []() -> Result<void> {
+        glFlush();
+        return {};
+    });
+}
+
 std::string Context::renderer_name() const { return impl_->renderer_name; }
 
 std::string Context::version() const { return impl_->version; }

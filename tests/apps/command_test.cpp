@@ -628,6 +628,22 @@ TEST_F(SimplifyTest, ASingleTriangleIsValid) {
     EXPECT_EQ(outcome.json()["triangles"], 1);
 }
 
+TEST_F(SimplifyTest, TakesNoOptionThatDoesNothing) {
+    for (const std::vector<std::string>& other :
+         {std::vector<std::string>{"--fold-test", "luebke-hallen"}, {"--pixels", "2"}, {"--full"}}) {
+        std::vector<std::string> words = {"simplify", "ball.vdt", "-o", "x.ply", "--masking", "scene"};
+        words.insert(words.end(), other.begin(), other.end());
+        const Outcome refused = run(words);
+        EXPECT_NE(refused.status, 0);
+        EXPECT_THAT(refused.err, HasSubstr("--masking scene needs --fold-test error"));
+    }
+    const auto triangles = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "x.ply", "--json", "-"});
+        return run(more).json()["triangles"].get<int>();
+    };
+    EXPECT_LT(triangles({"--visibility", "spheres"}), triangles({}) * 3 / 4) << "what faces away is folded";
+}
+
 // ---- what people read, and what they type
 
 TEST_F(SimplifyTest, AnswersInThreeLines) {
@@ -635,10 +651,9 @@ TEST_F(SimplifyTest, AnswersInThreeLines) {
     ASSERT_EQ(plain.status, 0) << plain.err;
     EXPECT_THAT(plain.out, ::testing::MatchesRegex(
                                "kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
-                               "nobody sees a difference, looked at from 0.5 m or more: by the default observer "
-                               "\\(castleCSF x 2: of measured people, 8.7% see more\\) and the judge \\(fold test "
-                               "error\\), in this view, on the "
-                               "default display, wherever the gaze\n"
+                               "nobody sees a difference, looked at from 0.5 m or more: by the model \\(fold test "
+                               "error\\), which can be wrong, for the default observer \\(castleCSF x 2: of measured "
+                               "people, 8.7% see more\\), in this view, on the default display, wherever they look\n"
                                "wrote small.glb \\([0-9.]+ kB\\)\n"));
     const auto second_line = [&](std::vector<std::string> more) {
         more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "small.glb"});
@@ -650,8 +665,10 @@ TEST_F(SimplifyTest, AnswersInThreeLines) {
         second_line({"--triangles", "100"}),
         ::testing::ContainsRegex("^a difference can be seen; looked at from [0-9.]+ m or more, nobody sees it: "));
     EXPECT_THAT(second_line({"--csf", "daly", "--peak", "200"}),
-                AllOf(HasSubstr("by the observer of 2 x daly and the judge"), HasSubstr("on this display")));
-    EXPECT_THAT(second_line({"--observer", "strict"}), HasSubstr("by the strict observer (castleCSF x 2.7: "));
+                AllOf(HasSubstr("for the observer of 2 x daly"), HasSubstr("on this display")));
+    EXPECT_THAT(second_line({"--observer", "strict"}), HasSubstr("for the strict observer (castleCSF x 2.7: "));
+    EXPECT_THAT(second_line({"--fold-test", "luebke-hallen"}),
+                HasSubstr("(fold test luebke-hallen, which misses some changes)"));
     EXPECT_EQ(second_line({"--full"}), "nothing is folded");
     EXPECT_THAT(second_line({"--pixels", "5"}), HasSubstr("not known: the fold test extent counts pixels"));
 }

@@ -2,6 +2,7 @@
 #include <unseen/session_gpu/level_control.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -55,6 +56,21 @@ const std::vector<glm::dvec3> row = {{-1, 0.3, -5}, {1.4, -0.5, -8}, {-3, 0.4, -
 
 perception::JudgeOptions judging(const Session& session) {
     return {.display = session.observer().display, .gain = session.observer().person.gain};
+}
+
+// The loop of a program that shows frames and never waits: what the GPU counts decides all the same.
+TEST_F(LevelControlTest, ChangesLevelsWithoutBeingWaitedFor) {
+    Session session = bodies(row);
+    auto control = LevelControl::create(context(), session, ahead(128));
+    ASSERT_TRUE(control) << control.error().message;
+    int changed = 0;
+    const auto start = std::chrono::steady_clock::now();
+    while (changed == 0 && std::chrono::steady_clock::now() - start < std::chrono::seconds(20)) {
+        const auto frame = control->draw(ahead(128));
+        ASSERT_TRUE(frame) << frame.error().message;
+        changed += frame->changed;
+    }
+    EXPECT_GT(changed, 0);
 }
 
 // ---- chains -----------------------------------------------------------------------------------------------------------

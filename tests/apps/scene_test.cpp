@@ -107,7 +107,7 @@ protected:
     }
     std::string complaint(const File& file) const {
         const auto loaded = load(file.glb());
-        return loaded ? std::string() : loaded.error().message;
+        return loaded ? "" : loaded.error().message;
     }
     bool can_draw() const {
         return run({"render", "s.glb", "-o", "can.png", "--size", "8x8"}).err.find("No OpenGL") == std::string::npos;
@@ -281,6 +281,10 @@ TEST_F(SceneTest, NamesNodesThatCannotBePlaced) {
     EXPECT_TRUE(
         load(File(R"({"nodes": [{"mesh": 0, "scale": [1e-12, 1e-12, 1e-12]}, {"mesh": 0}]})").add(body()).glb()))
         << "what is tiny is none the less there";
+    ASSERT_TRUE(load(File(all_kinds).add(body()).glb(), LoadAs::automatic));
+    const auto by_content = session::Scene::load(path("s.glb"));
+    ASSERT_TRUE(by_content);
+    EXPECT_TRUE(by_content->is_of_file()) << "by default the content decides";
     session::LoadOptions painted;
     painted.texture = "x.png";
     const auto refused = load(File(all_kinds).add(body()).glb(), LoadAs::automatic, painted);

@@ -640,6 +640,7 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     times.end_stage();
     times.end();
     open_times.push_back(open_time);
+    if (auto flushed = context.flush(); !flushed) return flushed.error(); // or counts that are polled never come
 
     const render::LayerCounts counts = layers.counts();
     frame.surface_passes += counts.surface_passes;

@@ -1,26 +1,26 @@
 #include <unseen/session_gpu/tradeoff.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <memory>
 #include <utility>
 
-#include <unseen/perception/judge.h>
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/frame_image.h>
-#include <unseen/session_gpu/scene_renderer.h>
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
-
-#include "median.h"
 
 namespace unseen::session {
 namespace {
 
 constexpr int timed_frames = 9;         // followed, and drawn
 constexpr double degrees_a_frame = 0.1; // around the scene's centre
-constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+
+// The median, and the middle half around it.
+Timing timing(std::vector<double> ms) {
+    std::ranges::sort(ms);
+    return {ms[ms.size() / 2], ms[ms.size() / 4], ms[ms.size() - 1 - ms.size() / 4]};
+}
 
 struct Way {
     std::string name;
@@ -63,10 +63,10 @@ public:
                                       const TradeoffOptions& options) {
         auto renderer = SceneRenderer::create(context, session);
         if (!renderer) return renderer.error();
-        return Measurement(session, context, view, options, std::move(*renderer));
+        return Measurement(session, context, view, options, std::make_shared<SceneRenderer>(std::move(*renderer)));
     }
 
-    // As many as keep so many pictures to half of the time.
+    // As many as keep this number of pictures to half of the time. Then judges are ready.
     Result<int> choose_samples(std::size_t pictures) {
         const auto whole = session_.simplify(view_, {.goal = Goal::full(), .purpose = Purpose::picture});
         if (!whole) return whole.error();
@@ -78,12 +78,14 @@ public:
             sample_ms = frame->draw_ms / tried;
         }
         const double allowed_ms = 1e3 * options_.seconds / 2 / static_cast<double>(pictures);
-        samples_ = std::clamp(static_cast<int>(allowed_ms / std::max(sample_ms, 1e-3)), options_.least_samples,
-                              options_.samples);
-        return samples_;
+        const int samples = std::clamp(static_cast<int>(allowed_ms / std::max(sample_ms, 1e-3)), options_.least_samples,
+                                       options_.samples);
+        auto judge = PictureJudge::create(renderer_, session_, view_, samples);
+        if (!judge) return judge.error();
+        judge_ = std::move(*judge);
+        return samples;
     }
 
-    // The full model comes first: the others are judged against it.
     Result<TradeoffPoint> measure(const Way& way) {
         TradeoffPoint point{.name = way.name, .request = way.request, .is_of_view = way.is_of_view};
         const auto start = vdtree::Clock::now();
@@ -93,17 +95,20 @@ public:
         point.make_ms = vdtree::ms_since(start);
         point.triangles = made->stats.triangles;
         point.shift = largest_shift(session_, made->cuts);
-        auto frame = draw(made->cuts, samples_);
-        if (!frame) return frame.error();
-        if (const auto judged = judge(*frame, point); !judged) return judged.error();
+        const auto verdict = judge_->judge(made->cuts);
+        if (!verdict) return verdict.error();
+        point.visible_pixels = verdict->visible, point.v = verdict->v;
+        point.second_visible_pixels = verdict->second_visible, point.second_v = verdict->second_v;
+        point.ssim = verdict->ssim;
         std::vector<double> drawn;
         for (int i = 0; i < timed_frames; ++i) {
             const auto one = draw(made->cuts, 1);
             if (!one) return one.error();
             drawn.push_back(one->draw_ms);
         }
-        point.draw_ms = median(std::move(drawn));
-        const auto followed = way.is_of_view ? Result<double>(undefined) : follow(way.request);
+        point.draw_ms = timing(std::move(drawn));
+        if (way.is_of_view) return point;
+        const auto followed = follow(way.request);
         if (!followed) return followed.error();
         point.follow_ms = *followed;
         return point;
@@ -111,42 +116,17 @@ public:
 
 private:
     Measurement(Session& session, const render::Context& context, const vdtree::View& view,
-                const TradeoffOptions& options, SceneRenderer renderer)
+                const TradeoffOptions& options, std::shared_ptr<SceneRenderer> renderer)
         : session_(session), context_(context), view_(view), options_(options), renderer_(std::move(renderer)) {}
 
     Result<render::Frame> draw(const std::vector<vdtree::Cut>& cuts, int samples) {
         render::DrawOptions drawing;
         drawing.samples = samples;
         drawing.background = session_.background();
-        return renderer_.draw(drawn_cuts(cuts), view_, drawing);
+        return renderer_->draw(drawn_cuts(cuts), view_, drawing);
     }
 
-    Result<void> judge(const render::Frame& frame, TradeoffPoint& point) {
-        const perception::Display& display = session_.observer().display;
-        const perception::Image luminance = luminance_image(frame, display);
-        perception::Image codes = code_image(frame, display);
-        if (!judge_) {
-            auto judge = perception::Judge::create(luminance, judge_options(session_.observer()));
-            if (!judge) return judge.error();
-            std::optional<glm::dvec2> gaze;
-            if (session_.observer().gaze) gaze = session_.observer().gaze->px;
-            auto second = perception::Judge::create(
-                luminance, perception::second_judge_options(session_.observer().person, display, gaze));
-            if (!second) return second.error();
-            judge_ = std::move(*judge), second_ = std::move(*second), codes_ = std::move(codes);
-            return {};
-        }
-        const auto verdict = judge_->judge(luminance), other = second_->judge(luminance);
-        if (!verdict) return verdict.error();
-        if (!other) return other.error();
-        const auto similarity = perception::ssim(codes_, codes);
-        point.visible_pixels = verdict->visible_pixels, point.v = verdict->max_ratio;
-        point.second_visible_pixels = other->visible_pixels, point.second_v = other->max_ratio;
-        point.ssim = similarity ? *similarity : undefined; // of windows too small for it
-        return {};
-    }
-
-    Result<double> follow(const Request& request) {
+    Result<Timing> follow(const Request& request) {
         Follower follower(session_);
         std::vector<double> times;
         for (int i = 0; i <= timed_frames + 1; ++i) {
@@ -155,22 +135,16 @@ private:
             if (!followed) return followed.error();
             if (i > 1) times.push_back(vdtree::ms_since(start)); // the first makes the cut, the second what to watch
         }
-        return median(std::move(times));
+        return timing(std::move(times));
     }
 
     Session& session_;
     const render::Context& context_;
     const vdtree::View& view_;
     const TradeoffOptions& options_;
-    SceneRenderer renderer_;
-    int samples_ = 1;
-    std::optional<perception::Judge> judge_ = {}, second_ = {}; // of the full model
-    perception::Image codes_ = {};
+    std::shared_ptr<SceneRenderer> renderer_;
+    std::optional<PictureJudge> judge_ = {}; // against the full model
 };
-
-double frame_ms(const TradeoffPoint& point) {
-    return point.draw_ms + (std::isnan(point.follow_ms) ? 0 : point.follow_ms);
-}
 
 void find_front(std::vector<TradeoffPoint>& points) {
     for (TradeoffPoint& point : points)
@@ -185,9 +159,10 @@ void recommend(std::vector<TradeoffPoint>& points) {
     for (TradeoffPoint& point : points) {
         const bool shows_nothing = point.visible_pixels == 0 && point.second_visible_pixels == 0;
         // A claim about all views like this one, not the luck of one.
-        const bool is_a_claim = is_perceptual(point.request.fold_test.value_or(FoldTest::error)) &&
+        const FoldTest test = point.request.fold_test.value_or(FoldTest::error);
+        const bool is_a_claim = is_perceptual(test) && test != FoldTest::luebke_hallen &&
                                 point.request.goal.kind == Goal::Kind::imperceptible && point.request.threshold <= 1;
-        if (!point.is_of_view && shows_nothing && is_a_claim && frame_ms(point) < frame_ms(*best)) best = &point;
+        if (!point.is_of_view && shows_nothing && is_a_claim && point.triangles < best->triangles) best = &point;
     }
     best->is_recommended = true;
 }

@@ -57,6 +57,8 @@ public:
 
     // Waits until the GPU has done all that it was told to: for measuring times.
     Result<void> finish() const;
+    // Makes the GPU begin what it was told to do: for results that are polled, where nothing swaps buffers.
+    Result<void> flush() const;
 
     std::string renderer_name() const;        // GL_RENDERER
     std::string version() const;              // GL_VERSION

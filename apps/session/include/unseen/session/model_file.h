@@ -16,7 +16,7 @@ enum class LoadAs { model, scene, automatic }; // automatic: a scene where meshi
 
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
-    LoadAs as = LoadAs::model;          // of Scene::load(); trees and files of other formats are models
+    LoadAs as = LoadAs::automatic;      // for Scene::load(); trees and files of other formats are models
     std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
     bool without_textures = false;      // look at no images; colours of materials count all the same
     meshio::LeftOut drop = {};          // what glTF files may have that trees cannot
@@ -52,7 +52,7 @@ Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const Lo
 
 // What to tell the user where the colours of a tree that was not built as pre-lit look as if light were in them, by
 // vdtree::find_baked_light(): a sentence, or nothing. load_tree() notes it where it builds a tree.
-std::string hint_at_baked_light(const vdtree::VertexTree& tree);
+Message hint_at_baked_light(const vdtree::VertexTree& tree);
 
 // A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured.
 // Of textured trees the light is not conserved. Cost: some 50 us a node, and a second; twice that with a texture; in

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -21,16 +22,21 @@ struct TradeoffOptions {
     std::function<void(double)> progress = {}; // hears what share of the points is done
 };
 
+// Milliseconds of some frames.
+struct Timing {
+    static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    double median = unknown, low = unknown, high = unknown; // half of the frames took `low` to `high`
+};
+
 // One way, and what came of it. The judges are the session's observer's, on the CPU.
 struct TradeoffPoint {
     std::string name;
     Request request;
     bool is_of_view = false; // goes by what this view's picture shows, and holds for no other
     vdtree::Index triangles = 0;
-    double make_ms = 0; // from nothing, errors of folds measured before
-    double follow_ms =
-        0;              // a frame of an eye that moves around the scene by a tenth of a degree; median. NaN: of stills
-    double draw_ms = 0; // a frame with one sample a pixel; median
+    double make_ms = 0;    // from nothing, errors of folds measured before
+    Timing follow_ms = {}; // a frame of an eye that moves around the scene by a tenth of a degree; unknown for stills
+    Timing draw_ms = {};   // a frame with one sample a pixel
     std::uint64_t visible_pixels = 0,
                   second_visible_pixels = 0; // against the full model, by the judge and the second one
     double v = 0, second_v = 0;              // the largest difference, in thresholds
@@ -51,9 +57,9 @@ struct Tradeoff {
 double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts);
 
 // Measures points in the order of what they tell: the full model, the default test at several thresholds, the others,
-// budgets. Recommended is, of the points that hold for moving views and show nothing to either judge, the one whose
-// frames take the least time; the full model where no other shows nothing. Fails as Session::simplify() and drawing do; a
-// fold test that does not know the scene is left out. Cost: a simplification and some hundred drawings a point.
+// budgets. Recommended is the point with the fewest triangles whose fold test is safe, which holds for moving views and
+// shows nothing to either judge; if there is none, the full model. Fails as Session::simplify() and drawing do; a fold
+// test that does not know the scene is left out. Cost: a simplification and some hundred drawings a point.
 Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& context, const vdtree::View& view,
                                   const TradeoffOptions& options = {});
 
