@@ -10,11 +10,6 @@ namespace {
 
 constexpr int samples_to_judge = 64; // a pixel; with fewer, samples that jump at outlines can be seen
 
-bool is_same(const vdtree::View& a, const vdtree::View& b) {
-    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees &&
-           a.width == b.width && a.height == b.height;
-}
-
 FoldTest test_of(const WhatOptions& what) { return what.request.fold_test.value_or(FoldTest::error); }
 bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
@@ -93,7 +88,7 @@ Result<void> JudgedModel::look(ViewOptions options) {
     options.height = view_.height;
     const vdtree::View before = view_;
     view_ = make_view(*plain_.session, options);
-    if (!is_same(view_, before)) full_.reset();
+    if (view_ != before) full_.reset();
     return vdtree::validate(view_);
 }
 

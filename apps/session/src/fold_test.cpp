@@ -57,29 +57,29 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
         (may_measure && tree.interior_count() <= most_measured))
         return {};
     return {FoldTest::luebke_hallen_safe,
-            "the tree does not hold the errors of its folds, and measuring them takes long: session::measured()"};
+            "the tree does not hold the errors of its folds, and measuring them takes long"};
 }
 
 // Whether a test knows what it would have to look at.
 Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, bool shown) {
     if (!is_perceptual(test)) return {};
     if (sight.lighting && test == FoldTest::error && (!sight.lights->stands_still() || sight.lighting->specular > 0))
-        return invalid_argument("request.fold_test = " + name_of(test) +
-                                " knows only lights of scene.lights that stand still and make no highlights: use "
-                                "request.fold_test = luebke-hallen-safe.");
+        return invalid_field(
+            "{request.fold_test = }{} knows only lights of {scene.lights} that stand still and make no "
+            "highlights: use {request.fold_test = }luebke-hallen-safe.",
+            {name_of(test)});
     if (sight.lighting && shown && test != FoldTest::error)
-        return invalid_argument("request.shown and scene.lights go together with request.fold_test = error alone.");
+        return invalid_field("{request.shown} and {scene.lights} go together with {request.fold_test = }error alone.");
     if (sight.lighting && chroma)
-        return invalid_argument(
-            "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
+        return invalid_field("{request.chroma} and {scene.lights} exclude each other: ranges of colour are those of "
+                             "the tree's own light.");
     if (sight.object.tree.texture().empty()) return {};
     if (chroma)
-        return invalid_argument(
-            "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
+        return invalid_field(
+            "{request.chroma} does not look at the colours of textures: leave it out, or add {load.without_textures}.");
     if (test == FoldTest::error && !knows_texture(sight))
-        return invalid_argument("request.fold_test = error does not measure textures over vertices of several hues: "
-                                "use request.fold_test = "
-                                "luebke-hallen-safe, or add load.without_textures.");
+        return invalid_field("{request.fold_test = }error does not measure textures over vertices of several hues: use "
+                             "{request.fold_test = }luebke-hallen-safe, or add {load.without_textures}.");
     return {};
 }
 
@@ -102,11 +102,17 @@ struct Key {
     std::shared_ptr<const vdtree::Lighting> still_lights = {}; // of the test by errors
     bool is_lit = false, chroma = false;
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
-    int width = 0, height = 0;
-    double fov_y_degrees = 0;
-    glm::dvec2 shift = {0, 0};
+    vdtree::View lens = {};
     bool operator==(const Key&) const = default;
 };
+
+// The view without its place, which only viewpoints depend on; so do they on the height of an orthographic one.
+vdtree::View lens_of(vdtree::View view) {
+    const vdtree::View nowhere;
+    view.eye = nowhere.eye, view.target = nowhere.target, view.up = nowhere.up;
+    if (view.orthographic_height) view.orthographic_height = 1;
+    return view;
+}
 
 // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they
 // are rounded up to whole windows.
@@ -121,10 +127,7 @@ double tolerance_px(const Goal& goal) { return goal.kind == Goal::Kind::pixels ?
 Key key_of(const Sight& sight, const Decision& decision) {
     Key key;
     key.test = decision.test;
-    key.width = sight.view.width;
-    key.height = sight.view.height;
-    key.fov_y_degrees = sight.view.fov_y_degrees;
-    key.shift = sight.view.shift;
+    key.lens = lens_of(sight.view);
     if (!is_perceptual(decision.test)) {
         key.pixels = tolerance_px(decision.request.goal);
         return key;
@@ -198,8 +201,7 @@ Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(const Sight& sig
     if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::shared_ptr<const perception::ShadowEdges>();
     // A highlight may be all there is on what is otherwise black.
     const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
-    const SceneShadows::EdgesKey edges_key{
-        key.width, key.height, key.fov_y_degrees, key.shift, ambient, key.farthest_gaze_px, key.csf};
+    const SceneShadows::EdgesKey edges_key{key.lens, ambient, key.farthest_gaze_px, key.csf};
     SceneShadows& all = sight.scene_shadows;
     std::erase_if(all.known_edges, [](const auto& known) { return known.edges.expired(); });
     const auto found = std::ranges::find(all.known_edges, edges_key, &SceneShadows::KnownEdges::key);
@@ -250,16 +252,17 @@ LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting,
 std::shared_ptr<const ShadowReach> reach_of(const Sight& sight, const Decision& decision,
                                             const std::shared_ptr<const perception::ShadowEdges>& edges) {
     SceneShadows& all = sight.scene_shadows;
+    std::shared_ptr<const ShadowReach>& reach = sight.memory.reach;
     const vdtree::Lighting lighting = in_world(*sight.lighting, sight.object);
     std::span<const vdtree::Plane> window;
     if (decision.request.purpose == Purpose::picture) window = *sight.window;
-    if (all.reach && all.reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return all.reach;
+    if (reach && reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return reach;
     if (!all.receivers) all.receivers.emplace(all_standing(all));
     if (!all.lit || !is_alike(all.lit->lighting, lighting))
         all.lit = lit_by(*all.receivers, lighting, sight.lights->stands_still());
-    const bool moves = all.reach && !all.reach->is_of(sight.view.eye, window); // the first view may be the only one
-    all.reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
-    return all.reach;
+    const bool moves = reach && !reach->is_of(sight.view.eye, window); // the first view may be the only one
+    reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
+    return reach;
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
@@ -296,12 +299,6 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
 
 } // namespace
 
-bool is_same(const vdtree::View& a, const vdtree::View& b) {
-    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees &&
-           a.shift == b.shift && a.orthographic_height == b.orthographic_height && a.width == b.width &&
-           a.height == b.height;
-}
-
 struct KeptCriterion {
     Key key;
     vdtree::DistanceCriterion criterion;
@@ -334,7 +331,7 @@ bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
     const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
     const auto still = is_measured ? sight.lighting : nullptr;
     const double threshold = decision.request.threshold;
-    ShadowState& state = sight.shadow;
+    ShadowState& state = shadow_of(sight);
     const bool is_new = state.of != base || state.lighting != still || state.threshold != threshold;
     if (is_new) {
         state = {base, still, {}, nullptr, threshold, {}, nullptr, nullptr};
@@ -360,7 +357,7 @@ bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
 // The criterion, and outlines kept whose shadows would move visibly.
 Result<std::shared_ptr<const vdtree::DistanceCriterion>>
 keep_outlines(const Sight& sight, const Decision& decision, const std::shared_ptr<const KeptCriterion>& base) {
-    ShadowState& state = sight.shadow;
+    ShadowState& state = shadow_of(sight);
     if (!find_shadowing_outlines(sight, decision, base) && state.criterion) return state.criterion;
     if (count(state.kept) == 0) {
         state.criterion = {base, &base->criterion};
@@ -386,12 +383,12 @@ without_kept(ShadowState& state, const std::shared_ptr<const std::vector<std::ui
 } // namespace
 
 Result<Decision> decide(const Sight& sight, const Request& request, std::size_t object) {
-    if (request.shown && !is_same(request.shown->view(), sight.view))
-        return invalid_argument("request.shown is of another view.");
+    if (request.shown && request.shown->view() != sight.view)
+        return invalid_field("{request.shown} is of another view.");
     if (!request.masking.empty() && object >= request.masking.size())
-        return invalid_argument("request.masking has fewer pictures than the scene has objects.");
-    if (!request.masking.empty() && !is_same(request.masking[object].view(), sight.view))
-        return invalid_argument("request.masking is of another view.");
+        return invalid_field("{request.masking} has fewer pictures than the scene has objects.");
+    if (!request.masking.empty() && request.masking[object].view() != sight.view)
+        return invalid_field("{request.masking} is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
@@ -403,9 +400,9 @@ Result<Decision> decide(const Sight& sight, const Request& request, std::size_t 
         return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure)
-        return invalid_argument(
-            "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
-            "session::measured().");
+        return invalid_field(
+            "{request.fold_test = }error goes by errors that the tree does not hold: allow {request.may_measure}, or "
+            "call {session::measured()}.");
     const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
     Decision decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
     if (request.hidden && !why_not_hidden(sight, decision))
@@ -491,7 +488,7 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
         auto with_outlines = keep_outlines(sight, decision, kept);
         if (!with_outlines) return with_outlines.error();
         recipe.criterion = std::move(*with_outlines);
-        recipe.viewpoint.hidden = without_kept(sight.shadow, recipe.viewpoint.hidden);
+        recipe.viewpoint.hidden = without_kept(shadow_of(sight), recipe.viewpoint.hidden);
         return recipe;
     }
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
@@ -500,8 +497,8 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     if (!without) return without.error();
     if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
         find_shadowing_outlines(sight, decision, kept);
-        sight.shadow.criterion.reset();
-        without = vdtree::keeping(sight.object.tree, *without, sight.shadow.kept);
+        shadow_of(sight).criterion.reset();
+        without = vdtree::keeping(sight.object.tree, *without, shadow_of(sight).kept);
         if (!without) return without.error();
     }
     recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));

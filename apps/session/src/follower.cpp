@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "session_state.h"
@@ -84,6 +85,7 @@ private:
 
     std::shared_ptr<Session::State> session_;
     std::vector<Followed> objects_;
+    ShadowMemory shadows_;
     std::optional<double> glide_s_;
     double passed_s_ = 0; // since the last step of glides
 };
@@ -92,8 +94,8 @@ Result<void> Follower::State::set_glide(double seconds) {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
         if (!tree.texture().empty())
-            return Error{ErrorCode::invalid_argument,
-                         "Follower::set_glide() does not move textures: leave it out, or add load.without_textures."};
+            return invalid_field("{Follower::set_glide()} does not move textures: leave it out, or add "
+                                 "{load.without_textures}.");
         auto made = vdtree::Geomorph::create(tree, {.seconds = seconds});
         if (!made) return made.error();
         objects_[i].geomorph = std::move(*made);
@@ -158,9 +160,8 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::unfold_all() {
 
 Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Request& request) {
     if (request.goal.fill || request.milliseconds)
-        return Error{
-            ErrorCode::unsupported,
-            "Several objects share a budget without request.goal.fill and request.milliseconds: leave these out."};
+        return unsupported(Message::of("Several objects share a budget without {request.goal.fill} and "
+                                       "{request.milliseconds}: leave these out."));
     std::vector<vdtree::SceneObject> objects;
     for (Followed& object : objects_) {
         CutRecipe& recipe = *object.recipe;
@@ -212,7 +213,7 @@ void Follower::State::conclude(Report& report, const Prepared& prepared,
         facts.is_complete = stats[i].is_complete;
         if (decision.request.reasons && folds_hidden(sight, decision))
             facts.occluders = inner_spheres(sight.object, sight.cache).size();
-        if (decision.request.reasons && objects_[i].recipe) facts.outlines = count(sight.shadow.kept);
+        if (decision.request.reasons && objects_[i].recipe) facts.outlines = count(shadow_of(sight).kept);
         if (decision.request.reasons) {
             for (Effect& effect : effects_of(sight, decision, facts)) {
                 effect.object = i;
@@ -238,7 +239,7 @@ Result<void> Follower::State::glide(Report& report) {
 }
 
 Result<Report> Follower::State::follow(const vdtree::View& view, const Request& request) {
-    const auto prepared = session_->prepare(view, request);
+    const auto prepared = session_->prepare(view, request, shadows_);
     if (!prepared) return prepared.error();
     if (const auto taken = take_up_trees(); !taken) return taken.error();
     const bool folds = request.goal.kind != Goal::Kind::full;
@@ -289,7 +290,6 @@ const vdtree::Geomorph* Follower::geomorph(std::size_t object) const {
 Result<Simplification> Session::simplify(const vdtree::View& view, const Request& request) {
     Request once = request;
     once.hysteresis = 1; // with no cut before, nothing is to keep still
-    const State::OneView one_view(*state_);
     Follower follower(*this);
     auto report = follower.follow(view, once);
     if (!report) return report.error();

@@ -137,8 +137,8 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
-      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
-      shadows_(scene.objects.size()), scene_shadows_{scene, caches} {
+      still_lights_(scene.objects.size() + scene.backdrop.size()),
+      lit_criteria_(scene.objects.size()), scene_shadows_{scene, caches} {
     share_caches();
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;
@@ -161,9 +161,9 @@ Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Obse
         return invalid_argument("A scene needs an object: load one, or add it to scene.objects.");
     if (const auto valid = perception::validate(observer.display); !valid) return valid.error();
     if (!(observer.velocity.value() >= 0 && observer.velocity <= perception::fastest_velocity))
-        return invalid_argument("observer.velocity must lie in 0 to " +
-                                number_text(perception::fastest_velocity.value()) + " degrees a second, not " +
-                                number_text(observer.velocity.value()) + ".");
+        return invalid_field(
+            "{observer.velocity} must lie in 0 to {} degrees a second, not {}.",
+            {number_text(perception::fastest_velocity.value()), number_text(observer.velocity.value())});
     const auto background = relative_background(observer.display, scene.background);
     if (!background) return background.error();
     return std::shared_ptr<State>(new State(std::move(scene), std::move(observer), std::move(messages), *background));
@@ -216,7 +216,7 @@ Result<std::shared_ptr<const perception::CsfTable>> Session::State::sensitivity(
     if (observer.velocity <= perception::least_velocity) return at_rest;
     if (!moving_ || moving_->velocity != observer.velocity || moving_->at_rest != at_rest) {
         auto made = at_rest->moving(observer.velocity);
-        if (!made) return Error{made.error().code, "observer.velocity: " + made.error().message + "."};
+        if (!made) return Error{made.error().code, Message::of("{observer.velocity}: ") + made.error().message + "."};
         moving_ = Moving{observer.velocity, std::move(at_rest),
                          std::make_shared<const perception::CsfTable>(std::move(*made))};
     }
@@ -262,25 +262,10 @@ Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
     return {};
 }
 
-Session::State::OneView::OneView(State& state)
-    : state_(state), shadows_(state.shadows_), reach_(std::exchange(state.scene_shadows_.reach, nullptr)) {
-    for (ShadowState& shadow : state.shadows_) {
-        shadow.reach.reset();
-        shadow.kept.clear();
-        shadow.criterion.reset();
-        shadow.hidden.reset();
-    }
-}
-
-Session::State::OneView::~OneView() {
-    if (!reach_) return; // nobody has followed anything yet, so this view serves as the first
-    state_.shadows_ = std::move(shadows_);
-    state_.scene_shadows_.reach = std::move(reach_);
-}
-
-Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
+Result<std::vector<Sight>> Session::State::look(const vdtree::View& view, ShadowMemory& memory) {
     if (const auto valid = vdtree::validate(view); !valid) return valid.error();
     window_ = window_of(view);
+    memory.of_objects.resize(scene.objects.size());
     std::vector<Sight> sights;
     sights.reserve(scene.objects.size());
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
@@ -294,7 +279,7 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], shadows_[i], scene_shadows_, observer, view,
+        sights.push_back({scene.objects[i], i, *caches[i], lit_criteria_[i], scene_shadows_, memory, observer, view,
                           scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
@@ -310,7 +295,7 @@ Result<void> Session::State::measure(std::size_t object) {
     const MeasurementPlace* const known = place_of(of);
     const MeasurementPlace* const place = known && known->is_of_tree_file ? known : nullptr;
     if (messages.note && of.tree.interior_count() >= told_from && !place)
-        messages.note("measuring what folds change (session::measured() keeps that in the tree) ...");
+        messages.note(Message::of("measuring what folds change ({session::measured()} keeps that in the tree) ..."));
     auto with_errors = measured_once(of.tree, place, messages);
     if (!with_errors) return with_errors.error();
     of.measurement.reset();
@@ -321,7 +306,6 @@ Result<void> Session::State::measure(std::size_t object) {
         scene.objects[i].tree = with_errors->share();
         caches[i].reset();
         lit_criteria_[i].reset();
-        shadows_[i] = {};
         ++tree_count[i];
     }
     share_caches();
@@ -337,9 +321,9 @@ Result<void> Session::State::measure_under_lights(std::size_t object) {
     return {};
 }
 
-Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request& request) {
+Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request& request, ShadowMemory& memory) {
     if (const auto valid = validate(request); !valid) return valid.error();
-    auto sights = look(view);
+    auto sights = look(view, memory);
     if (!sights) return sights.error();
     std::vector<Decision> decisions;
     for (std::size_t i = 0; i < sights->size(); ++i) {
@@ -356,7 +340,7 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
             continue; // of another object with this tree
         if (const auto measured = is_lit ? measure_under_lights(i) : measure(i); !measured) return measured.error();
     }
-    return prepare(view, request); // of the other trees
+    return prepare(view, request, memory); // of the other trees
 }
 
 // ---- the session
@@ -427,7 +411,8 @@ vdtree::View Session::default_view() const {
 
 Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std::size_t object) const {
     if (const auto valid = validate(request); !valid) return valid.error();
-    const auto sights = state_->look(view);
+    ShadowMemory none;
+    const auto sights = state_->look(view, none);
     if (!sights) return sights.error();
     const auto decision = decide((*sights)[object], request, object);
     if (!decision) return decision.error();
@@ -435,7 +420,8 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
 }
 
 Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
-    const auto prepared = state_->prepare(view, request);
+    ShadowMemory none;
+    const auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;
     for (std::size_t i = 0; i < prepared->sights.size(); ++i)
@@ -445,8 +431,9 @@ Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Reque
 
 Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& request, std::size_t object) {
     if (request.goal.kind == Goal::Kind::full)
-        return invalid_argument("request.goal full folds nothing, so there is nothing to cut by.");
-    const auto prepared = state_->prepare(view, request);
+        return invalid_field("{request.goal = full} folds nothing, so there is nothing to cut by.");
+    ShadowMemory none;
+    const auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     return make_recipe(prepared->sights[object], prepared->decisions[object]);
 }
@@ -460,7 +447,8 @@ Result<std::optional<vdtree::Lighting>> Session::backdrop_lighting(const vdtree:
 }
 
 Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) const {
-    const auto sights = state_->look(view);
+    ShadowMemory none;
+    const auto sights = state_->look(view, none);
     if (!sights) return sights.error();
     if (sights->empty()) return perception::SceneLuminance{state_->background, state_->background};
     return sights->front().luminance;

@@ -13,8 +13,8 @@
 
 namespace unseen::session {
 
-// All objects as they are seen in a view, and what is to be done about each. Refers to the state, the view and the
-// request.
+// All objects as they are seen in a view, and what is to be done about each. Refers to the state, the view, the request
+// and the memory.
 struct Prepared {
     std::vector<Sight> sights;
     std::vector<Decision> decisions; // by object
@@ -28,25 +28,12 @@ class Session::State {
 public:
     static Result<std::shared_ptr<State>> create(Scene scene, Observer observer, Messages messages);
 
-    Result<std::vector<Sight>> look(const vdtree::View& view);
+    // Sights refer to the state, the view and the memory.
+    Result<std::vector<Sight>> look(const vdtree::View& view, ShadowMemory& memory);
     // Measures the errors of folds where a decision wants them.
-    Result<Prepared> prepare(const vdtree::View& view, const Request& request);
+    Result<Prepared> prepare(const vdtree::View& view, const Request& request, ShadowMemory& memory);
     // Of all objects, then of the backdrop.
     Result<std::shared_ptr<const vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
-
-    // While it lives, shadows are decided as if no view had been looked at before. Then followers' views count again.
-    class OneView {
-    public:
-        explicit OneView(State& state);
-        OneView(const OneView&) = delete;
-        OneView& operator=(const OneView&) = delete;
-        ~OneView();
-
-    private:
-        State& state_;
-        std::vector<ShadowState> shadows_;
-        std::shared_ptr<const ShadowReach> reach_;
-    };
 
     Scene scene;
     Observer observer;
@@ -76,7 +63,6 @@ private:
     std::shared_ptr<const perception::CsfTable> widened_of_;
     std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
     std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
-    std::vector<ShadowState> shadows_;                                  // likewise
     SceneShadows scene_shadows_;
     bool is_crowded_ = false;
     std::vector<vdtree::Plane> window_;                   // of the last look

@@ -40,9 +40,7 @@ struct SceneShadows {
     // How shadows' edges are seen in views like this one. The same object for the same key, however long ago it was made:
     // objects go by one reach only where their criteria have the same.
     struct EdgesKey {
-        int width = 0, height = 0;
-        double fov_y_degrees = 0;
-        glm::dvec2 shift = {0, 0};
+        vdtree::View lens = {}; // without its place
         double ambient = 0;
         std::optional<double> farthest_gaze_px = {};
         std::shared_ptr<const perception::CsfTable> csf = {};
@@ -54,7 +52,6 @@ struct SceneShadows {
     };
     std::vector<KnownEdges> known_edges = {};                       // that criteria go by
     std::shared_ptr<const perception::ShadowEdges> last_edges = {}; // also where none does any more
-    std::shared_ptr<const ShadowReach> reach = {};                  // of the last views
 };
 
 // Of an object whose lights cast shadows.
@@ -69,12 +66,19 @@ struct ShadowState {
     std::shared_ptr<const std::vector<std::uint64_t>> hidden = {};   // of the last view, without what is kept
 };
 
+// What a follower keeps of the views that it has seen, so that shadows do not flicker. A single view begins anew.
+struct ShadowMemory {
+    std::vector<ShadowState> of_objects = {};
+    std::shared_ptr<const ShadowReach> reach = {}; // of the last views
+};
+
 struct Sight {
     const Object& object;
+    std::size_t number; // of the object
     ObjectCache& cache;
     std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
-    ShadowState& shadow;                                 // likewise
     SceneShadows& scene_shadows;
+    ShadowMemory& memory;
     const Observer& observer;
     const vdtree::View& view;
     const calibration::LightRig* lights;              // null: the tree's own light
@@ -87,6 +91,8 @@ struct Sight {
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<glm::dvec2> gaze_px = {};
 };
+
+inline ShadowState& shadow_of(const Sight& sight) { return sight.memory.of_objects[sight.number]; }
 
 // What will be done for a valid request.
 struct Decision {

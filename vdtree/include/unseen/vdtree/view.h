@@ -37,6 +37,8 @@ struct View {
     // Of an orthographic view: the world units from the window's bottom to its top, in place of the field. Things then
     // are of one size wherever they are along the line of sight.
     std::optional<double> orthographic_height = {};
+
+    bool operator==(const View&) const = default;
 };
 
 // The view of a camera that is given as matrices in OpenGL's way: column vectors, the camera looking along -z with y up,
