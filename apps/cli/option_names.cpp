@@ -1,5 +1,6 @@
 #include "option_names.h"
 
+#include <algorithm>
 #include <string_view>
 
 namespace unseen::app {
@@ -9,7 +10,7 @@ struct OptionName {
     std::string_view field, option;
 };
 
-// Fields with values come first: "request.fold_test = error" becomes "--fold-test error".
+// "request.fold_test = " stands before a value: "request.fold_test = error" becomes "--fold-test error".
 constexpr OptionName option_names[] = {
     {"request.fold_test = ", "--fold-test "},
     {"scene.background = ", "--background "},
@@ -22,12 +23,13 @@ constexpr OptionName option_names[] = {
     {"request.goal.triangles", "--triangles"},
     {"request.goal.pixels", "--pixels"},
     {"request.goal.fill", "--fill-budget"},
-    {"request.goal full", "--full"},
+    {"request.goal = full", "--full"},
     {"request.milliseconds", "--milliseconds"},
     {"request.threshold", "--threshold"},
     {"observer.csf", "--csf"},
     {"observer.velocity", "--velocity"},
     {"observer.person", "--observer"},
+    {"request.may_measure", "--fold-test error"},
     {"scene.lights", "--lights"},
     {"Scene::relight()", "--light, --ambient or --fill-light"},
     {"read.drop = ", "--drop "},
@@ -51,10 +53,14 @@ constexpr OptionName option_names[] = {
 
 } // namespace
 
-std::string with_option_names(std::string text) {
-    for (const auto& [field, option] : option_names)
-        for (std::size_t at = 0; (at = text.find(field, at)) != std::string::npos; at += option.size())
-            text.replace(at, field.size(), option);
+std::string with_option_names(const Message& message) {
+    std::string text = message;
+    const auto names = message.names();
+    for (std::size_t i = names.size(); i-- > 0;) { // from behind, so that the places stay
+        const std::string_view name = std::string_view(message).substr(names[i].begin, names[i].size);
+        const auto* known = std::ranges::find(option_names, name, &OptionName::field);
+        if (known != std::end(option_names)) text.replace(names[i].begin, names[i].size, known->option);
+    }
     return text;
 }
 

@@ -1,11 +1,13 @@
-// The options of the command for the fields that the session library speaks of.
+// The options of the command for the fields that messages of the libraries name.
 #pragma once
 
 #include <string>
 
+#include <unseen/vdtree/result.h>
+
 namespace unseen::app {
 
 // "request.chroma and scene.lights exclude each other" -> "--chroma and --lights exclude each other".
-std::string with_option_names(std::string text);
+std::string with_option_names(const Message& message);
 
 } // namespace unseen::app

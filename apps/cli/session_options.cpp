@@ -64,8 +64,8 @@ Result<session::Session> assemble(session::Scene scene, Surroundings around, con
 
 session::Messages terminal_messages() {
     session::Messages messages;
-    messages.note = [](const std::string& text) { print_note(with_option_names(text)); };
-    messages.warning = [](const std::string& text) { print_warning(with_option_names(text)); };
+    messages.note = [](const Message& text) { print_note(with_option_names(text)); };
+    messages.warning = [](const Message& text) { print_warning(with_option_names(text)); };
     return messages;
 }
 

@@ -78,7 +78,7 @@ Command cache_command(CLI::App& app) {
         ->type_name("SIZE")
         ->check([](const std::string& text) {
             const auto size = session::parse_size(text);
-            return size ? std::string() : size.error().message;
+            return size ? "" : size.error().message;
         })
         ->excludes(clear);
     add_json_option(*verb, a->json);

@@ -150,7 +150,7 @@ TEST(Subdivide, RefusesWhatCannotBe) {
     const Mesh mesh = shapes::icosphere(1);
     const auto message = [&](const SubdivideOptions& options) {
         const auto result = subdivide(mesh, options);
-        return result ? std::string() : result.error().message;
+        return result ? "" : result.error().message;
     };
     EXPECT_THAT(message(up_to(10)), testing::HasSubstr("80 triangles already"));
     EXPECT_THAT(message(rounds(-1)), testing::HasSubstr("not -1"));

@@ -32,7 +32,7 @@ protected:
     vdtree::Lighting at(const LightRig& rig, double seconds) const { return rig.at(seconds, tree_, view_, {}); }
     std::string complaint(const std::string& text) const {
         const auto rig = LightRig::read(write(text, "lights.json"));
-        return rig ? std::string() : rig.error().message;
+        return rig ? "" : rig.error().message;
     }
     static void expect_near(glm::dvec3 a, glm::dvec3 b) {
         EXPECT_LT(glm::length(a - b), 1e-6) << a.x << " " << a.y << " " << a.z;

@@ -246,7 +246,7 @@ TEST(People, AreReadWithErrorsThatNameTheLine) {
         "dataset,frequency_cpd,temporal_hz,eccentricity_deg,luminance_cdm2,area_deg2,sensitivity\n";
     const auto message = [](const std::string& text) {
         const auto read = parse_sensitivities(text, "t.csv");
-        return read ? std::string() : read.error().message;
+        return read ? "" : read.error().message;
     };
     EXPECT_THAT(message(""), HasSubstr("columns' names"));
     EXPECT_THAT(message("a,b\n"), HasSubstr("t.csv:1: there is no column dataset"));

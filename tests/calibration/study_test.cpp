@@ -103,7 +103,7 @@ TEST(Study, RefusesFilesThatLeadElsewhere) {
             "pixels_per_degree": 30, "pairs": [{"condition": "x", "original": "a.png", "other": ")"
                             << picture << R"("}]})";
         const auto read = read_study(file);
-        return read ? std::string() : read.error().message;
+        return read ? "" : read.error().message;
     };
     EXPECT_EQ(complaint("b.png"), "");
     for (const char* outside : {"../b.png", "/etc/passwd", "x/../../b.png", ""})
@@ -141,7 +141,7 @@ TEST(StudyAnswers, RefuseDamagedFiles) {
     const auto complaint = [&](const std::string& text) {
         std::ofstream(file) << text;
         const auto read = analyse_answers(std::span(&file, 1));
-        return read ? std::string() : read.error().message;
+        return read ? "" : read.error().message;
     };
     EXPECT_EQ(complaint(header + "ann,0,x,a,b,0,which,,left,left,1,1.5\n"), "");
     EXPECT_THAT(complaint(""), HasSubstr("csv:1: the first line"));

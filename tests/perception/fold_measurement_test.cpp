@@ -343,7 +343,7 @@ TEST(FoldErrors, AreRefusedWhereTheyAreNone) {
     const VertexTree tree = built(shapes::bumpy_sphere(2, 0.03));
     const auto message = [](const VertexTree& of) {
         const auto criterion = error_distances(of, View{.eye = {0, 0, 3}}, {});
-        return criterion ? std::string() : criterion.error().message;
+        return criterion ? "" : criterion.error().message;
     };
     const auto with = [&](auto&& change) {
         std::vector<FoldRecord> records(records_of(tree).begin(), records_of(tree).end());

@@ -228,7 +228,7 @@ TEST(LitFolds, RefuseDamagedAttributes) {
     const auto complaint = [](const Result<VertexTree>& damaged) {
         EXPECT_TRUE(damaged);
         const auto read = LitFolds::of(*damaged);
-        return read ? std::string() : read.error().message;
+        return read ? "" : read.error().message;
     };
     const auto with_folds = [&](std::vector<Folds> values, AttributeDomain domain = AttributeDomain::interior_node) {
         return with.with_attribute("lit_folds", domain, std::move(values));

@@ -304,7 +304,7 @@ TEST_F(LayersTest, StippledItemsShareThePixels) {
 TEST_F(LayersTest, RefusesWhatCannotBeSplit) {
     const auto why = [&](int width, int height, const LayerOptions& options) {
         const auto made = LayerPasses::create(context(), width, height, options);
-        return made ? std::string() : made.error().message;
+        return made ? "" : made.error().message;
     };
     EXPECT_THAT(why(8, 8, {.most = 17}), HasSubstr("1 to 16 layers, not 17"));
     EXPECT_THAT(why(8, 8, {.most = 0}), HasSubstr("not 0"));
@@ -317,7 +317,7 @@ TEST_F(LayersTest, RefusesWhatCannotBeSplit) {
     auto passes = LayerPasses::create(context(), 8, 8, {.most = 2});
     const auto refused = [&](const LayerSplit& split) {
         const auto done = passes->draw(strips.objects, {}, {.view = ahead(8, 8)}, split);
-        return done ? std::string() : done.error().message;
+        return done ? "" : done.error().message;
     };
     EXPECT_THAT(refused(strips.split), HasSubstr("in 3 layers, and there are only 2"));
     EXPECT_THAT(refused({.layer_of = {0, 1}, .count = 2}), HasSubstr("of 2 objects, not of 3"));

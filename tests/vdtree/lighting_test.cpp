@@ -163,7 +163,7 @@ TEST(Lights, AtAVertexOrInsideAreRefused) {
     const glm::dvec3 vertex(tree.positions()[tree.interior_count()]);
     const auto complaint = [&](glm::dvec3 at) {
         const auto checked = check_lights(tree, lit_by(point(at, 1, 1)));
-        return checked ? std::string() : checked.error().message;
+        return checked ? "" : checked.error().message;
     };
     EXPECT_NE(complaint(vertex).find("lights[0].position is at a vertex"), std::string::npos);
     EXPECT_NE(complaint(glm::dvec3(2, 0, 0) - tree.origin()).find("inside"), std::string::npos); // in the tube

@@ -66,7 +66,7 @@ bool is_read_or_refused(const std::string& bytes, const std::string& name, const
 std::string error_of(const std::string& bytes, const std::string& name) {
     const Result<meshio::ReadResult> result = read_exactly(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
-    return result ? std::string() : result.error().message;
+    return result ? "" : result.error().message;
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

@@ -37,7 +37,7 @@ meshio::ReadResult read(const std::string& bytes, const std::string& name, const
 std::string error_of(const std::string& bytes, const std::string& name) {
     const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
-    return result ? std::string() : result.error().message;
+    return result ? "" : result.error().message;
 }
 
 // A folder of its own for each test, removed with everything in it.
@@ -1001,7 +1001,7 @@ TEST(Mesh, ValidateNamesTheFirstOffender) {
     EXPECT_TRUE(validate(mesh.view()));
     const auto message = [](const Mesh& m) {
         const Result<void> valid = validate(m.view());
-        return valid ? std::string() : valid.error().message;
+        return valid ? "" : valid.error().message;
     };
     Mesh bad = mesh;
     bad.positions[1].z = std::numeric_limits<double>::infinity();

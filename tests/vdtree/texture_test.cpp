@@ -138,7 +138,7 @@ TEST(Textures, AreCheckedBeforeTheyAreLaid) {
     Mesh mesh = textures::textured_grid(3, textures::checkerboard(8, 8, 2, 0, 255));
     const auto complaint = [](const Mesh& m) {
         const auto tree = build_tree(m.view());
-        return tree ? std::string() : tree.error().message;
+        return tree ? "" : tree.error().message;
     };
     EXPECT_EQ(complaint(mesh), "");
     Mesh bad = mesh;

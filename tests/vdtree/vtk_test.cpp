@@ -41,7 +41,7 @@ meshio::ReadResult read(const std::string& bytes, const std::string& name, const
 std::string error_of(const std::string& bytes, const std::string& name) {
     const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
-    return result ? std::string() : result.error().message;
+    return result ? "" : result.error().message;
 }
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {

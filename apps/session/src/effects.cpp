@@ -73,7 +73,7 @@ Effect csf_effect(const Sight& sight, const Decision& decision) {
 Effect motion_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"motion", false, "only the perceptual fold test knows it"};
     if (sight.observer.velocity <= perception::least_velocity)
-        return {"motion", false, "without observer.velocity everything counts as still on the retina"};
+        return {"motion", false, Message::of("without {observer.velocity} everything counts as still on the retina")};
     return {
         "motion", true,
         "everything counts as moving over the retina at " + rounded(sight.observer.velocity.value(), 3) +
@@ -110,7 +110,7 @@ Effect reach_effect(const Sight& sight, const Decision& decision) {
 
 Effect prelit_effect(const Sight& sight) {
     if (sight.lighting && !sight.object.tree.colours().empty())
-        return {"pre-lit colours", false, "scene.lights lights the colours"};
+        return {"pre-lit colours", false, Message::of("{scene.lights} lights the colours")};
     if (sight.object.tree.is_prelit())
         return {"pre-lit colours", true,
                 sight.object.tree.colours().empty() ? "the texture is taken as lit"
@@ -123,7 +123,8 @@ Effect prelit_effect(const Sight& sight) {
 Effect texture_effect(const Sight& sight, const Decision& decision) {
     if (sight.object.tree.texture().empty())
         return {"texture", false,
-                sight.object.texture_left_out ? "load.without_textures leaves it out" : "the model has none"};
+                sight.object.texture_left_out ? Message::of("{load.without_textures} leaves it out")
+                                              : Message("the model has none")};
     if (!is_perceptual(decision)) return {"texture", true, "drawn; folds are not tested against it"};
     if (decision.test == FoldTest::error)
         return {"texture", true,
@@ -136,7 +137,8 @@ Effect texture_effect(const Sight& sight, const Decision& decision) {
 
 Effect chroma_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"chroma", false, "only the perceptual fold test knows it"};
-    if (!decision.request.chroma) return {"chroma", false, "without request.chroma only luminance counts"};
+    if (!decision.request.chroma)
+        return {"chroma", false, Message::of("without {request.chroma} only luminance counts")};
     if (!perception::has_chroma(sight.object.tree)) return {"chroma", false, "nothing has any colour"};
     return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
@@ -165,7 +167,7 @@ Effect shadow_effect(const Sight& sight, const Decision& decision, const std::op
                 why + "; the fold test " + name_of(decision.test) +
                     " does not look at them, so their edges may move visibly"};
     if (!decision.request.keeps_shadows)
-        return {"shadows", true, why + "; without request.keeps_shadows their edges may move visibly"};
+        return {"shadows", true, why + Message::of("; without {request.keeps_shadows} their edges may move visibly")};
     why += "; folds are tested with any of these hidden, and outlines that a light sees fold only where their shadows' "
            "edges move invisibly";
     if (decision.request.purpose == Purpose::picture) why += " or out of the window";
@@ -267,7 +269,7 @@ Effect masking_effect(const Sight& sight, const Decision& decision) {
                 "folds are tested against thresholds that the scene around the object raises in this view, by " +
                     std::to_string(decision.masking->bands().size()) + " bands of frequency"};
     if (decision.request.masking.empty())
-        return {"masking", false, "without request.masking nothing masks what folds change"};
+        return {"masking", false, Message::of("without {request.masking} nothing masks what folds change")};
     if (decision.test != FoldTest::error)
         return {"masking", false, "the fold test " + name_of(decision.test) + " does not know it"};
     return {"masking", false, why_unmasked(sight)};
@@ -308,7 +310,9 @@ std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, con
 }
 
 Effect geomorph_effect(const vdtree::Geomorph* geomorph, const vdtree::Cut& cut) {
-    if (!geomorph) return {"geomorphs", false, "vertices do not glide unless Follower::set_glide() says for how long"};
+    if (!geomorph)
+        return {"geomorphs", false,
+                Message::of("vertices do not glide unless {Follower::set_glide()} says for how long")};
     return {"geomorphs", true,
             "vertices glide for " + rounded(geomorph->seconds(), 3) + " s; " + grouped(geomorph->moved().size()) +
                 " do now, and " + grouped(geomorph->drawn().triangle_count() - cut.triangle_count()) +

@@ -13,6 +13,9 @@ namespace unseen::session {
 // Larger trees are measured only where somebody asks for that. Interior nodes; about a minute on one core.
 inline constexpr vdtree::NodeId most_measured = 2'000'000;
 
+// "kept in FOLDER for the next time".
+Message kept_in(const TreeCache& cache);
+
 // Where what is measured of a tree is kept.
 struct MeasurementPlace {
     TreeCache cache;

@@ -8,6 +8,7 @@
 #include <unseen/vdtree/baked_light.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 #include <unseen/vdtree/tree_io.h>
@@ -24,13 +25,13 @@ namespace fs = std::filesystem;
 // What of the options is of trees.
 Result<vdtree::VertexTree> as_asked(Result<vdtree::VertexTree> tree, const fs::path& file, const LoadOptions& options) {
     if (tree && !options.texture.empty())
-        return Error{ErrorCode::invalid_argument,
-                     file.string() + " is a tree, whose texture is laid when it is built: give load.texture to "
-                                     "session::read_textured_mesh()."};
+        return invalid_field("{} is a tree, whose texture is laid when it is built: give {load.texture} to "
+                             "{session::read_textured_mesh()}.",
+                             {file.string()});
     if (tree && options.prelit)
-        return Error{ErrorCode::invalid_argument, file.string() + " is a tree: whether its colours are pre-lit was "
-                                                                  "decided when it was built. Give load.prelit with "
-                                                                  "the mesh."};
+        return invalid_field("{} is a tree: whether its colours are pre-lit was decided when it was built. Give "
+                             "{load.prelit} with the mesh.",
+                             {file.string()});
     if (tree && options.without_textures && !tree->texture().empty()) return tree->untextured();
     return tree;
 }
@@ -44,7 +45,7 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     building.prelit = options.prelit;
     auto tree = vdtree::build_tree(read->mesh.view(), building);
     if (!tree) return tree;
-    if (const std::string hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
+    if (const Message hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
     const bool measures =
         options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
@@ -68,11 +69,10 @@ Result<vdtree::VertexTree> make_and_keep(const TreeCache& cache, const std::opti
     Result<vdtree::VertexTree> tree = make();
     if (!tree) return tree;
     const double seconds = vdtree::seconds_since(start);
-    std::string what_becomes = "vdtree::write_tree() does it once and for all";
+    Message what_becomes = Message::of("{vdtree::write_tree()} does it once and for all");
     if (cache.is_on() && key) {
         const auto kept = cache.keep(*key, file, *tree);
-        what_becomes = kept ? "kept in " + cache.folder().string() + " for the next time (session::TreeCache)"
-                            : "not kept for the next time: " + kept.error().message;
+        what_becomes = kept ? kept_in(cache) : "not kept for the next time: " + kept.error().message;
     }
     if (messages.note) messages.note(deed(*tree) + " in " + rounded(seconds, 2) + " s; " + what_becomes);
     return tree;
@@ -109,6 +109,10 @@ Result<LoadedTree> load_mesh(const fs::path& file, const LoadOptions& options) {
 }
 
 } // namespace
+
+Message kept_in(const TreeCache& cache) {
+    return Message::of("kept in {} for the next time ({session::TreeCache})", {cache.folder().string()});
+}
 
 std::string name_of(TreeOrigin origin) {
     switch (origin) {
@@ -167,7 +171,7 @@ Result<vdtree::VertexTree> open_tree(const fs::path& file, const LoadOptions& op
     return loaded ? Result<vdtree::VertexTree>(std::move(loaded->tree)) : loaded.error();
 }
 
-std::string hint_at_baked_light(const vdtree::VertexTree& tree) {
+Message hint_at_baked_light(const vdtree::VertexTree& tree) {
     if (tree.is_prelit()) return {};
     const auto baked = vdtree::find_baked_light(tree);
     if (!baked || !(baked->explained > vdtree::telling_share)) return {};
@@ -175,7 +179,7 @@ std::string hint_at_baked_light(const vdtree::VertexTree& tree) {
     const glm::dvec3 from(baked->direction);
     return "the colours look as if light were baked in (a light from " + hundredths(from.x) + " " + hundredths(from.y) +
            " " + hundredths(from.z) + " explains " + shortest(std::round(100 * baked->explained)) +
-           "% of their variation); if so, use load.prelit.";
+           "% of their variation); if so, use " + Message::of("{load.prelit}.");
 }
 
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads, const Progress& progress) {
@@ -222,8 +226,9 @@ Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree
             if (auto folds = perception::LitFolds::of(**kept)) return folds;
     }
     if (messages.note && takes_long)
-        messages.note("measuring what folds change under lights" +
-                      std::string(place ? "" : " (session::measured_under_lights() keeps that in the tree)") + " ...");
+        messages.note(
+            "measuring what folds change under lights" +
+            (place ? Message() : Message::of(" ({session::measured_under_lights()} keeps that in the tree)")) + " ...");
     if (!place) return perception::LitFolds::measure(tree, 0, messages.progress);
     const auto with_folds = make_and_keep(
         place->cache, key, place->file.string() + std::string(under_lights), messages,

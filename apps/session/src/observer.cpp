@@ -43,7 +43,7 @@ Result<ObserverChoice> choose_observer(const std::string& name_or_file) {
     if (person) return ObserverChoice{*person, {}};
     std::error_code unknown;
     if (!std::filesystem::exists(name_or_file, unknown))
-        return invalid_argument("observer.person: there is no such file, and " + person.error().message);
+        return invalid_argument(Message::of("{observer.person}: there is no such file, and ") + person.error().message);
     auto table = calibration::read_csf(name_or_file);
     if (!table) return table.error();
     return ObserverChoice{{}, std::make_shared<const perception::CsfTable>(std::move(*table))};
@@ -53,12 +53,13 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     const auto model = perception::csf_model(model_or_file);
     if (model) {
         if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
-        return invalid_argument("observer.csf = " + model_or_file +
-                                " is sensitivity to colour, not to luminance contrast.");
+        return invalid_field("{observer.csf = }{} is sensitivity to colour, not to luminance contrast.",
+                             {model_or_file});
     }
     std::error_code unknown;
     if (!std::filesystem::exists(model_or_file, unknown))
-        return invalid_argument("observer.csf: there is no such file, and " + model.error().message + ".");
+        return invalid_argument(Message::of("{observer.csf}: there is no such file, and ") + model.error().message +
+                                ".");
     auto table = calibration::read_csf(model_or_file);
     if (!table) return table.error();
     return CsfChoice{{}, std::move(*table)};
@@ -81,10 +82,9 @@ Result<float> relative_background(const perception::Display& display, std::optio
     // Asking for the black or white that the display reports must work in spite of rounding.
     constexpr double rounding = 1e-9;
     if (asked && !(relative >= -rounding && relative <= 1 + rounding)) {
-        return invalid_argument("scene.background = " + number_text(wanted.value()) +
-                                " cd/m2 is not between the display's black (" +
-                                number_text(perception::black_level(display).value()) + ") and white (" +
-                                number_text(perception::to_luminance(display, 1).value()) + ").");
+        return invalid_field("{scene.background = }{} cd/m2 is not between the display's black ({}) and white ({}).",
+                             {number_text(wanted.value()), number_text(perception::black_level(display).value()),
+                              number_text(perception::to_luminance(display, 1).value())});
     }
     return static_cast<float>(std::clamp(relative, 0.0, 1.0));
 }

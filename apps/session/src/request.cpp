@@ -14,18 +14,19 @@ Result<void> validate_goal(const Request& r) {
     using Kind = Goal::Kind;
     const FoldTest test = r.fold_test.value_or(r.goal.kind == Kind::pixels ? FoldTest::extent : FoldTest::error);
     if (r.goal.kind == Kind::budget && r.goal.triangles == 0)
-        return invalid_argument("request.goal.triangles must be 1 or more.");
+        return invalid_field("{request.goal.triangles} must be 1 or more.");
     if (r.goal.fill && r.goal.kind != Kind::budget)
-        return invalid_argument("request.goal.fill needs request.goal.triangles.");
+        return invalid_field("{request.goal.fill} needs {request.goal.triangles}.");
     if (r.goal.kind == Kind::pixels && !is_positive(r.goal.tolerance_px))
-        return invalid_argument("request.goal.pixels must be above 0 and finite.");
+        return invalid_field("{request.goal.pixels} must be above 0 and finite.");
     if (r.goal.kind == Kind::pixels && is_perceptual(test))
-        return invalid_argument("request.goal.pixels needs request.fold_test = extent or displacement: " +
-                                name_of(test) + " knows no pixels.");
+        return invalid_field(
+            "{request.goal.pixels} needs {request.fold_test = }extent or displacement: {} knows no pixels.",
+            {name_of(test)});
     if (r.goal.kind == Kind::imperceptible && !is_perceptual(test))
-        return invalid_argument(
-            "request.fold_test = " + name_of(test) +
-            " cannot tell what is imperceptible: ask for request.goal.triangles or request.goal.pixels.");
+        return invalid_field("{request.fold_test = }{} cannot tell what is imperceptible: ask for "
+                             "{request.goal.triangles} or {request.goal.pixels}.",
+                             {name_of(test)});
     return {};
 }
 
@@ -35,27 +36,27 @@ std::string name_of(FoldTest test) { return std::string(perception::fold_test_na
 
 Result<void> validate(const Request& r) {
     if (r.shown && r.purpose != Purpose::picture)
-        return invalid_argument("request.shown is of pictures: set request.purpose = picture.");
+        return invalid_field("{request.shown} is of pictures: set {request.purpose} = picture.");
     if (!r.masking.empty() && r.purpose != Purpose::picture)
-        return invalid_argument("request.masking is of pictures: set request.purpose = picture.");
+        return invalid_field("{request.masking} is of pictures: set {request.purpose} = picture.");
     if (const auto goal = validate_goal(r); !goal) return goal;
     // Where none is asked for, one that knows colours is taken.
     const bool knows_chroma =
         !r.fold_test || *r.fold_test == FoldTest::luebke_hallen || *r.fold_test == FoldTest::luebke_hallen_safe;
     const bool may_count = r.goal.kind == Goal::Kind::imperceptible || r.goal.kind == Goal::Kind::budget;
     if (r.chroma && !(knows_chroma && may_count))
-        return invalid_argument(
-            "request.chroma needs request.fold_test = luebke-hallen or luebke-hallen-safe, and a goal that "
-            "folds by it.");
+        return invalid_field("{request.chroma} needs {request.fold_test = }luebke-hallen or luebke-hallen-safe, and a "
+                             "goal that folds by "
+                             "it.");
     if (r.milliseconds && !(*r.milliseconds >= 0 && std::isfinite(*r.milliseconds)))
-        return invalid_argument("request.milliseconds must be 0 or more, and finite.");
+        return invalid_field("{request.milliseconds} must be 0 or more, and finite.");
     if (r.milliseconds && r.goal.kind == Goal::Kind::full)
-        return invalid_argument("request.milliseconds has no meaning for the full model.");
-    if (!is_positive(r.threshold)) return invalid_argument("request.threshold must be above 0 and finite.");
+        return invalid_field("{request.milliseconds} has no meaning for the full model.");
+    if (!is_positive(r.threshold)) return invalid_field("{request.threshold} must be above 0 and finite.");
     if (r.threshold != 1 && r.goal.kind != Goal::Kind::imperceptible)
-        return invalid_argument(
-            "request.threshold is of the goal imperceptible: the others say themselves how much is folded.");
-    if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid_argument("request.hysteresis must be from 1 to 2.");
+        return invalid_field(
+            "{request.threshold} is of the goal imperceptible: the others say themselves how much is folded.");
+    if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid_field("{request.hysteresis} must be from 1 to 2.");
     return {};
 }
 

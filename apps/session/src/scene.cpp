@@ -54,13 +54,13 @@ Result<calibration::LightRig> light_rig(std::optional<glm::dvec3> towards, std::
 
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
     if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
-        return invalid_argument("load.unit_metres must be above 0 and finite.");
+        return invalid_field("{load.unit_metres} must be above 0 and finite.");
     if (options.as != LoadAs::model) {
         const bool may_be_scene = meshio::is_gltf_file(file);
         if (!may_be_scene && options.as == LoadAs::scene)
-            return invalid_argument(file.string() +
-                                    " is no glTF file (.glb, .gltf), and only these are scenes: read it "
-                                    "with load.as = model.");
+            return invalid_field("{} is no glTF file (.glb, .gltf), and only these are scenes: read it with "
+                                 "{load.as = }model.",
+                                 {file.string()});
         if (may_be_scene) {
             auto read = meshio::SceneFile::read(file, reading_options(options));
             if (!read) return read.error();

@@ -135,7 +135,7 @@ private:
     }
 
     // Sentences that several meshes have in common are said once.
-    static void tell_each(std::vector<std::string> texts, const fs::path& file,
+    static void tell_each(std::vector<Message> texts, const fs::path& file,
                           const Callback<void(const std::string&)>& tell) {
         if (!tell) return;
         std::map<std::string, int> counts;
@@ -151,10 +151,9 @@ private:
         tell_each(std::move(warnings_), name_, options_.messages.warning);
         tell_each(std::move(notes_), name_, options_.messages.note);
         if (built_ == 0 || !options_.messages.note) return;
-        const std::string becomes =
-            !not_kept_.empty() ? "not kept for the next time: " + not_kept_
-            : cache_.is_on()   ? "kept in " + cache_.folder().string() + " for the next time (session::TreeCache)"
-                               : "not kept for the next time";
+        const Message becomes = !not_kept_.empty() ? Message("not kept for the next time: " + not_kept_)
+                                : cache_.is_on()   ? kept_in(cache_)
+                                                   : Message("not kept for the next time");
         options_.messages.note("built " + std::to_string(built_) + (built_ == 1 ? " tree" : " trees") + " of " +
                                name_.string() + " in " + rounded(seconds, 2) + " s; " + becomes);
     }
@@ -167,7 +166,7 @@ private:
     std::mutex mutex_;
     std::atomic<bool> is_over_{false};
     std::optional<Error> failure_;
-    std::vector<std::string> warnings_, notes_;
+    std::vector<Message> warnings_, notes_;
     std::string not_kept_;
     std::size_t built_ = 0, empty_ = 0;
 };
@@ -263,9 +262,10 @@ meshio::ReadOptions reading_options(const LoadOptions& options) {
 Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const LoadOptions& options) {
     const meshio::SceneContents& contents = file.contents();
     if (!options.texture.empty())
-        return Error{ErrorCode::invalid_argument,
-                     name.string() + " is a scene, and load.texture lies over one model: leave it out, or read the "
-                                     "file with load.as = model."};
+        return invalid_field(
+            "{} is a scene, and {load.texture} lies over one model: leave it out, or read the file with "
+            "{load.as = }model.",
+            {name.string()});
     std::vector<Part> parts;
     std::map<std::size_t, std::vector<std::size_t>> of_mesh; // parts
     std::vector<Placed> placed;
@@ -274,9 +274,10 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         auto factored = factor(node.to_world);
         if (!factored)
             return Error{ErrorCode::malformed_data,
-                         name.string() + ": node " + std::to_string(node.node) + " '" + node.name +
-                             "' has, with the nodes above it, a transform without an inverse (a scale of 0, or one "
-                             "that is a million times another): correct it, or read the file with load.as = model."};
+                         Message::of("{}: node {} '{}' has, with the nodes above it, a transform without an inverse (a "
+                                     "scale of 0, or one that is a million times another): correct it, or read the "
+                                     "file with {load.as = }model.",
+                                     {name.string(), std::to_string(node.node), node.name})};
         factored->placement.scale *= options.unit_metres;
         factored->placement.translation *= options.unit_metres;
         turns = turns || is_turned(factored->placement);

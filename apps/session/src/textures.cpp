@@ -21,9 +21,9 @@ using vdtree::MeshRange;
 using vdtree::Texture;
 
 // What one can do about a bad image, in the same sentence.
-std::string with_advice(std::string complaint) {
+Message with_advice(Message complaint) {
     if (complaint.ends_with('.')) complaint.pop_back();
-    return complaint + " (load.texture names another image, load.without_textures leaves images out).";
+    return complaint + Message::of(" ({load.texture} names another image, {load.without_textures} leaves images out).");
 }
 
 constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unused = no_material - 1;

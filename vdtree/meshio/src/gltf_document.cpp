@@ -59,7 +59,7 @@ void check_structure(std::string_view text) {
 
 } // namespace
 
-void fail(std::string what) { throw Broken{std::move(what)}; }
+void fail(Message what) { throw Broken{std::move(what)}; }
 
 std::string numbered(const char* what, std::size_t index) { return std::string(what) + " " + std::to_string(index); }
 

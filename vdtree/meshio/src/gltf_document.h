@@ -20,9 +20,9 @@ using nlohmann::json;
 
 // A broken rule of the format, thrown within the glTF reader only: it unwinds from deep inside a document.
 struct Broken {
-    std::string what;
+    Message what;
 };
-[[noreturn]] void fail(std::string what);
+[[noreturn]] void fail(Message what);
 
 std::string numbered(const char* what, std::size_t index); // "buffer 3"
 
@@ -58,10 +58,10 @@ struct Reduced {
 Reduced reduce(const json& document);
 
 // Fails on what no cut can keep, unless it is to be dropped; what is dropped is told in the warnings.
-void check_kept(const json& document, const LeftOut& drop, std::vector<std::string>& warnings);
+void check_kept(const json& document, const LeftOut& drop, std::vector<Message>& warnings);
 
 // The document as far as it is kept beside the triangles: without geometry, what is dropped, extensions that nobody
 // here knows, and images that lie in the file.
-json without_geometry(json document, std::vector<std::string>& warnings);
+json without_geometry(json document, std::vector<Message>& warnings);
 
 } // namespace unseen::meshio::gltf

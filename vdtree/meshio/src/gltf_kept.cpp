@@ -127,7 +127,7 @@ json kept_image(json image) {
 
 } // namespace
 
-void check_kept(const json& document, const LeftOut& drop, std::vector<std::string>& warnings) {
+void check_kept(const json& document, const LeftOut& drop, std::vector<Message>& warnings) {
     const std::set<std::string> unknown = unknown_required(document);
     struct Thing {
         const char *what, *name;
@@ -151,12 +151,12 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<std::stri
     }
     if (!refused.empty()) {
         fail("it has " + refused + ", which a simplified mesh cannot keep" +
-             (unknown.empty() || drop.extensions ? "" : " (" + listed(unknown) + ")") +
-             "; leave them out with read.drop = " + names + ".");
+             (unknown.empty() || drop.extensions ? "" : " (" + listed(unknown) + ")") + "; leave them out with " +
+             Message::of("{read.drop = }") + names + ".");
     }
 }
 
-json without_geometry(json document, std::vector<std::string>& warnings) {
+json without_geometry(json document, std::vector<Message>& warnings) {
     for (const char* key : {"accessors", "bufferViews", "buffers", "animations", "skins"}) document.erase(key);
     std::set<std::string> stripped;
     strip_extensions(document, stripped);

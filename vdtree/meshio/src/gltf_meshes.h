@@ -21,7 +21,7 @@ public:
     // none. Precondition: there is such a mesh.
     ReadResult read(std::size_t mesh, const glm::dmat3& stretch);
     // All images of the document.
-    std::vector<SourceDocument::File> files(std::vector<std::string>& warnings);
+    std::vector<SourceDocument::File> files(std::vector<Message>& warnings);
 
 private:
     struct Impl;

@@ -20,7 +20,7 @@ Error failed_to_write(const std::filesystem::path& file, const std::string& why)
 
 // Writes what lay beside the mesh beside this file. What is there already must be the same.
 Result<void> write_beside(const std::filesystem::path& file, const SourceDocument& document,
-                          std::vector<std::string>& notes);
+                          std::vector<Message>& notes);
 
 // Images that lay in the source's file.
 void add_images(nlohmann::json& out, const SourceDocument& document, GltfFile& file);
@@ -31,7 +31,7 @@ nlohmann::json gltf_primitive(RestoredPart& restored, const SourceDocument& docu
 
 // The node of a part, or a new one beside all others, where there is none or its frame cannot be turned back.
 std::size_t node_for(nlohmann::json& out, const SourceDocument::Part& part, const RestoredPart& restored,
-                     std::vector<std::string>& notes);
+                     std::vector<Message>& notes);
 
 // Runs what believes what a document says.
 template <class Write>

@@ -58,7 +58,7 @@ public:
 
     // All images, for who writes them again, those beside the mesh file once. What cannot be read is told in the
     // warnings.
-    std::vector<SourceDocument::File> read_all(std::vector<std::string>& warnings) {
+    std::vector<SourceDocument::File> read_all(std::vector<Message>& warnings) {
         std::vector<SourceDocument::File> all;
         std::set<std::string> read_already;
         for (std::size_t i = 0; i < images_.size(); ++i) {
@@ -560,7 +560,7 @@ Result<ReadResult> read_document(const MeshSource& source) {
     json document = parse_json(container.json_text);
     if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
 
-    std::vector<std::string> warnings;
+    std::vector<Message> warnings;
     check_kept(document, source.options.drop, warnings);
     Buffers buffers(source, document, container.bin);
     unpack_views(document, buffers);
@@ -606,7 +606,7 @@ ReadResult Meshes::read(std::size_t mesh, const glm::dmat3& stretch) {
     return result;
 }
 
-std::vector<SourceDocument::File> Meshes::files(std::vector<std::string>& warnings) {
+std::vector<SourceDocument::File> Meshes::files(std::vector<Message>& warnings) {
     return impl_->images.read_all(warnings);
 }
 

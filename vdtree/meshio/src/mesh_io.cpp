@@ -182,7 +182,8 @@ Result<void> settle_bad_parts(const MeshSource& source, ReadResult& result) {
     if (!result.bad.any()) return {};
     const std::string text = text_of(result.bad);
     if (!source.options.skip_bad)
-        return malformed(source, text + ". Correct it, or leave out the faces concerned with read.skip_bad.");
+        return malformed(source, text + ". Correct it, or leave out the faces concerned with " +
+                                     Message::of("{read.skip_bad}."));
     if (result.mesh.triangles.empty()) return malformed(source, "no face is left without the bad ones: " + text + ".");
     result.warnings.push_back(counted_were(result.bad.left_out, "face") + " left out: " + text + ".");
     const glm::dvec3 place = result.mesh.positions[result.mesh.triangles.front().front()];
@@ -231,7 +232,7 @@ bool MeshSource::keep_going(std::uint64_t bytes_done, const char* stage) const {
     return options.progress(std::min(1.0, static_cast<double>(bytes_done) / total), stage);
 }
 
-Error malformed(const MeshSource& source, const std::string& what) {
+Error malformed(const MeshSource& source, const Message& what) {
     return {ErrorCode::malformed_data, source.name + ": " + what};
 }
 Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what) {

@@ -63,7 +63,7 @@ std::optional<std::filesystem::path> path_beside(std::string_view name);
 struct MtlContents {
     std::vector<Material> materials;
     std::set<std::filesystem::path> images; // all that are named, below the mesh file's folder
-    std::vector<std::string> warnings;
+    std::vector<Message> warnings;
 };
 // Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad
 // ones are no errors.
@@ -87,7 +87,7 @@ void leave_out_face(BadParts& bad, What&& what) {
 }
 
 // Where in the file, and the sentence: "bunny.ply: line 7: ...".
-Error malformed(const MeshSource& source, const std::string& what);
+Error malformed(const MeshSource& source, const Message& what);
 Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what);
 Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what);
 Error cancelled(const MeshSource& source);

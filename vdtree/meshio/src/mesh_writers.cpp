@@ -50,7 +50,7 @@ ValueType ply_type(const VertexArray& array, std::uint32_t component) {
 
 class PlyColumns {
 public:
-    PlyColumns(const MeshView& mesh, std::span<const VertexArray> arrays, std::vector<std::string>& notes) {
+    PlyColumns(const MeshView& mesh, std::span<const VertexArray> arrays, std::vector<Message>& notes) {
         std::vector<std::string> parted, rounded;
         for (const VertexArray& array : arrays) {
             if (array.role != VertexArray::Role::value) continue;
@@ -96,7 +96,7 @@ private:
     }
 
     // Those that would be read as positions, normals, colours or texture coordinates, and those of one name.
-    void rename(const MeshView& mesh, std::vector<std::string>& notes) {
+    void rename(const MeshView& mesh, std::vector<Message>& notes) {
         using namespace ply;
         std::array<bool, slot_count> present{};
         for (const PlyColumn& column : columns_) present[slot_of(column.name)] = true;
@@ -400,7 +400,7 @@ std::uint8_t to_byte(float channel) {
 bool holds_arrays(const std::string& ending) { return ending == ".ply" || ending == ".vtp" || ending == ".vtk"; }
 
 Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::span<const VertexArray> arrays,
-                             std::vector<std::string>& notes, const Progress& progress) {
+                             std::vector<Message>& notes, const Progress& progress) {
     const std::string ending = lower_ending(file);
     const bool is_gltf = ending == ".glb" || ending == ".gltf";
     if (!holds_arrays(ending) && ending != ".obj" && !is_gltf) {
@@ -434,7 +434,7 @@ Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::sp
 }
 
 Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {
-    std::vector<std::string> no_notes; // without arrays there is nothing to tell
+    std::vector<Message> no_notes; // without arrays there is nothing to tell
     return write_mesh_with(file, mesh, {}, no_notes, progress);
 }
 

@@ -19,7 +19,7 @@ bool holds_arrays(const std::string& ending);
 // write_mesh() with arrays by vertex; those of other roles than `value` say how the mesh's own are called. What the
 // format holds otherwise, or not at all, is told in the notes. Precondition: the arrays are as long as the mesh.
 Result<void> write_mesh_with(const std::filesystem::path& file, const vdtree::MeshView& mesh,
-                             std::span<const VertexArray> arrays, std::vector<std::string>& notes,
+                             std::span<const VertexArray> arrays, std::vector<Message>& notes,
                              const Progress& progress = {});
 
 // XML PolyData (.vtp): little-endian, raw behind the XML; legacy polydata (.vtk): binary, version 3.0. Points are

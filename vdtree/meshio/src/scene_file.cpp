@@ -315,7 +315,7 @@ struct SceneFile::Impl {
         if (source.bytes.starts_with("glTF")) container = gltf::split_glb(source.bytes);
         document = gltf::parse_json(container.json_text);
         if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
-        std::vector<std::string> warnings;
+        std::vector<Message> warnings;
         gltf::check_kept(document, options.drop, warnings);
         buffers.emplace(source, document, container.bin);
         gltf::unpack_views(document, *buffers);

@@ -100,8 +100,10 @@ void weld(ReadResult& result) {
     for (Triangle& t : mesh.triangles)
         for (Index& v : t) v = number[v];
     mesh.normals = {};
-    result.notes.push_back("its " + std::to_string(before) + " vertices, three a facet, were welded to " +
-                           std::to_string(kept) + "; with read.weld = false they and the facets' normals stay.");
+    result.notes.push_back(
+        Message::of("its {} vertices, three a facet, were welded to {}; with {read.weld = false} they "
+                    "and the facets' normals stay.",
+                    {std::to_string(before), std::to_string(kept)}));
 }
 
 void settle(const MeshSource& source, ReadResult& result) {

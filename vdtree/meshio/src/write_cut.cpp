@@ -61,7 +61,7 @@ Error failed_to_write(const fs::path& file, const std::string& why) {
     return {ErrorCode::io_failure, "Cannot write '" + file.string() + "': " + why};
 }
 
-Result<void> write_beside(const fs::path& file, const SourceDocument& document, std::vector<std::string>& notes) {
+Result<void> write_beside(const fs::path& file, const SourceDocument& document, std::vector<Message>& notes) {
     std::map<fs::path, const std::string*> missing;
     for (const File& beside : document.files) {
         if (beside.uri.empty() || !beside.bytes) continue;
@@ -130,7 +130,7 @@ json gltf_primitive(RestoredPart& restored, const SourceDocument& document, Gltf
 }
 
 std::size_t node_for(json& out, const SourceDocument::Part& part, const RestoredPart& restored,
-                     std::vector<std::string>& notes) {
+                     std::vector<Message>& notes) {
     json& nodes = out["nodes"];
     const bool is_known = part.node >= 0 && static_cast<std::size_t>(part.node) < nodes.size();
     if (is_known && !restored.is_in_world) return static_cast<std::size_t>(part.node);
@@ -151,7 +151,7 @@ std::size_t node_for(json& out, const SourceDocument::Part& part, const Restored
 namespace {
 
 Result<void> write_gltf(const fs::path& name, const SourceDocument& document, std::vector<RestoredPart>& parts,
-                        std::vector<std::string>& notes) {
+                        std::vector<Message>& notes) {
     GltfFile file;
     json out = gltf::parse_json(document.json);
     if (!out.contains("nodes")) out["nodes"] = json::array();
@@ -302,7 +302,7 @@ private:
 // ---- any format
 
 Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument document,
-                            std::vector<std::string>& notes) {
+                            std::vector<Message>& notes) {
     const std::string ending = lower_ending(file);
     const bool is_gltf = ending == ".glb" || ending == ".gltf";
     const std::vector<std::string> uvs = drawn_uvs(document);
@@ -335,7 +335,7 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
 }
 
 Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocument& document,
-                         std::vector<std::string>& notes) {
+                         std::vector<Message>& notes) {
     const ExtractedMesh extracted = extract_with_sources(cut);
     const bool is_held = holds_arrays(lower_ending(file));
     const auto arrays =
@@ -357,7 +357,7 @@ bool is_whole(const Cut& cut) {
 // Puts the meshes of cuts into a scene's document.
 class SceneWriter {
 public:
-    SceneWriter(const SceneSource& source, std::vector<std::string>& notes) : source_(source), notes_(notes) {}
+    SceneWriter(const SceneSource& source, std::vector<Message>& notes) : source_(source), notes_(notes) {}
 
     Result<void> write(const fs::path& file, std::span<const SceneCut> cuts) {
         out_ = gltf::parse_json(source_.json);
@@ -428,7 +428,7 @@ private:
     }
 
     const SceneSource& source_;
-    std::vector<std::string>& notes_;
+    std::vector<Message>& notes_;
     GltfFile file_;
     std::deque<std::vector<RestoredPart>> parts_; // which the file refers to
     json out_, meshes_, written_ = json::array();
@@ -438,17 +438,17 @@ private:
 
 } // namespace
 
-Result<std::vector<std::string>> write_scene(const fs::path& file, const SceneSource& source,
-                                             std::span<const SceneCut> cuts) {
-    std::vector<std::string> notes;
+Result<std::vector<Message>> write_scene(const fs::path& file, const SceneSource& source,
+                                         std::span<const SceneCut> cuts) {
+    std::vector<Message> notes;
     const auto written =
         guarded_writing([&]() -> Result<void> { return SceneWriter(source, notes).write(file, cuts); });
     if (!written) return written.error();
     return notes;
 }
 
-Result<std::vector<std::string>> write_cut(const fs::path& file, const Cut& cut) {
-    std::vector<std::string> notes;
+Result<std::vector<Message>> write_cut(const fs::path& file, const Cut& cut) {
+    std::vector<Message> notes;
     const auto bytes = cut.tree().document();
     Result<void> written;
     if (bytes.empty()) {

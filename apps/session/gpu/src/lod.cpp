@@ -52,13 +52,13 @@ double shift_of(const vdtree::Cut& cut, double scale) {
 
 Result<void> check(const LodOptions& options, const perception::Display& display) {
     if (options.directions < 1 || options.directions > most_directions)
-        return invalid_argument("lod.directions must be 1 to " + std::to_string(most_directions) + ", not " +
-                                std::to_string(options.directions) + ".");
+        return invalid_field("{lod.directions} must be 1 to {}, not {}.",
+                             {std::to_string(most_directions), std::to_string(options.directions)});
     if (options.samples < 1 || options.samples > most_lod_samples)
-        return invalid_argument("lod.samples must be 1 to " + std::to_string(most_lod_samples) + ", not " +
-                                std::to_string(options.samples) + ".");
+        return invalid_field("{lod.samples} must be 1 to {}, not {}.",
+                             {std::to_string(most_lod_samples), std::to_string(options.samples)});
     if (options.fov_y_degrees && !(*options.fov_y_degrees > 0 && *options.fov_y_degrees < 180))
-        return invalid_argument("lod.fov_y_degrees must lie between 0 and 180.");
+        return invalid_field("{lod.fov_y_degrees} must lie between 0 and 180.");
     constexpr int least_px = 4 * margin_px;
     if (std::min(display.width_px, display.height_px) < least_px)
         return invalid_argument("Levels of detail need a display of " + std::to_string(least_px) +

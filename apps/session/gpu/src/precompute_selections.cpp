@@ -395,7 +395,7 @@ Result<PrecomputeReport> precompute_selections(const render::Context& context, S
     // All go on or none.
     if (team && team->size() > 1) {
         const auto complaint = [&](const Result<void>& r) {
-            std::string text = r ? std::string() : r.error().message;
+            const std::string text = r ? "" : r.error().message;
             std::vector<std::byte> bytes;
             append(bytes, std::as_bytes(std::span(text)));
             const std::uint64_t key = r ? search_key(s) : 0;

@@ -6,11 +6,16 @@
 #pragma once
 
 #include <cassert>
+#include <concepts>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
+#include <vector>
 
 namespace unseen {
 
@@ -22,10 +27,43 @@ enum class ErrorCode {
     cancelled,        // the caller's progress callback asked to stop
 };
 
+// A sentence for people, of an error, a warning or a note. It is a string that knows which of its parts are names of
+// the library ("request.fold_test", "Follower::set_glide()"), so that a program can show its own names instead.
+class Message : public std::string {
+public:
+    Message() = default;
+    Message(std::string text) : std::string(std::move(text)) {}
+    Message(const char* text) : std::string(text) {}
+
+    // In `text`, "{name}" marks a name and "{}" stands for the next of `values`. These are inserted as they are: the
+    // name of a file is never taken for one of the library.
+    static Message of(std::string_view text, std::initializer_list<std::string_view> values = {});
+
+    struct Name {
+        std::size_t begin = 0, size = 0;
+    };
+    std::span<const Name> names() const noexcept { return names_; } // from left to right
+
+    static Message joined(const Message& a, const Message& b);
+
+private:
+    std::vector<Name> names_;
+};
+
+// Text before or after a message keeps its names.
+template <class A, class B>
+requires std::same_as<std::remove_cvref_t<A>, Message> || std::same_as<std::remove_cvref_t<B>, Message>
+    Message operator+(A&& a, B&& b) {
+    return Message::joined(std::forward<A>(a), std::forward<B>(b));
+}
+
 // What went wrong, as one sentence for people that names the file, line or index, and what to do.
 struct Error {
     ErrorCode code = ErrorCode::invalid_argument;
-    std::string message;
+    Message message;
+
+    // The field at fault: the first name in the message, or empty.
+    std::string_view field() const;
 };
 
 // Ends the program: somebody took the value of a Result that holds this error.

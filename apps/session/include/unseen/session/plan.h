@@ -13,7 +13,7 @@ namespace unseen::session {
 struct Effect {
     std::string name;
     bool on = false;
-    std::string why = {};
+    Message why = {};
     std::size_t object = 0; // of the scene
 };
 

@@ -16,7 +16,7 @@ namespace unseen::session {
 struct PassEffect {
     std::string name;
     bool on = false;
-    std::string why = {};
+    Message why = {};
     int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, a sample each; of planes
     std::uint64_t texture_bytes = 0;                // on the GPU, at most at a time
     double milliseconds = 0;                        // of wall-clock time

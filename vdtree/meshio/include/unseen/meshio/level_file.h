@@ -35,7 +35,7 @@ struct LevelCuts {
 };
 
 struct LevelsWritten {
-    std::vector<std::string> notes;   // what could not be kept, one sentence each
+    std::vector<Message> notes;       // what could not be kept, one sentence each
     std::vector<std::uint64_t> bytes; // by level: of all its geometry; of a geometry that levels share, the first's
 };
 

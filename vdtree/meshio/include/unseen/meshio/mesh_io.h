@@ -71,15 +71,15 @@ struct ReadResult {
     vdtree::Mesh mesh;
     std::uint64_t source_faces = 0;       // faces of the file before triangulation
     std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
-    std::vector<std::string> warnings;    // repairs that were made, one sentence each
+    std::vector<Message> warnings;        // repairs that were made, one sentence each
     std::vector<Material> materials = {}; // of OBJ and glTF
     // Of glTF, and of OBJ with objects or materials; without vertex_parts. Of PLY and VTK with values of vertices.
     std::optional<SourceDocument> document = {};
     bool uvs_from_top = false; // v grows downward in images (glTF), not upward (OBJ, PLY)
     std::optional<std::uint64_t> bad_uv =
-        {};                              // the first vertex whose texture coordinates were not finite, and set to 0
-    std::vector<std::string> notes = {}; // what is no repair and good to know, one sentence each
-    BadParts bad = {};                   // what was left out
+        {};                          // the first vertex whose texture coordinates were not finite, and set to 0
+    std::vector<Message> notes = {}; // what is no repair and good to know, one sentence each
+    BadParts bad = {};               // what was left out
 };
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
@@ -104,6 +104,6 @@ Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshVie
 // Values of vertices (VertexArray), to PLY and VTK: vertices of the input keep theirs. Those of proxies are the mean of
 // the finite values of the vertices that they stand for, component by component; of integers, and where none is finite,
 // the value of the nearest of these vertices. Memory: the values of the input, and those of the cut.
-Result<std::vector<std::string>> write_cut(const std::filesystem::path& file, const vdtree::Cut& cut);
+Result<std::vector<Message>> write_cut(const std::filesystem::path& file, const vdtree::Cut& cut);
 
 } // namespace unseen::meshio

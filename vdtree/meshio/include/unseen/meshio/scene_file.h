@@ -69,7 +69,7 @@ struct SceneContents {
     // Cameras, lights, a mark of what is background, or a mesh under several nodes: more than one model.
     bool is_scene = false;
     SceneSource source;
-    std::vector<std::string> warnings, notes; // one sentence each
+    std::vector<Message> warnings, notes; // one sentence each
 };
 
 class SceneFile {
@@ -108,7 +108,7 @@ struct SceneCut {
 // Writes a scene as glTF with the cuts in place of the meshes: each node has a mesh of its own, but for whole ones,
 // which are shared as before; nodes, transforms, names, materials, cameras and lights stay. Nodes whose cut has no
 // triangles lose their mesh. Images as by write_cut(). Returns what could not be kept, one sentence each.
-Result<std::vector<std::string>> write_scene(const std::filesystem::path& file, const SceneSource& source,
-                                             std::span<const SceneCut> cuts);
+Result<std::vector<Message>> write_scene(const std::filesystem::path& file, const SceneSource& source,
+                                         std::span<const SceneCut> cuts);
 
 } // namespace unseen::meshio

@@ -62,8 +62,8 @@ struct LodObject {
     std::size_t same_as = 0; // the first object of Lod::objects with these levels; itself: none before
     WorldSphere sphere;
     LevelChain chain;
-    std::vector<LodLevel> levels;        // the full mesh first, at ascending distances
-    std::vector<std::string> notes = {}; // levels that are none, and why; one sentence each
+    std::vector<LodLevel> levels;    // the full mesh first, at ascending distances
+    std::vector<Message> notes = {}; // levels that are none, and why; one sentence each
 
     vdtree::Cut cut(std::size_t level) const { return chain.cut(levels[level].chain_level); }
 };

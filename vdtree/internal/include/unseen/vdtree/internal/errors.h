@@ -8,7 +8,11 @@
 
 namespace unseen {
 
-inline Error invalid_argument(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-inline Error unsupported(std::string message) { return {ErrorCode::unsupported, std::move(message)}; }
+inline Error invalid_argument(Message message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+// A message that names fields: see Message::of().
+inline Error invalid_field(std::string_view text, std::initializer_list<std::string_view> values = {}) {
+    return invalid_argument(Message::of(text, values));
+}
+inline Error unsupported(Message message) { return {ErrorCode::unsupported, std::move(message)}; }
 
 } // namespace unseen
