@@ -1,34 +1,33 @@
 // Fuzz target for the readers of images, PNG, PFM and EXR, and of textures, which may be JPEG, too: any bytes must give an
 // error, or an image whose values are numbers and as many as it says. tests/README.md tells how to build and run it.
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
-#include <vector>
-
 #include <string_view>
+#include <vector>
 
 #include <unseen/perception/image.h>
 
+#include "target.h"
 #include "texture_image.h"
 
 namespace {
 
-void read_texture(std::string_view bytes) {
+bool is_texture(std::string_view bytes) {
     const auto texture = unseen::session::decode_texture(bytes, "fuzz", true);
     if (texture ? texture->texels.empty() || !unseen::vdtree::validate(texture->view())
                 : texture.error().message.empty())
         std::abort();
+    return texture.has_value();
 }
 
 } // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    read_texture({reinterpret_cast<const char*>(data), size});
-    const auto read = unseen::perception::decode_image(std::vector<unsigned char>(data, data + size), "fuzz");
+bool unseen::fuzz::accepts(std::string_view bytes) {
+    const bool is_accepted = is_texture(bytes);
+    const auto read = unseen::perception::decode_image(bytes, "fuzz");
     if (!read) {
         if (read.error().message.empty()) std::abort();
-        return 0;
+        return false;
     }
     const unseen::perception::Image& image = read->image;
     const std::size_t values = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) *
@@ -38,5 +37,5 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         if (!std::isfinite(value)) std::abort();
     for (const float value : unseen::perception::to_luminance(*read, {}).values)
         if (std::isnan(value)) std::abort();
-    return 0;
+    return is_accepted;
 }

@@ -1,7 +1,6 @@
 // Fuzz target for files of selected levels, the journals of searches that were interrupted, and the messages of processes
 // that search together. After a byte that chooses what the others are: any bytes give an error with a message, or what
 // can be used and written again. tests/README.md tells how to build and run it.
-#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -15,6 +14,7 @@
 #include <unseen/session/selection.h>
 
 #include "memory_file.h"
+#include "target.h"
 
 namespace {
 
@@ -22,7 +22,7 @@ using namespace unseen;
 
 // Sums over the content would keep all but few inputs out.
 void seal(std::string& bytes) {
-    constexpr std::string_view head("UNSEENSL\1\0\0\0", 12);
+    constexpr std::string_view head("UNSEENSL\2\0\0\0", 12);
     if (bytes.size() < head.size() + sizeof(std::uint64_t)) return;
     std::memcpy(bytes.data(), head.data(), head.size());
     const std::size_t body = bytes.size() - sizeof(std::uint64_t);
@@ -30,11 +30,11 @@ void seal(std::string& bytes) {
     std::memcpy(bytes.data() + body, &sum, sizeof(sum));
 }
 
-void read_as_selections(const std::filesystem::path& file) {
+bool is_selections(const std::filesystem::path& file) {
     const auto read = session::read_selections(file);
     if (!read) {
         if (read.error().message.empty()) std::abort();
-        return;
+        return false;
     }
     for (const session::SelectionCell& cell : read->cells) {
         std::vector<const session::SelectionCorner*> corners;
@@ -44,20 +44,22 @@ void read_as_selections(const std::filesystem::path& file) {
         }
         static_cast<void>(session::corners_differ(corners, 0.5));
     }
+    return true;
 }
 
-void read_as_message(std::string_view bytes) {
+bool is_message(std::string_view bytes) {
     const auto corner = session::corner_from(std::as_bytes(std::span(bytes)));
     if (!corner) {
         if (corner.error().message.empty()) std::abort();
-        return;
+        return false;
     }
     const auto again = session::to_bytes(*corner);
     if (again.size() != bytes.size() || std::memcmp(again.data(), bytes.data(), bytes.size()) != 0) std::abort();
+    return true;
 }
 
 // What follows the last whole record is cut off, and a further record is found again.
-void read_as_journal(const std::filesystem::path& file) {
+bool is_journal(const std::filesystem::path& file) {
     constexpr std::uint64_t key = 0x3131313131313131; // "11111111"
     auto journal = session::SelectionJournal::open(file, key);
     if (!journal) std::abort();
@@ -65,19 +67,18 @@ void read_as_journal(const std::filesystem::path& file) {
     if (!journal->add(session::SelectionCorner{})) std::abort();
     const auto again = session::SelectionJournal::open(file, key);
     if (!again || again->done().size() != before + 1) std::abort();
+    return true;
 }
 
 } // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    if (size == 0) return 0;
-    std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-    const int reader = data[0] % 4;
+bool fuzz::accepts(std::string_view input) {
+    if (input.empty()) return false;
+    std::string bytes(input.substr(1));
+    const int reader = static_cast<unsigned char>(input[0]) % 4;
     if (reader == 1) seal(bytes);
     static fuzz::MemoryFile file;
     file.hold(bytes);
-    if (reader < 2) read_as_selections(file.path());
-    if (reader == 2) read_as_message(bytes);
-    if (reader == 3) read_as_journal(file.path());
-    return 0;
+    if (reader == 2) return is_message(bytes);
+    return reader == 3 ? is_journal(file.path()) : is_selections(file.path());
 }

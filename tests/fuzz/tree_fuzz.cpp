@@ -1,8 +1,6 @@
 // Fuzz target for the reader of tree files: any bytes must give an error, or a tree with which
 // everything can be done or which says that it is damaged.
 // tests/README.md tells how to build and run it.
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
@@ -13,6 +11,7 @@
 #include "kept_arrays.h"
 #include "memory_file.h"
 #include "restore.h"
+#include "target.h"
 #include "tree_file.h"
 #include "tree_use.h"
 
@@ -30,29 +29,32 @@ void restore_document(const unseen::vdtree::VertexTree& tree) {
     (void)unseen::meshio::arrays_of_cut(cut, extracted, document->arrays).has_value();
 }
 
-void read_and_use(const std::string& bytes) {
+bool read_and_use(const std::string& bytes) {
     static unseen::fuzz::MemoryFile file;
     file.hold(bytes);
+    bool is_accepted = true;
     for (const bool mapped : {false, true}) {
         const auto tree = mapped ? unseen::vdtree::map_tree(file.path()) : unseen::vdtree::read_tree(file.path());
         if (tree) restore_document(*tree);
         if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
+        is_accepted = is_accepted && tree.has_value();
     }
+    return is_accepted;
 }
 
 } // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    std::string bytes(reinterpret_cast<const char*>(data), size);
-    read_and_use(bytes);
+bool unseen::fuzz::accepts(std::string_view input) {
+    std::string bytes(input);
+    bool is_accepted = read_and_use(bytes);
     // Most changes end at a checksum. Once more with those of header and table made right ...
     unseen::support::TreeFile::seal(bytes);
-    read_and_use(bytes);
+    is_accepted = read_and_use(bytes) && is_accepted;
     // ... and with all of them, so that changed values come through to the checks behind.
     try {
-        read_and_use(unseen::support::TreeFile::parse(bytes).bytes());
+        is_accepted = read_and_use(unseen::support::TreeFile::parse(bytes).bytes()) && is_accepted;
     } catch (const std::out_of_range&) {
         // The sections do not lie in the file.
     }
-    return 0;
+    return is_accepted;
 }
