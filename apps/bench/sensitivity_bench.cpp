@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <random>
@@ -17,6 +16,7 @@
 #include <unseen/calibration/simulated_observer.h>
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
@@ -79,8 +79,9 @@ struct Reference {
 };
 
 std::optional<Reference> read_reference(const fs::path& file) {
-    std::ifstream stream(file);
-    if (!stream) return std::nullopt;
+    const auto text = read_text_file(file);
+    if (!text) return std::nullopt;
+    std::istringstream stream(*text);
     Reference reference;
     reference.file = file;
     std::size_t number = 0;

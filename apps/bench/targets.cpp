@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <unseen/vdtree/internal/text_file.h>
+#include <unseen/vdtree/internal/input_file.h>
 
 #include "embedded.h"
 

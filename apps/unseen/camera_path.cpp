@@ -9,8 +9,8 @@
 
 #include <glm/geometric.hpp>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 #include "terminal.h"
 

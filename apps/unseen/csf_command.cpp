@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -15,8 +14,8 @@
 #include <unseen/perception/motion.h>
 #include <unseen/session/observer.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 #include "log_log_plot.h"
 #include "options.h"
@@ -229,7 +228,7 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
 
 Result<int> run_csv(const CsfArguments& a, const Observer& observer) {
     const std::string name = a.csv == "-" ? "stdin" : a.csv;
-    const auto text = a.csv == "-" ? read_text(std::cin, name) : read_text_file(a.csv);
+    const auto text = read_text_file(a.csv);
     if (!text) return text.error();
     std::istringstream lines(*text);
     const auto table = evaluate_csv(lines, name, a, observer);

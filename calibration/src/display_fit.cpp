@@ -1,8 +1,8 @@
 // Fits of a display's transfer function, and photometers' tables.
 #include <unseen/calibration/display_fit.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 #include <charconv>
 #include <cmath>
@@ -75,7 +75,8 @@ Result<PhotometerTable> read_photometer(const std::filesystem::path& file) {
         if (const std::string problem = append_row(table, text); !problem.empty()) return complain(problem);
     }
     constexpr std::size_t least_rows = 3;
-    if (table.code.size() < least_rows) return complain("there are fewer than 3 rows");
+    if (table.code.size() < least_rows)
+        return Error{ErrorCode::malformed_data, file.string() + ": there are fewer than 3 rows of measurements."};
     if (table.code.back() != 1) return complain("the last code must be 255");
     return table;
 }

@@ -9,8 +9,8 @@
 #include <set>
 
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::calibration {
 namespace {

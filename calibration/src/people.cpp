@@ -7,8 +7,8 @@
 
 #include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::calibration {
 namespace {

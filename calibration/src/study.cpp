@@ -7,10 +7,10 @@
 
 #include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/number_text.h>
 #include <unseen/vdtree/internal/random.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 #include "json_file.h"
 

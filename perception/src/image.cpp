@@ -10,13 +10,11 @@
 #include <cstdint>
 #include <cstring>
 #include <exception>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include <Iex.h>
@@ -31,20 +29,21 @@
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {
 
 constexpr std::uint64_t largest_side = 32768;                   // pixels
 constexpr std::uint64_t largest_count = std::uint64_t{1} << 28; // pixels
-// No compressed byte of PNG or EXR's deflate can grow to more than 1032 bytes; other EXR methods stay near that.
+// No compressed byte of PNG or EXR's deflate can grow to more than 1032 bytes; its other methods stay near that.
 constexpr std::uint64_t largest_expansion = 2048;
 constexpr std::uint64_t small_buffer = std::uint64_t{1} << 26; // bytes that any file may ask for
 constexpr std::uint64_t most_exr_channels = 64;                // of one file; more is no picture
 
-using Bytes = std::vector<unsigned char>;
+using Bytes = std::vector<unsigned char>;        // written
+using ByteView = std::span<const unsigned char>; // read
 
 Error malformed(const std::filesystem::path& file, const std::string& what) {
     return {ErrorCode::malformed_data, file.string() + ": " + what};
@@ -56,8 +55,13 @@ Error unsupported(const std::filesystem::path& file, const std::string& what) {
     return {ErrorCode::unsupported, file.string() + ": " + what};
 }
 
+std::string too_many_pixels(std::uint64_t width, std::uint64_t height, std::uint64_t file_bytes) {
+    return "the header gives " + std::to_string(width) + " x " + std::to_string(height) + " pixels, which " +
+           std::to_string(file_bytes) + " bytes cannot hold";
+}
+
 // Sizes as a header gives them, before they are believed.
-std::optional<std::string> size_complaint(std::uint64_t width, std::uint64_t height) {
+std::optional<std::string> size_complaint(std::uint64_t width, std::uint64_t height, std::uint64_t file_bytes) {
     const std::string size = std::to_string(width) + " x " + std::to_string(height);
     if (width == 0 || height == 0) return "the header gives an empty image (" + size + ")";
     if (width > largest_side || height > largest_side) {
@@ -66,35 +70,20 @@ std::optional<std::string> size_complaint(std::uint64_t width, std::uint64_t hei
     if (width * height > largest_count) {
         return "the header gives " + size + " pixels; at most 2^28 in all can be read, so scale the image down";
     }
+    if (width * height > most_pixels_in(file_bytes)) return too_many_pixels(width, height, file_bytes);
     return std::nullopt;
 }
 
-Result<Bytes> read_bytes(const std::filesystem::path& file) {
-    std::error_code code;
-    if (std::filesystem::is_directory(file, code)) return io_error(file, "is a folder, not an image");
-    const bool ends = std::filesystem::is_regular_file(file, code); // devices may not
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream) return io_error(file, "cannot be opened; check the name and the permissions");
-    Bytes bytes;
-    std::array<char, 1 << 16> block;
-    while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
-        bytes.insert(bytes.end(), block.data(), block.data() + stream.gcount());
-        if (!ends && bytes.size() > largest_text_bytes) return malformed(file, "does not end after 512 MiB");
+// Hands over a row, whose values must be finite.
+Result<void> hand_over(const std::filesystem::path& file, const ImageFile& header, int y, std::span<const float> row,
+                       const TakeRow& take) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+        if (std::isfinite(row[i])) continue;
+        const std::size_t x = i / static_cast<std::size_t>(header.image.channels);
+        return malformed(file, "the value of pixel (" + std::to_string(x) + ", " + std::to_string(y) +
+                                   ") is not a finite number");
     }
-    if (stream.bad()) return io_error(file, "cannot be read to its end");
-    if (bytes.empty()) return malformed(file, "is empty, not an image");
-    return bytes;
-}
-
-std::optional<Error> non_finite(const std::filesystem::path& file, const Image& image) {
-    for (std::size_t i = 0; i < image.values.size(); ++i) {
-        if (std::isfinite(image.values[i])) continue;
-        const std::size_t pixel = i / static_cast<std::size_t>(image.channels);
-        const auto width = static_cast<std::size_t>(image.width);
-        return malformed(file, "the value of pixel (" + std::to_string(pixel % width) + ", " +
-                                   std::to_string(pixel / width) + ") is not a finite number");
-    }
-    return std::nullopt;
+    return take(header, y, row);
 }
 
 // ---- PNG ----------------------------------------------------------------------------------------------------------
@@ -102,7 +91,7 @@ std::optional<Error> non_finite(const std::filesystem::path& file, const Image& 
 // libpng leaves by longjmp. So every object with a destructor lives out here, and `guarded` runs one step at a time,
 // whose own frame holds nothing to destroy.
 struct PngReader {
-    const Bytes* bytes = nullptr;
+    ByteView bytes;
     std::size_t position = 0;
     png_structp png = nullptr;
     png_infop info = nullptr;
@@ -153,8 +142,8 @@ bool guarded(Codec& codec, void (*step)(Codec&)) {
 
 void png_read_from_memory(png_structp png, png_bytep to, std::size_t count) {
     auto* reader = static_cast<PngReader*>(png_get_io_ptr(png));
-    if (count > reader->bytes->size() - reader->position) png_error(png, "the file ends too early");
-    std::memcpy(to, reader->bytes->data() + reader->position, count);
+    if (count > reader->bytes.size() - reader->position) png_error(png, "the file ends too early");
+    std::memcpy(to, reader->bytes.data() + reader->position, count);
     reader->position += count;
 }
 
@@ -176,38 +165,43 @@ void png_decode_row(PngReader& r) { png_read_row(r.png, r.row, nullptr); }
 void png_decode_all(PngReader& r) { png_read_image(r.png, r.rows); }
 void png_finish(PngReader& r) { png_read_end(r.png, nullptr); }
 
-void append_row(const unsigned char* row, std::size_t values, int bits, std::vector<float>& out) {
-    for (std::size_t i = 0; i < values; ++i) {
-        const double code = bits == 16 ? row[2 * i] * 256 + row[2 * i + 1] : row[i];
-        out.push_back(static_cast<float>(code / (bits == 16 ? 65535 : 255)));
+void decode_codes(const unsigned char* codes, int bits, std::span<float> row) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+        const double code = bits == 16 ? codes[2 * i] * 256 + codes[2 * i + 1] : codes[i];
+        row[i] = static_cast<float>(code / (bits == 16 ? 65535 : 255));
     }
 }
 
-Result<void> decode_png_rows(PngReader& reader, ImageFile& out) {
-    const auto values = static_cast<std::size_t>(out.image.width) * static_cast<std::size_t>(out.image.channels);
-    const auto height = static_cast<std::size_t>(out.image.height);
+Result<void> decode_png_rows(PngReader& reader, const std::filesystem::path& file, const ImageFile& header,
+                             const TakeRow& take) {
+    const auto damaged = [&](const std::string& where) {
+        return malformed(file,
+                         "damaged PNG at byte " + std::to_string(reader.position) + ", " + where + reader.message);
+    };
+    const auto height = static_cast<std::size_t>(header.image.height);
     // Interlaced rows arrive in seven passes, so the whole image has to stand.
     Bytes pixels(reader.row_bytes * (reader.is_interlaced ? height : 1));
     std::vector<png_bytep> rows;
     if (reader.is_interlaced) {
         for (std::size_t y = 0; y < height; ++y) rows.push_back(pixels.data() + y * reader.row_bytes);
         reader.rows = rows.data();
-        if (!guarded(reader, png_decode_all)) return Error{ErrorCode::malformed_data, reader.message};
+        if (!guarded(reader, png_decode_all)) return damaged("");
     }
+    std::vector<float> row(header.image.index(0, 1, 0));
     for (std::size_t y = 0; y < height; ++y) {
         reader.row = reader.is_interlaced ? rows[y] : pixels.data();
-        if (!reader.is_interlaced && !guarded(reader, png_decode_row)) {
-            return Error{ErrorCode::malformed_data, "row " + std::to_string(y) + ": " + reader.message};
-        }
-        append_row(reader.row, values, out.bits, out.image.values);
+        if (!reader.is_interlaced && !guarded(reader, png_decode_row))
+            return damaged("row " + std::to_string(y) + ": ");
+        decode_codes(reader.row, header.bits, row);
+        if (auto taken = take(header, static_cast<int>(y), row); !taken) return taken;
     }
-    if (!guarded(reader, png_finish)) return Error{ErrorCode::malformed_data, "after the pixels: " + reader.message};
+    if (!guarded(reader, png_finish)) return damaged("after the pixels: ");
     return {};
 }
 
-Result<ImageFile> read_png(const std::filesystem::path& file, const Bytes& bytes) {
+Result<ImageFile> read_png(const std::filesystem::path& file, ByteView bytes, const TakeRow& take) {
     PngReader reader;
-    reader.bytes = &bytes;
+    reader.bytes = bytes;
     reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_png_error<PngReader>, on_png_warning);
     if (reader.png != nullptr) reader.info = png_create_info_struct(reader.png);
     if (reader.info == nullptr) return io_error(file, "libpng could not be started");
@@ -218,24 +212,21 @@ Result<ImageFile> read_png(const std::filesystem::path& file, const Bytes& bytes
 
     const std::uint64_t width = png_get_image_width(reader.png, reader.info);
     const std::uint64_t height = png_get_image_height(reader.png, reader.info);
-    if (const auto complaint = size_complaint(width, height)) return malformed(file, *complaint);
+    if (const auto complaint = size_complaint(width, height, bytes.size())) return malformed(file, *complaint);
     const std::uint64_t raw = height * (1 + png_get_rowbytes(reader.png, reader.info));
-    if (raw / largest_expansion > bytes.size()) {
-        return malformed(file, "the header gives " + std::to_string(width) + " x " + std::to_string(height) +
-                                   " pixels, which " + std::to_string(bytes.size()) + " bytes cannot hold");
-    }
+    if (raw / largest_expansion > bytes.size()) return malformed(file, too_many_pixels(width, height, bytes.size()));
     reader.is_interlaced = png_get_interlace_type(reader.png, reader.info) != PNG_INTERLACE_NONE;
     if (!guarded(reader, png_set_transforms)) return complain(reader.message);
     reader.row_bytes = png_get_rowbytes(reader.png, reader.info);
 
-    ImageFile out;
-    out.bits = png_get_bit_depth(reader.png, reader.info) == 16 ? 16 : 8;
-    out.image.width = static_cast<int>(width);
-    out.image.height = static_cast<int>(height);
-    out.image.channels = png_get_channels(reader.png, reader.info);
-    if (out.image.channels != 1 && out.image.channels != 3) return complain("neither grey nor RGB");
-    if (auto ok = decode_png_rows(reader, out); !ok) return complain(ok.error().message);
-    return out;
+    ImageFile header;
+    header.bits = png_get_bit_depth(reader.png, reader.info) == 16 ? 16 : 8;
+    header.image.width = static_cast<int>(width);
+    header.image.height = static_cast<int>(height);
+    header.image.channels = png_get_channels(reader.png, reader.info);
+    if (header.image.channels != 1 && header.image.channels != 3) return complain("neither grey nor RGB");
+    if (auto decoded = decode_png_rows(reader, file, header, take); !decoded) return decoded.error();
+    return header;
 }
 
 void png_write_to_memory(png_structp png, png_bytep from, std::size_t count) {
@@ -294,7 +285,7 @@ struct PfmHeader {
 bool is_white(unsigned char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
 // The next word of the header, empty where there is none or where it is longer than any number need be.
-std::string_view next_word(const Bytes& bytes, std::size_t& position) {
+std::string_view next_word(ByteView bytes, std::size_t& position) {
     constexpr std::size_t longest = 64;
     while (position < bytes.size() && is_white(bytes[position])) ++position;
     const std::size_t begin = position;
@@ -311,7 +302,7 @@ bool parse(std::string_view word, Number& number) {
     return parsed.has_value();
 }
 
-Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, const Bytes& bytes) {
+Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, ByteView bytes) {
     PfmHeader header;
     header.channels = bytes[1] == 'F' ? 3 : 1;
     std::size_t position = 2;
@@ -324,7 +315,8 @@ Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, const Byte
     if (!parse(next_word(bytes, position), header.scale) || !std::isfinite(header.scale) || header.scale == 0) {
         return complain("scale (negative: little-endian, positive: big-endian)");
     }
-    if (const auto complaint = size_complaint(header.width, header.height)) return malformed(file, *complaint);
+    if (const auto complaint = size_complaint(header.width, header.height, bytes.size()))
+        return malformed(file, *complaint);
     header.data = position + 1;
     const std::uint64_t need = header.width * header.height * static_cast<std::uint64_t>(header.channels) * 4;
     const std::uint64_t have = bytes.size() > header.data ? bytes.size() - header.data : 0;
@@ -342,24 +334,21 @@ float float_at(const unsigned char* bytes, bool is_little) {
 }
 
 // The size of the scale is not applied: programs disagree on its meaning, and ours are absolute values.
-Result<ImageFile> read_pfm(const std::filesystem::path& file, const Bytes& bytes) {
-    const auto header = parse_pfm_header(file, bytes);
-    if (!header) return header.error();
-    ImageFile out;
-    out.is_absolute = true;
-    out.bits = 32;
-    out.image = {static_cast<int>(header->width), static_cast<int>(header->height), header->channels, {}};
-    const std::size_t row = static_cast<std::size_t>(header->width) * static_cast<std::size_t>(header->channels);
-    out.image.values.resize(row * static_cast<std::size_t>(header->height));
-    for (std::size_t y = 0; y < header->height; ++y) {
-        const std::size_t from_bottom = static_cast<std::size_t>(header->height) - 1 - y;
-        const unsigned char* line = bytes.data() + header->data + 4 * row * from_bottom;
-        for (std::size_t i = 0; i < row; ++i) {
-            out.image.values[y * row + i] = float_at(line + 4 * i, header->scale < 0);
-        }
+Result<ImageFile> read_pfm(const std::filesystem::path& file, ByteView bytes, const TakeRow& take) {
+    const auto pfm = parse_pfm_header(file, bytes);
+    if (!pfm) return pfm.error();
+    ImageFile header;
+    header.is_absolute = true;
+    header.bits = 32;
+    header.image = {static_cast<int>(pfm->width), static_cast<int>(pfm->height), pfm->channels, {}};
+    std::vector<float> row(header.image.index(0, 1, 0));
+    for (int y = 0; y < header.image.height; ++y) {
+        const std::size_t from_bottom = static_cast<std::size_t>(header.image.height - 1 - y);
+        const unsigned char* line = bytes.data() + pfm->data + 4 * row.size() * from_bottom;
+        for (std::size_t i = 0; i < row.size(); ++i) row[i] = float_at(line + 4 * i, pfm->scale < 0);
+        if (auto taken = hand_over(file, header, y, row, take); !taken) return taken.error();
     }
-    if (auto error = non_finite(file, out.image)) return *std::move(error);
-    return out;
+    return header;
 }
 
 Bytes encode_pfm(const Image& image) {
@@ -381,7 +370,7 @@ Bytes encode_pfm(const Image& image) {
 
 class MemoryInput : public Imf::IStream {
 public:
-    explicit MemoryInput(const Bytes& bytes) : Imf::IStream("image"), bytes_(bytes) {}
+    explicit MemoryInput(ByteView bytes) : Imf::IStream("image"), bytes_(bytes) {}
     bool read(char to[], int count) override {
         if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() - position_) {
             throw Iex::InputExc("the file ends too early");
@@ -397,7 +386,7 @@ public:
     }
 
 private:
-    const Bytes& bytes_;
+    ByteView bytes_;
     std::uint64_t position_ = 0;
 };
 
@@ -422,7 +411,7 @@ private:
 // window and the channel list claim, so those are settled against the file before it is called.
 class ExrHeaderCheck {
 public:
-    ExrHeaderCheck(const std::filesystem::path& file, const Bytes& bytes) : file_(file), bytes_(bytes) {}
+    ExrHeaderCheck(const std::filesystem::path& file, ByteView bytes) : file_(file), bytes_(bytes) {}
 
     Result<void> run() {
         const std::uint32_t version = word(4);
@@ -511,10 +500,9 @@ private:
             for (std::size_t i = 0; i < 4; ++i) box[i] = std::bit_cast<std::int32_t>(word(position + 4 * i));
             const std::int64_t width = box[2] - box[0] + 1, height = box[3] - box[1] + 1;
             if (width <= 0 || height <= 0) return malformed(file_, "the EXR data window is empty");
-            if (auto complaint =
-                    size_complaint(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
+            if (auto complaint = size_complaint(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height),
+                                                bytes_.size()))
                 return malformed(file_, *complaint);
-            }
             width_ = static_cast<std::uint64_t>(width);
             height_ = static_cast<std::uint64_t>(height);
         } else if (name == "compression" && type == "compression") {
@@ -571,7 +559,7 @@ private:
     }
 
     const std::filesystem::path& file_;
-    const Bytes& bytes_;
+    ByteView bytes_;
     std::uint64_t width_ = 0, height_ = 0, channels_ = 0;
     unsigned compression_ = 0;
 };
@@ -595,29 +583,33 @@ Result<std::vector<std::string>> choose_channels(const std::filesystem::path& fi
     return chosen;
 }
 
-// Decodes a strip of rows at a time, so that memory grows only with pixels that were really there.
-void read_exr_pixels(Imf::InputFile& input, const std::vector<std::string>& channels, Image& image) {
+// Decodes a strip of rows at a time.
+Result<void> read_exr_pixels(Imf::InputFile& input, const std::vector<std::string>& channels,
+                             const std::filesystem::path& file, const ImageFile& header, const TakeRow& take) {
     constexpr int strip_rows = 32; // lines of a usual chunk, so that none is decoded twice
     const auto window = input.header().dataWindow();
-    const std::size_t pixel_bytes = channels.size() * sizeof(float);
-    std::vector<float> strip(static_cast<std::size_t>(image.width) * channels.size() * strip_rows);
-    for (int row = 0; row < image.height; row += strip_rows) {
-        const int rows = std::min(strip_rows, image.height - row);
+    const std::size_t pixel_bytes = channels.size() * sizeof(float), row_values = header.image.index(0, 1, 0);
+    std::vector<float> strip(row_values * strip_rows);
+    for (int row = 0; row < header.image.height; row += strip_rows) {
+        const int rows = std::min(strip_rows, header.image.height - row);
         const int top = window.min.y + row;
         Imf::FrameBuffer frame;
         for (std::size_t c = 0; c < channels.size(); ++c) {
             frame.insert(channels[c],
-                         Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top), image.width,
-                                          rows, pixel_bytes, pixel_bytes * static_cast<std::size_t>(image.width)));
+                         Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top),
+                                          header.image.width, rows, pixel_bytes, row_values * sizeof(float)));
         }
         input.setFrameBuffer(frame);
         input.readPixels(top, top + rows - 1);
-        const auto count = static_cast<std::size_t>(rows) * static_cast<std::size_t>(image.width) * channels.size();
-        image.values.insert(image.values.end(), strip.begin(), strip.begin() + static_cast<std::ptrdiff_t>(count));
+        for (int i = 0; i < rows; ++i) {
+            const std::span values(strip.data() + row_values * static_cast<std::size_t>(i), row_values);
+            if (auto taken = hand_over(file, header, row + i, values, take); !taken) return taken;
+        }
     }
+    return {};
 }
 
-Result<ImageFile> read_exr(const std::filesystem::path& file, const Bytes& bytes) {
+Result<ImageFile> read_exr(const std::filesystem::path& file, ByteView bytes, const TakeRow& take) {
     if (bytes.size() < 8) return malformed(file, "ends within the EXR header");
     if (auto ok = ExrHeaderCheck(file, bytes).run(); !ok) return ok.error();
     try {
@@ -626,14 +618,15 @@ Result<ImageFile> read_exr(const std::filesystem::path& file, const Bytes& bytes
         const auto window = input.header().dataWindow();
         const auto channels = choose_channels(file, input.header().channels());
         if (!channels) return channels.error();
-        ImageFile out;
-        out.is_absolute = true;
-        out.bits = 32;
-        out.image = {
+        ImageFile header;
+        header.is_absolute = true;
+        header.bits = 32;
+        header.image = {
             window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, static_cast<int>(channels->size()), {}};
-        read_exr_pixels(input, *channels, out.image);
-        if (auto error = non_finite(file, out.image)) return *std::move(error);
-        return out;
+        if (auto read = read_exr_pixels(input, *channels, file, header, take); !read) return read.error();
+        return header;
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception& e) {
         return malformed(file, std::string("damaged EXR: ") + e.what());
     }
@@ -682,9 +675,8 @@ Result<Bytes> encode(const std::filesystem::path& file, const Image& image) {
                  file.string() + ": images are written as .png, .pfm or .exr, not '" + ending + "'"};
 }
 
-bool begins_with(const Bytes& bytes, std::initializer_list<unsigned char> magic) {
-    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
-}
+constexpr std::string_view png_magic = "\x89PNG\r\n\x1a\n", exr_magic = "\x76\x2f\x31\x01";
+bool is_pfm(std::string_view bytes) { return bytes.starts_with("Pf") || bytes.starts_with("PF"); }
 
 // decode() costs a power; an 8- or 16-bit file has few codes and many pixels.
 class CodeDecoder {
@@ -708,19 +700,41 @@ private:
 } // namespace
 
 Result<ImageFile> read_image(const std::filesystem::path& file) {
-    auto bytes = read_bytes(file);
+    const auto bytes = read_file_or_pipe(file);
     if (!bytes) return bytes.error();
     return decode_image(*bytes, file);
 }
 
-Result<ImageFile> decode_image(const std::vector<unsigned char>& bytes, const std::filesystem::path& file) {
+std::uint64_t most_pixels_in(std::uint64_t file_bytes) {
+    constexpr std::uint64_t pixels_a_byte = 1024;                 // of a blank PNG of 8 bits, or a blank JPEG
+    constexpr std::uint64_t small_image = std::uint64_t{1} << 24; // pixels that any file may ask for
+    return std::max(small_image, pixels_a_byte * file_bytes);
+}
+
+Result<ImageFile> decode_image(std::string_view bytes, const std::filesystem::path& file) {
+    std::vector<float> values;
+    auto header = decode_rows(bytes, file, [&](const ImageFile&, int, std::span<const float> row) -> Result<void> {
+        values.insert(values.end(), row.begin(), row.end());
+        return {};
+    });
+    if (header) header->image.values = std::move(values);
+    return header;
+}
+
+bool is_image(std::string_view bytes) {
+    return bytes.starts_with(png_magic) || bytes.starts_with(exr_magic) || is_pfm(bytes);
+}
+
+Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& file, const TakeRow& take) {
+    const ByteView view(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
     try {
-        if (begins_with(bytes, {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'})) return read_png(file, bytes);
-        if (begins_with(bytes, {0x76, 0x2f, 0x31, 0x01})) return read_exr(file, bytes);
-        if (begins_with(bytes, {'P', 'f'}) || begins_with(bytes, {'P', 'F'})) return read_pfm(file, bytes);
+        if (bytes.starts_with(png_magic)) return read_png(file, view, take);
+        if (bytes.starts_with(exr_magic)) return read_exr(file, view, take);
+        if (is_pfm(bytes)) return read_pfm(file, view, take);
     } catch (const std::bad_alloc&) {
         return unsupported(file, "needs more memory than this machine has");
     }
+    if (bytes.empty()) return malformed(file, "is empty, not an image");
     return malformed(file, "is neither PNG, nor PFM, nor EXR (told by its first bytes)");
 }
 

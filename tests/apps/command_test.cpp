@@ -915,17 +915,6 @@ TEST_F(SimplifyTest, NumbersBeyondAllRangesAreNamedPlainly) {
     EXPECT_THAT(outcome.err, AllOf(HasSubstr("1e999"), Not(HasSubstr("exception"))));
 }
 
-TEST_F(UsageTest, FilesThatNeverEndAreRefused) {
-    for (const std::vector<std::string>& words :
-         std::vector<std::vector<std::string>>{{"compare", "/dev/zero", "/dev/zero"},
-                                               {"csf", "--csv", "/dev/zero", "--luminance", "1"},
-                                               {"calibrate", "--photometer", "/dev/zero", "-o", "o.json"}}) {
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 1) << outcome.err;
-        EXPECT_THAT(outcome.err, AllOf(IsAnErrorForPeople(), HasSubstr("512 MiB")));
-    }
-}
-
 TEST_F(UsageTest, ByteOrderMarksAreNoText) {
     const std::string mark = "\xef\xbb\xbf";
     write_text(path("s.csv"), mark + "frequency,luminance\n4,100\n");

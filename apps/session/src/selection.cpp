@@ -15,6 +15,7 @@
 #include <unseen/session/session.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 
 namespace unseen::session {
 namespace {
@@ -134,21 +135,6 @@ SelectionCorner get_corner(ByteReader& in) {
 }
 
 std::uint64_t hash_of(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
-
-Result<std::vector<std::byte>> read_bytes(const std::filesystem::path& file) {
-    std::error_code failed;
-    const std::uint64_t size = std::filesystem::file_size(file, failed);
-    if (failed) return Error{ErrorCode::io_failure, "Cannot read '" + file.string() + "': " + failed.message() + "."};
-    constexpr std::uint64_t most_bytes = std::uint64_t{1} << 32;
-    if (size > most_bytes)
-        return Error{ErrorCode::unsupported, "'" + file.string() + "' is larger than selections are, 4 GiB."};
-    std::ifstream in(file, std::ios::binary);
-    std::vector<std::byte> bytes(size);
-    in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-    if (!in || in.gcount() != static_cast<std::streamsize>(size))
-        return Error{ErrorCode::io_failure, "Cannot read all of '" + file.string() + "'."};
-    return bytes;
-}
 
 void check_grid(const SelectionGrid& grid, ByteReader& in) {
     const auto is_finite = [](double v) { return std::abs(v) <= 1e12; };
@@ -302,12 +288,12 @@ Result<void> write_selections(const std::filesystem::path& file, const Selection
 }
 
 Result<Selections> read_selections(const std::filesystem::path& file) {
-    const auto read = read_bytes(file);
+    const auto read = read_file_or_pipe(file);
     if (!read) return read.error();
     const auto wrong = [&](const std::string& what) {
         return Error{ErrorCode::malformed_data, "'" + file.string() + "', " + what + "."};
     };
-    const std::span<const std::byte> bytes(*read);
+    const auto bytes = std::as_bytes(std::span(*read));
     if (bytes.size() < selection_magic.size() + 12 ||
         std::memcmp(bytes.data(), selection_magic.data(), selection_magic.size()) != 0)
         return wrong("byte 0: this is no file of selections; make one with 'unseen select precompute'");
@@ -391,7 +377,7 @@ Result<SelectionJournal> SelectionJournal::open(const std::filesystem::path& fil
     std::error_code failed;
     std::uint64_t good = 0; // bytes
     if (std::filesystem::exists(file, failed)) {
-        const auto bytes = read_bytes(file);
+        const auto bytes = read_file_or_pipe(file);
         if (!bytes) return bytes.error();
         std::uint64_t of = 0;
         if (bytes->size() >= head) std::memcpy(&of, bytes->data() + journal_magic.size(), sizeof(of));
@@ -406,7 +392,8 @@ Result<SelectionJournal> SelectionJournal::open(const std::filesystem::path& fil
                 std::memcpy(&length, bytes->data() + good, sizeof(length));
                 std::memcpy(&sum, bytes->data() + good + sizeof(length), sizeof(sum));
                 if (length > left - sizeof(length) - sizeof(sum)) break;
-                const auto record = std::span(*bytes).subspan(good + sizeof(length) + sizeof(sum), length);
+                const auto record =
+                    std::as_bytes(std::span(*bytes)).subspan(good + sizeof(length) + sizeof(sum), length);
                 if (hash_of(record) != sum) break;
                 auto corner = corner_from(record);
                 if (!corner) break;

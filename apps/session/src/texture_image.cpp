@@ -7,11 +7,9 @@
 #include <csetjmp>
 #include <cstdint>
 #include <cstdio> // what jpeglib.h counts on
-#include <fstream>
-#include <iterator>
 #include <new>
+#include <span>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include <jerror.h>
@@ -19,6 +17,7 @@
 
 #include <unseen/perception/image.h>
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/input_file.h>
 
 namespace unseen::session {
 namespace {
@@ -26,11 +25,7 @@ namespace {
 using vdtree::Texel;
 using vdtree::Texture;
 
-// A JPEG's blank parts take less than a bit a pixel, but no picture gets this small: a header that claims more is
-// wrong.
-constexpr std::uint64_t most_pixels_a_byte = 1024;
-constexpr std::uint64_t small_image = std::uint64_t{1} << 24; // pixels that any file may ask for
-constexpr int most_scans = 100;                               // of a progressive JPEG: more only take time
+constexpr int most_scans = 100; // of a progressive JPEG: more only take time
 
 Error malformed(const std::filesystem::path& name, const std::string& what) {
     return {ErrorCode::malformed_data, name.string() + ": " + what};
@@ -118,7 +113,7 @@ Result<Texture> decode_jpeg(std::string_view bytes, const std::filesystem::path&
     if (!guarded(reader, begin)) return complain();
     const std::uint64_t width = reader.info.image_width, height = reader.info.image_height;
     if (const auto ok = check_size(name, width, height); !ok) return ok.error();
-    if (width * height > std::max(small_image, most_pixels_a_byte * bytes.size()))
+    if (width * height > perception::most_pixels_in(bytes.size()))
         return malformed(name, "the header gives " + std::to_string(width) + " x " + std::to_string(height) +
                                    " pixels, which " + std::to_string(bytes.size()) + " bytes cannot hold.");
     if (reader.info.jpeg_color_space == JCS_CMYK || reader.info.jpeg_color_space == JCS_YCCK)
@@ -146,32 +141,34 @@ Result<Texture> decode_jpeg(std::string_view bytes, const std::filesystem::path&
 
 std::uint8_t code_of(double encoded) { return static_cast<std::uint8_t>(std::clamp(encoded, 0.0, 1.0) * 255 + 0.5); }
 
-Result<Texture> to_texture(const perception::ImageFile& file, const std::filesystem::path& name) {
-    const perception::Image& image = file.image;
-    if (const auto ok =
-            check_size(name, static_cast<std::uint64_t>(image.width), static_cast<std::uint64_t>(image.height));
-        !ok)
-        return ok.error();
+Result<Texture> decode_codes(std::string_view bytes, const std::filesystem::path& name) {
     Texture texture;
-    texture.width = static_cast<std::uint32_t>(image.width);
-    texture.height = static_cast<std::uint32_t>(image.height);
-    texture.texels.reserve(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height));
-    for (int y = 0; y < image.height; ++y) {
-        for (int x = 0; x < image.width; ++x) {
+    const auto take = [&](const perception::ImageFile& file, int y, std::span<const float> row) -> Result<void> {
+        const auto width = static_cast<std::uint32_t>(file.image.width),
+                   height = static_cast<std::uint32_t>(file.image.height);
+        if (y == 0) {
+            if (const auto ok = check_size(name, width, height); !ok) return ok;
+            texture.width = width, texture.height = height;
+            texture.texels.reserve(std::size_t{width} * height);
+        }
+        const auto channels = static_cast<std::size_t>(file.image.channels);
+        for (std::size_t i = 0; i < row.size(); i += channels) {
             Texel texel{0, 0, 0, 255};
-            for (int c = 0; c < 3; ++c) {
-                const float value = image.at(x, y, image.channels == 1 ? 0 : c);
+            for (std::size_t c = 0; c < 3; ++c) {
+                const float value = row[channels == 1 ? i : i + c];
                 if (!(value >= 0 && value <= 1))
-                    return malformed(name, "the value of pixel (" + std::to_string(x) + ", " + std::to_string(y) +
-                                               ") is " + std::to_string(value) +
+                    return malformed(name, "the value of pixel (" + std::to_string(i / channels) + ", " +
+                                               std::to_string(y) + ") is " + std::to_string(value) +
                                                ", and a texture has values from 0 to 1; scale them.");
-                texel[static_cast<std::size_t>(c)] =
+                texel[c] =
                     code_of(file.is_absolute ? linear_to_srgb(static_cast<double>(value)) : static_cast<double>(value));
             }
             texture.texels.push_back(texel);
         }
-    }
-    return texture;
+        return {};
+    };
+    const auto decoded = perception::decode_rows(bytes, name, take);
+    return decoded ? Result<Texture>(std::move(texture)) : decoded.error();
 }
 
 void turn_upside_down(Texture& texture) {
@@ -188,9 +185,9 @@ Result<Texture> decode_texture(std::string_view bytes, const std::filesystem::pa
     const auto decode = [&]() -> Result<Texture> {
         if (bytes.empty()) return malformed(name, "is empty, not an image.");
         if (bytes.starts_with("\xFF\xD8\xFF")) return decode_jpeg(bytes, name);
-        const auto image = perception::decode_image(std::vector<unsigned char>(bytes.begin(), bytes.end()), name);
-        if (!image) return image.error();
-        return to_texture(*image, name);
+        if (!perception::is_image(bytes))
+            return malformed(name, "is neither PNG, JPEG, PFM nor EXR (told by its first bytes).");
+        return decode_codes(bytes, name);
     };
     try {
         auto texture = decode();
@@ -203,18 +200,8 @@ Result<Texture> decode_texture(std::string_view bytes, const std::filesystem::pa
 }
 
 Result<Texture> read_texture(const std::filesystem::path& file, bool from_top) {
-    const auto failure = [&](const std::string& why) {
-        return Error{ErrorCode::io_failure, file.string() + ": " + why};
-    };
-    std::error_code error;
-    const auto status = std::filesystem::status(file, error);
-    if (!std::filesystem::exists(status)) return failure("there is no such image; check the name.");
-    if (!std::filesystem::is_regular_file(status)) return failure("it is no regular file; give the name of an image.");
-    std::ifstream in(file, std::ios::binary);
-    if (!in) return failure("cannot be opened; check the permissions.");
-    const std::string bytes((std::istreambuf_iterator<char>(in)), {});
-    if (in.bad()) return failure("cannot be read to its end.");
-    return decode_texture(bytes, file, from_top);
+    const auto bytes = read_regular_file(file);
+    return bytes ? decode_texture(*bytes, file, from_top) : bytes.error();
 }
 
 } // namespace unseen::session

@@ -10,8 +10,8 @@
 
 #include <unseen/perception/gaze.h>
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {

@@ -268,32 +268,7 @@ std::optional<fs::path> path_beside(std::string_view name) {
     if (relative.empty() || relative.is_absolute() || leaves_folder || slashes.find(':') != std::string::npos ||
         slashes.find('\0') != std::string::npos)
         return std::nullopt;
-    return relative;
-}
-
-Result<std::string> read_whole_file(const fs::path& file) {
-    const auto failure = [&](const std::string& why) {
-        return Error{ErrorCode::io_failure, "Cannot read '" + file.string() + "': " + why};
-    };
-    std::error_code error;
-    const fs::file_status status = fs::status(file, error);
-    if (!fs::exists(status)) return failure("there is no such file; check the name.");
-    // A pipe or a device could make the reader wait for ever.
-    if (!fs::is_regular_file(status)) return failure("it is no regular file; give the name of one.");
-    const std::uintmax_t size = fs::file_size(file, error);
-    if (error) return failure(error.message() + ".");
-
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
-    if (!stream) return failure(std::string(std::strerror(errno)) + ".");
-    std::string bytes;
-    try {
-        bytes.resize(size);
-    } catch (const std::exception&) {
-        return too_large(file.string());
-    }
-    const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), stream.get());
-    if (got != bytes.size()) return failure("it ended early; it may have been changed meanwhile, so try again.");
-    return bytes;
+    return relative.lexically_normal();
 }
 
 Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name, const ReadOptions& options,
@@ -321,7 +296,7 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name,
 }
 
 Result<ReadResult> read_mesh(const fs::path& file, const ReadOptions& options) {
-    const Result<std::string> bytes = read_whole_file(file);
+    const Result<std::string> bytes = read_regular_file(file);
     if (!bytes) return bytes.error();
     const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
     return read_mesh_bytes(*bytes, file, options, folder);

@@ -13,7 +13,9 @@
 
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/input_file.h>
 
 namespace unseen::meshio {
 
@@ -68,9 +70,6 @@ struct MtlContents {
 // Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad
 // ones are no errors.
 Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents);
-
-// Reads a regular file whole; pipes and devices are refused.
-Result<std::string> read_whole_file(const std::filesystem::path& file);
 
 // Counts a vertex with a NaN or infinite coordinate. `where` names it if it is the first.
 template <class Where>

@@ -396,7 +396,7 @@ private:
         }
         if (!libraries_.insert(*path).second) return {}; // it is often named again and again
         document_.files.push_back({.use = SourceDocument::File::Use::library, .uri = path->generic_string()});
-        Result<std::string> bytes = read_whole_file(source_.folder / *path);
+        Result<std::string> bytes = read_regular_file(source_.folder / *path);
         if (!bytes) {
             warn(where + " were left out: " + bytes.error().message);
             return {};
@@ -432,7 +432,7 @@ private:
         if (!has_parts_ || result_.mesh.triangles.empty()) return;
         document_.format = SourceDocument::Format::obj;
         for (const fs::path& image : library_.images) {
-            Result<std::string> bytes = read_whole_file(source_.folder / image);
+            Result<std::string> bytes = read_regular_file(source_.folder / image);
             if (!bytes) warn(bytes.error().message + " The image is named, but not kept.");
             document_.files.push_back(
                 {.uri = image.generic_string(),

@@ -9,12 +9,12 @@
 #include <cstring>
 #include <string>
 
-#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <unseen/vdtree/internal/mapped_names.h>
+
+#include "files/descriptor.h"
 
 namespace unseen::vdtree {
 
@@ -28,17 +28,25 @@ Error failure(const std::filesystem::path& file, const std::string& why) {
 struct NamedPages {
     std::atomic<bool> is_used = false;
     std::atomic<std::uintptr_t> begin = 0, end = 0;
+    std::atomic<std::uint64_t> number = 0; // of the file in its file system
+    std::atomic<std::int64_t> written_ns = 0;
     std::array<char, PATH_MAX> name;
 };
 static_assert(std::atomic<std::uintptr_t>::is_always_lock_free);
 std::array<NamedPages, 32> named_pages;
 
+std::int64_t written_ns(const struct stat& status) {
+    return status.st_mtim.tv_sec * std::int64_t{1'000'000'000} + status.st_mtim.tv_nsec;
+}
+
 // Its place in the list; -1 where the list is full.
-int note(std::span<const std::byte> bytes, const std::string& name) {
+int note(std::span<const std::byte> bytes, const std::string& name, const struct stat& status) {
     for (std::size_t i = 0; i < named_pages.size() && name.size() < PATH_MAX; ++i) {
         NamedPages& pages = named_pages[i];
         if (pages.is_used.exchange(true)) continue;
         std::copy_n(name.c_str(), name.size() + 1, pages.name.begin());
+        pages.number = status.st_ino;
+        pages.written_ns = written_ns(status);
         pages.begin = reinterpret_cast<std::uintptr_t>(bytes.data());
         pages.end = pages.begin + bytes.size();
         return static_cast<int>(i);
@@ -53,21 +61,6 @@ void forget(int place) {
     pages.is_used = false;
 }
 
-class Descriptor {
-public:
-    explicit Descriptor(const std::filesystem::path& file)
-        : fd_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
-    }
-    int get() const { return fd_; }
-
-private:
-    int fd_;
-};
-
 } // namespace
 
 Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::filesystem::path& file) {
@@ -81,11 +74,10 @@ Result<std::shared_ptr<const MappedFile>> MappedFile::open(const std::filesystem
     void* start = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, descriptor.get(), 0);
     if (start == MAP_FAILED) return failure(file, std::strerror(errno));
     ::madvise(start, size, MADV_RANDOM); // a hint only
-    return std::shared_ptr<const MappedFile>(new MappedFile({static_cast<const std::byte*>(start), size}, file));
+    return std::shared_ptr<const MappedFile>(
+        new MappedFile({static_cast<const std::byte*>(start), size},
+                       note({static_cast<const std::byte*>(start), size}, file.native(), status)));
 }
-
-MappedFile::MappedFile(std::span<const std::byte> bytes, const std::filesystem::path& file)
-    : bytes_(bytes), place_(note(bytes, file.native())) {}
 
 MappedFile::~MappedFile() {
     forget(place_);
@@ -96,6 +88,15 @@ const char* mapped_file_at(const void* address) noexcept {
     const auto at = reinterpret_cast<std::uintptr_t>(address);
     for (const NamedPages& pages : named_pages)
         if (const std::uintptr_t end = pages.end; at < end && at >= pages.begin) return pages.name.data();
+    return nullptr;
+}
+
+const char* changed_mapped_file() noexcept {
+    for (const NamedPages& pages : named_pages) {
+        struct stat status {};
+        if (pages.end == 0 || ::stat(pages.name.data(), &status) != 0) continue;
+        if (status.st_ino == pages.number && written_ns(status) != pages.written_ns) return pages.name.data();
+    }
     return nullptr;
 }
 

@@ -24,9 +24,9 @@ public:
     std::span<const std::byte> bytes() const noexcept { return bytes_; }
 
 private:
-    MappedFile(std::span<const std::byte> bytes, const std::filesystem::path& file);
+    MappedFile(std::span<const std::byte> bytes, int place) : bytes_(bytes), place_(place) {}
     std::span<const std::byte> bytes_;
-    int place_; // among the names that mapped_file_at() knows; -1: none
+    int place_; // among the names that mapped_file_at() knows; -1: it is not there
 };
 
 } // namespace unseen::vdtree

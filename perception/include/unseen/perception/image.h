@@ -1,10 +1,14 @@
 // Luminance images and their files.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include <unseen/perception/display.h>
+#include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
@@ -37,8 +41,19 @@ struct ImageFile {
 // side; non-finite values are an error that names the pixel.
 Result<ImageFile> read_image(const std::filesystem::path& file);
 
-// The same of a file's bytes; `name` is for messages.
-Result<ImageFile> decode_image(const std::vector<unsigned char>& bytes, const std::filesystem::path& name);
+// Decodes the bytes of a file; `name` is for messages.
+Result<ImageFile> decode_image(std::string_view bytes, const std::filesystem::path& name);
+
+// Decodes an image and hands over its rows from the top, so that it need not fit into memory as floats. The image that
+// `take` receives and that is returned has a size and no values. An error of `take` ends decoding.
+using TakeRow = FunctionRef<Result<void>(const ImageFile& image, int y, std::span<const float> row)>;
+Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& name, const TakeRow& take);
+
+// Whether the bytes begin like a file of one of these formats.
+bool is_image(std::string_view bytes);
+
+// The most pixels that a compressed image of this size may claim to have.
+std::uint64_t most_pixels_in(std::uint64_t file_bytes);
 
 // By ending: .png (values are code values 0..1, 8 bit), .pfm and .exr (float as they are). Written to a temporary
 // name, then renamed.
