@@ -1,9 +1,14 @@
 #include "interruption.h"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <string_view>
+#include <system_error>
+#include <thread>
 
 #include <unistd.h>
 
@@ -11,6 +16,7 @@
 #include <unseen/vdtree/internal/mapped_names.h>
 
 #include "command.h"
+#include "output_files.h"
 
 namespace unseen::app {
 namespace {
@@ -21,6 +27,7 @@ static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_alw
 
 void end_by(int signal) {
     vdtree::AtomicFile::remove_all();
+    remove_empty_made_folders();
     std::signal(signal, SIG_DFL);
     std::raise(signal); // waits until a handler has returned
 }
@@ -39,16 +46,36 @@ void write_plainly(std::string_view text) {
     }
 }
 
-// What a mapped file's pages raise when the file has become shorter than it was. Other causes are not for a sentence.
-void on_lost_page(int signal, siginfo_t* info, void*) {
-    const char* const file = info->si_code > 0 ? vdtree::mapped_file_at(info->si_addr) : nullptr;
-    if (!file) return end_by(signal);
+[[noreturn]] void end_for_changed(const char* file) {
     write_plainly("unseen: '");
     write_plainly(file);
-    write_plainly("' was cut short while it was read: write it anew, under another name, and rename it.");
+    write_plainly("' was cut short or changed while it was read: write it anew, under another name, and rename it.");
     [[maybe_unused]] const auto written = ::write(STDERR_FILENO, "\n", 1);
     vdtree::AtomicFile::remove_all();
+    remove_empty_made_folders();
     ::_exit(exit_failed);
+}
+
+constexpr std::array fault_signals = {SIGBUS, SIGSEGV, SIGFPE, SIGABRT};
+std::array<struct sigaction, fault_signals.size()> usual_actions;
+
+// A mapped file that becomes shorter raises SIGBUS; one that is written to may lead to any fault. Other faults have
+// their usual end.
+void on_fault(int signal, siginfo_t* info, void*) {
+    const bool is_fault = info->si_code > 0;
+    const char* const cut_short = is_fault && signal == SIGBUS ? vdtree::mapped_file_at(info->si_addr) : nullptr;
+    if (const char* file = cut_short ? cut_short : vdtree::changed_mapped_file()) end_for_changed(file);
+    vdtree::AtomicFile::remove_all();
+    const auto place = std::find(fault_signals.begin(), fault_signals.end(), signal) - fault_signals.begin();
+    ::sigaction(signal, &usual_actions[static_cast<std::size_t>(place)], nullptr);
+    if (!is_fault) std::raise(signal); // else it is raised again where it was
+}
+
+// What is read from a file that is written to meanwhile may also have no end.
+void watch_mapped_files() {
+    constexpr auto pause = std::chrono::seconds(1);
+    for (;; std::this_thread::sleep_for(pause))
+        if (const char* file = vdtree::changed_mapped_file()) end_for_changed(file);
 }
 
 } // namespace
@@ -63,9 +90,13 @@ void clean_up_on_signals() {
         ::sigaction(signal, &action, nullptr);
     }
     struct sigaction action {};
-    action.sa_sigaction = on_lost_page;
+    action.sa_sigaction = on_fault;
     action.sa_flags = SA_SIGINFO;
-    ::sigaction(SIGBUS, &action, nullptr);
+    for (std::size_t i = 0; i < fault_signals.size(); ++i) ::sigaction(fault_signals[i], &action, &usual_actions[i]);
+    try {
+        std::thread(watch_mapped_files).detach();
+    } catch (const std::system_error&) { // no more threads: then nothing is watched
+    }
 }
 
 Interruptible::Interruptible() { is_interruptible = true; }

@@ -67,6 +67,8 @@ Result<session::Scene> load_scene(const std::filesystem::path& file, const ViewO
     options.unit_metres = view.unit_metres;
     options.as = view.as;
     options.cache.is_off = view.no_cache;
+    options.measures = view.measures;
+    options.conserves_light = !view.measures; // so that pictures are the same
     return session::Scene::load(file, options);
 }
 

@@ -43,6 +43,7 @@ constexpr OptionName option_names[] = {
     {"Follower::set_glide()", "--geomorph"},
     {"session::read_textured_mesh()", "unseen build"},
     {"vdtree::write_tree()", "'unseen build'"},
+    {"perception::measure_folds()", "'unseen build'"},
     {"session::measured()", "unseen build"},
     {"session::measured_under_lights()", "unseen build --lit-fold-errors"},
     {"session::TreeCache", "unseen cache"},

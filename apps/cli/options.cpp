@@ -284,6 +284,10 @@ std::uint32_t TriangleCount::of(std::uint64_t all) const {
     return static_cast<std::uint32_t>(std::clamp(std::round(share * static_cast<double>(all)), 1.0, most));
 }
 
+bool WhatOptions::needs_measurement() const {
+    return request.goal.kind != session::Goal::Kind::pixels && request.goal.kind != session::Goal::Kind::full;
+}
+
 session::Request WhatOptions::request_for(std::uint64_t source_triangles) const {
     session::Request complete = request;
     if (budget.is_given()) complete.goal.triangles = budget.of(source_triangles);

@@ -51,6 +51,7 @@ struct ViewOptions {
     double unit_metres = 1; // world units a mesh unit
     TextureOptions texture;
     bool no_cache = false;                       // trees are neither kept nor taken from what was kept
+    bool measures = true;                        // what folds change, when a tree is built
     session::LoadAs as = session::LoadAs::model; // what glTF files become; set by verbs that take scenes
 };
 
@@ -81,6 +82,8 @@ struct WhatOptions {
     session::Request request; // of budgets, without the number of triangles
     TriangleCount budget;
 
+    // Whether a test may go by what folds change; tolerances in pixels do not.
+    bool needs_measurement() const;
     // For a model with so many triangles.
     session::Request request_for(std::uint64_t source_triangles) const;
     std::optional<glm::dvec2> gaze_px;

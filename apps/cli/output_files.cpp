@@ -1,10 +1,16 @@
 #include "output_files.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <filesystem>
 #include <iterator>
 
+#include <unistd.h>
+
+#include <unseen/session/model_file.h>
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "report.h"
 #include "terminal.h"
@@ -16,7 +22,10 @@ namespace fs = std::filesystem;
 namespace {
 
 std::vector<std::string> checked_outputs; // of this run
-std::vector<fs::path> made_folders;       // parents first
+
+// Parents first. A signal's handler may read them at any time; folders beyond these are left.
+std::array<fs::path, 64> made_folders;
+std::atomic<std::size_t> made_folder_count = 0;
 
 bool is_file(const std::string& name) { return !name.empty() && name != "-"; }
 
@@ -29,11 +38,38 @@ bool is_same(const std::string& a, const std::string& b) {
     return !one.empty() && one == other;
 }
 
+// Whether the file is one of the numbered pictures that the output names ("frames/%04d.png").
+bool is_picture_of(const fs::path& file, const fs::path& output) {
+    const std::string name = file.filename().string(), pattern = output.filename().string();
+    const std::size_t begin = pattern.find('%'), end = pattern.find('d', begin);
+    if (begin == pattern.npos || end == pattern.npos || !is_same(file.parent_path() / ".", output.parent_path() / "."))
+        return false;
+    const std::string after = pattern.substr(end + 1);
+    if (name.size() <= begin + after.size() || !name.starts_with(pattern.substr(0, begin)) || !name.ends_with(after))
+        return false;
+    const std::string number = name.substr(begin, name.size() - begin - after.size());
+    return number.find_first_not_of("0123456789") == number.npos;
+}
+
+// Whether an input is a mesh that reads the output: a buffer, a library of materials, an image.
+bool is_read_by(const std::string& input, const std::string& output) {
+    std::error_code unknown;
+    const bool may_be_there = fs::exists(output, unknown) || output.find('%') != output.npos;
+    if (!is_file(input) || !is_file(output) || !may_be_there || vdtree::is_tree_file(input)) return false;
+    const auto named = session::files_named_by(input);
+    return std::any_of(named.begin(), named.end(), [&](const fs::path& file) {
+        return is_same(file.string(), output) || is_picture_of(file, output);
+    });
+}
+
 Result<void> make_folder(const fs::path& folder) {
     std::error_code failure;
     if (folder.empty() || fs::is_directory(folder, failure)) return {};
     if (const auto parent = make_folder(folder.parent_path()); !parent) return parent;
-    if (fs::create_directory(folder, failure)) made_folders.push_back(folder);
+    if (fs::create_directory(folder, failure) && made_folder_count < made_folders.size()) {
+        made_folders[made_folder_count] = folder;
+        ++made_folder_count;
+    }
     if (!failure) return {};
     return Error{ErrorCode::io_failure, "Cannot make the folder '" + folder.string() + "': " + failure.message() + "."};
 }
@@ -44,7 +80,6 @@ Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file)
     if (file.empty()) return std::optional<vdtree::AtomicFile>();
     auto opened = vdtree::AtomicFile::create(file);
     if (!opened) return opened.error();
-    vdtree::AtomicFile::remove_orphans(file);
     return std::optional(std::move(*opened));
 }
 
@@ -54,8 +89,9 @@ std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& 
 
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
     for (auto output = outputs.begin(); output != outputs.end(); ++output) {
-        if (std::any_of(inputs.begin(), inputs.end(),
-                        [&](const std::string& input) { return is_same(input, *output); }))
+        if (std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) {
+                return is_same(input, *output) || is_read_by(input, *output);
+            }))
             return Error{ErrorCode::invalid_argument, "'" + *output + "' is read: give the output another name."};
         if (std::any_of(outputs.begin(), output, [&](const std::string& other) { return is_same(other, *output); }))
             return Error{ErrorCode::invalid_argument,
@@ -63,6 +99,7 @@ Result<void> check_outputs(const std::vector<std::string>& inputs, const std::ve
         if (!is_file(*output)) continue;
         if (const auto made = make_folder(fs::path(*output).parent_path()); !made) return made;
         if (const auto file = vdtree::AtomicFile::create(*output); !file) return file.error(); // goes without a trace
+        vdtree::AtomicFile::remove_orphans(*output);
         checked_outputs.push_back(*output);
     }
     return {};
@@ -87,9 +124,8 @@ std::vector<std::string> written_outputs() {
     return files;
 }
 
-void remove_empty_made_folders() {
-    std::error_code ignored;
-    for (auto folder = made_folders.rbegin(); folder != made_folders.rend(); ++folder) fs::remove(*folder, ignored);
+void remove_empty_made_folders() noexcept {
+    for (std::size_t i = made_folder_count; i-- > 0;) ::rmdir(made_folders[i].c_str());
 }
 
 } // namespace unseen::app

@@ -13,11 +13,12 @@
 
 namespace unseen::app {
 
-// Fails where an output is one of the inputs or another output, and where it could not be written. Names that are
-// empty, or "-", are none. Outputs are left as they are; folders that they need are made.
+// Fails if an output is one of the inputs, a file that an input reads in turn (a texture of a model), or another output,
+// and if it could not be written. Empty names and "-" are passed over. Outputs stay as they are; folders that they need
+// are made, and what a killed writer has left in them is removed.
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
-// One of them, to be written and committed later; nothing where the name is empty. Removes what a killed writer has left.
+// One of them, to be written and committed later; nothing if the name is empty.
 Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file);
 
 // What a command that looks at a model reads.
@@ -29,7 +30,7 @@ void print_written(const std::vector<std::string>& files);
 // Outputs that passed check_outputs() and are there.
 std::vector<std::string> written_outputs();
 
-// Folders that check_outputs() made and nothing went into, after a failure.
-void remove_empty_made_folders();
+// Removes the folders that check_outputs() made and that are empty, after a failure. Async-signal-safe.
+void remove_empty_made_folders() noexcept;
 
 } // namespace unseen::app

@@ -132,6 +132,19 @@ int run(const std::vector<Command>& commands) {
     return exit_usage; // the parser insists on a verb
 }
 
+// A variable of a shell that is not set must not look like an option that is not given.
+void refuse_empty_values(std::span<char* const> words) {
+    for (std::size_t i = 1; i < words.size(); ++i) {
+        const std::string_view word = words[i];
+        const bool is_assigned = word.starts_with("--") && word.ends_with("=");
+        if (!word.empty() && !is_assigned) continue;
+        const std::string_view option = is_assigned ? word.substr(0, word.size() - 1) : words[i - 1];
+        throw CLI::ValidationError(option.starts_with("-") ? std::string(option) + " has an empty value: give one, or "
+                                                                                   "leave the option out."
+                                                           : "a word is empty: leave it out.");
+    }
+}
+
 int run(int argc, char** argv, const Program& program, const FunctionRef<std::vector<Command>(CLI::App&)>& verbs) {
     CLI::App app(program.about, program.name);
     app.footer(program.examples);
@@ -143,6 +156,7 @@ int run(int argc, char** argv, const Program& program, const FunctionRef<std::ve
         const std::vector<Command> commands = verbs(app);
         if (argc > 1 && std::string_view(argv[1]) == "help")
             return help(app, program, std::span<char* const>(argv, static_cast<std::size_t>(argc)).subspan(2));
+        refuse_empty_values(std::span(argv, static_cast<std::size_t>(argc)));
         app.parse(argc, argv);
         return parse_only->count() > 0 ? exit_done : run(commands);
     } catch (const CLI::ParseError& error) {

@@ -33,7 +33,6 @@ Result<JsonReport> JsonReport::open(const std::string& name) {
     if (name.empty() || report.on_stdout_) return report;
     auto file = vdtree::AtomicFile::create(name);
     if (!file) return file.error();
-    vdtree::AtomicFile::remove_orphans(name);
     report.file_ = std::move(*file);
     return report;
 }
@@ -48,11 +47,15 @@ Result<void> JsonReport::publish() {
     return file_ ? file_->commit() : Result<void>();
 }
 
-void print_line(std::string_view text) { std::printf("%s\n", printable(text).c_str()); }
+void print_line(std::string_view text) {
+    constexpr std::size_t longest = 4000; // bytes
+    std::printf("%s\n", shortened(printable(text), longest).c_str());
+}
 
 void print_table(std::vector<std::vector<std::string>> rows) {
+    constexpr std::size_t widest_cell = 200; // bytes
     for (auto& row : rows)
-        for (std::string& cell : row) cell = printable(cell); // before it is measured
+        for (std::string& cell : row) cell = shortened(printable(cell), widest_cell); // before it is measured
     std::vector<std::size_t> widths;
     for (const auto& row : rows) {
         widths.resize(std::max(widths.size(), row.size()));

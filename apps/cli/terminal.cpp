@@ -11,7 +11,9 @@ namespace {
 std::string_view program = "unseen";
 
 void print_to_stderr(std::string_view kind, std::string_view text) {
-    const std::string line = std::string(program) + ": " + std::string(kind) + printable(text) + "\n";
+    constexpr std::size_t longest = 2000; // bytes of a sentence: files may have names of any length in them
+    const std::string line =
+        std::string(program) + ": " + std::string(kind) + shortened(printable(text), longest) + "\n";
     std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -57,6 +59,15 @@ std::string printable(std::string_view text) {
         text.remove_prefix(bytes > 0 ? bytes : 1);
     }
     return result;
+}
+
+std::string shortened(std::string text, std::size_t most_bytes) {
+    if (text.size() <= most_bytes) return text;
+    const auto is_inside = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xc0) == 0x80; };
+    std::size_t begin = most_bytes / 2, end = text.size() - (most_bytes - 3 - begin);
+    while (is_inside(begin)) --begin; // not in the middle of a letter
+    while (end < text.size() && is_inside(end)) ++end;
+    return text.replace(begin, end - begin, "...");
 }
 
 std::string duration(double milliseconds) {

@@ -20,6 +20,9 @@ void print_error(std::string_view text);   // "unseen: ..." on stderr, with a fu
 // UTF-8, become \xNN. All that this header and report.h print goes through it.
 std::string printable(std::string_view text);
 
+// At most so many bytes of a printable text: long ones lose their middle, for which "..." stands.
+std::string shortened(std::string text, std::size_t most_bytes);
+
 std::string duration(double milliseconds);   // "0.05 ms", "620 ms", "61.8 s", "2 min 5 s"
 std::string file_size(std::uintmax_t bytes); // "812 bytes", "1.2 MB"
 

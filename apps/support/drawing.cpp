@@ -309,7 +309,6 @@ Result<void> Drawing::write(const std::filesystem::path& file) {
     if (status != CAIRO_STATUS_SUCCESS) return failure(status, "'" + file.string() + "'");
     auto out = vdtree::AtomicFile::create(file);
     if (!out) return out.error();
-    vdtree::AtomicFile::remove_orphans(file);
     if (auto written = out->write(*svg_); !written) return written;
     return out->commit();
 }

@@ -51,6 +51,7 @@ Result<int> run(const CacheArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const session::TreeCache cache;
+    if (const auto sound = cache.check(); !sound) return sound.error();
     std::size_t removed = 0;
     if (a.clears) removed = cache.shrink(0).size();
     else if (!a.limit.empty()) removed = cache.shrink(*session::parse_size(a.limit)).size();

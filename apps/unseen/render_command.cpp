@@ -96,6 +96,7 @@ Result<int> run(RenderArguments& a) {
     if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
+    a.view.measures = a.what.needs_measurement();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
     const vdtree::View view = make_view(*session, a.view);

@@ -50,6 +50,7 @@ Result<int> run(const SimplifyArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     ViewOptions view = a.view;
+    view.measures = a.what.needs_measurement();
     // Other formats hold one mesh.
     if (view.as == session::LoadAs::automatic && !is_gltf(a.out)) view.as = session::LoadAs::model;
     auto session = open_session(a.model, view, a.display);
@@ -72,6 +73,8 @@ Result<int> run(const SimplifyArguments& a) {
         if (!result->stats.is_complete)
             return Error{ErrorCode::invalid_argument,
                          "No triangle is there yet when the time is over: allow more with --milliseconds."};
+        if (session->triangle_count() == 0)
+            return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no triangle."};
         return Error{ErrorCode::invalid_argument,
                      "No triangle is left, for the model is too small in this view or the budget too low: "
                      "move nearer or allow more triangles."};

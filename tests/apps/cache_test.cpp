@@ -333,6 +333,28 @@ TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptOfScenes) {
     EXPECT_TRUE(read_text(path("first.bin")) == read_text(path("second.bin")));
 }
 
+TEST_F(CacheTest, AnotherMeshsTreeUnderTheKeyIsRefused) {
+    write_ball("smaller.obj", 6, 9);
+    EXPECT_EQ(origin("smaller.obj"), "built");
+    EXPECT_EQ(origin("ball.obj"), "built");
+    fs::path of_ball, of_smaller;
+    for (const auto& tree : TreeCache().trees()) (tree.source == "ball.obj" ? of_ball : of_smaller) = tree.file;
+    fs::copy_file(of_smaller, of_ball, fs::copy_options::overwrite_existing);
+    EXPECT_EQ(origin("ball.obj"), "built");
+    EXPECT_EQ(origin("ball.obj"), "cache");
+}
+
+TEST_F(CacheTest, WrongSettingsAreSaid) {
+    ::setenv("UNSEEN_CACHE_SIZE", "abc", 1);
+    EXPECT_THAT(run({"simplify", "ball.obj", "-o", "o.ply"}).err,
+                HasSubstr("$UNSEEN_CACHE_SIZE is passed over: 'abc' is no size"));
+    write_text(path("file"), "");
+    ::setenv("UNSEEN_CACHE", path("file").c_str(), 1);
+    const Outcome listed = run({"cache"});
+    EXPECT_EQ(listed.status, 1);
+    EXPECT_THAT(listed.err, HasSubstr("file' is no folder: no trees are kept."));
+}
+
 TEST_F(CacheTest, AProgramChoosesTheFolderOrNone) {
     const auto load = [&](const CacheOptions& cache, session::Messages messages = {}) {
         return Scene::load(path("ball.obj"), {.cache = cache, .messages = std::move(messages)});

@@ -1,5 +1,6 @@
-// Builds and trees that are cut short: by a full disk, a kill, or somebody who truncates a tree that is mapped.
+// Builds and trees that are cut short: by a full disk, a kill, or somebody who truncates or overwrites a mapped tree.
 #include <csignal>
+#include <fstream>
 #include <vector>
 
 #include <unseen/vdtree/builder.h>
@@ -25,7 +26,7 @@ protected:
 };
 
 // Trees of 256 MiB and more are mapped.
-TEST_F(CutShortTest, ATreeCutShortWhileItIsDrawnIsAnError) {
+TEST_F(CutShortTest, ATreeCutShortOrOverwrittenWhileItIsDrawnIsAnError) {
     const auto tree = unseen::vdtree::build_tree(unseen::shapes::bumpy_sphere(4).view());
     ASSERT_TRUE(tree);
     constexpr std::size_t ballast = (std::size_t{256} << 20) / sizeof(float);
@@ -36,16 +37,24 @@ TEST_F(CutShortTest, ATreeCutShortWhileItIsDrawnIsAnError) {
     if (run({"render", "heavy.vdt", "--pixels", "1", "-o", "o.png"}).err.find("No OpenGL") != std::string::npos)
         GTEST_SKIP() << "no OpenGL";
     const fs::path log = folder().string() + ".log";
-    const pid_t process = start(
-        {"render", "heavy.vdt", "--pixels", "1", "--path", "orbit:0.01:1000000", "--csv", "frames.csv"}, log, log);
-    ASSERT_GT(process, 0);
-    const fs::path maps = "/proc/" + std::to_string(process) + "/maps";
-    for (int i = 0; i < 3000 && read_text(maps).find("heavy.vdt") == std::string::npos; ++i) usleep(10'000);
-    usleep(300'000); // the first frames
-    fs::resize_file(path("heavy.vdt"), 0);
-    EXPECT_EQ(wait_for(process), 1);
-    EXPECT_THAT(read_text(log), HasSubstr("heavy.vdt' was cut short while it was read: write it anew"));
-    EXPECT_THAT(files(), UnorderedElementsAre("heavy.vdt", "o.png"));
+    for (const bool is_overwritten : {true, false}) {
+        const pid_t process = start(
+            {"render", "heavy.vdt", "--pixels", "1", "--path", "orbit:0.01:1000000", "--csv", "frames.csv"}, log, log);
+        ASSERT_GT(process, 0);
+        const fs::path maps = "/proc/" + std::to_string(process) + "/maps";
+        for (int i = 0; i < 3000 && read_text(maps).find("heavy.vdt") == std::string::npos; ++i) usleep(10'000);
+        usleep(300'000); // the first frames
+        if (is_overwritten) {
+            std::fstream file(path("heavy.vdt"), std::ios::binary | std::ios::in | std::ios::out);
+            file << std::string(4096, 'Z');
+        } else {
+            fs::resize_file(path("heavy.vdt"), 0);
+        }
+        EXPECT_EQ(wait_for(process), 1);
+        EXPECT_THAT(read_text(log), HasSubstr("heavy.vdt' was cut short or changed while it was read: write it anew"));
+        EXPECT_THAT(files(), UnorderedElementsAre("heavy.vdt", "o.png"));
+        ASSERT_TRUE(unseen::vdtree::write_tree(path("heavy.vdt"), *heavy));
+    }
     for (const fs::path& file : {log, fs::path(log.string() + ".in")}) fs::remove(file);
 }
 

@@ -285,6 +285,11 @@ TEST_F(SceneTest, NamesNodesThatCannotBePlaced) {
     const auto by_content = session::Scene::load(path("s.glb"));
     ASSERT_TRUE(by_content);
     EXPECT_TRUE(by_content->is_of_file()) << "by default the content decides";
+    for (const char* scale : {"1e-300", "1e200"})
+        EXPECT_THAT(complaint(File(std::string(R"({"nodes": [{"mesh": 0}, {"mesh": 0, "name": "leaf", "scale": [)") +
+                                   scale + "," + scale + "," + scale + "]}]}")
+                                  .add(body())),
+                    HasSubstr("s.glb: node 1 'leaf' is too small, too large or too far away"));
     session::LoadOptions painted;
     painted.texture = "x.png";
     const auto refused = load(File(all_kinds).add(body()).glb(), LoadAs::automatic, painted);
@@ -299,6 +304,19 @@ TEST_F(SceneTest, ThousandsOfNodesAreQuicklyRead) {
     const auto scene = load(File("{\"nodes\": [" + nodes + "]}").add(shapes::cube(2)).glb());
     ASSERT_TRUE(scene) << scene.error().message;
     EXPECT_EQ(scene->objects.size(), 5000u);
+}
+
+TEST_F(SceneTest, NodesMultiplyAFileWithinBounds) {
+    const auto nodes = [](int count, const char* key, const char* others, double step) {
+        std::string text;
+        for (int i = 0; i < count; ++i)
+            text += (i ? "," : "") + std::string("{\"mesh\": 0, \"") + key + "\": [" + std::to_string(1 + step * i) +
+                    others + "]}";
+        return File("{\"nodes\": [" + text + "]}").add(shapes::icosphere(5));
+    };
+    EXPECT_THAT(complaint(nodes(20'000, "translation", ", 0, 0", 3)),
+                HasSubstr("s.glb: its 20,000 nodes multiply to far more than the file holds"));
+    EXPECT_THAT(complaint(nodes(60, "scale", ", 1, 1", 0.01)), HasSubstr("its nodes stretch meshes in so many ways"));
 }
 
 TEST_F(SceneTest, LooksLikeTheSameThingsAsOneModel) {
@@ -353,6 +371,18 @@ TEST_F(SceneTest, WritesWholeMeshesOnce) {
     ASSERT_TRUE(in && out);
     EXPECT_EQ(out->contents().nodes[2].mesh, 0) << "the stretch is the node's";
     EXPECT_EQ(out->contents().nodes[2].to_world, in->contents().nodes[2].to_world);
+}
+
+TEST_F(SceneTest, WritesEqualCutsOnce) {
+    write_text(
+        path("s.glb"),
+        File(R"({"nodes": [{"mesh": 0}, {"mesh": 0}, {"mesh": 0, "translation": [0, 0, -9]}]})").add(body()).glb());
+    ASSERT_EQ(run({"simplify", "s.glb", "-o", "cut.glb", "--pixels", "4", "--size", "256x256"}).status, 0);
+    const auto out = meshio::SceneFile::read(path("cut.glb"));
+    ASSERT_TRUE(out) << out.error().message;
+    ASSERT_EQ(out->contents().nodes.size(), 3u);
+    EXPECT_EQ(out->contents().nodes[1].mesh, out->contents().nodes[0].mesh);
+    EXPECT_NE(out->contents().nodes[2].mesh, out->contents().nodes[0].mesh) << "it is farther away";
 }
 
 TEST_F(SceneTest, MayBeEmpty) {

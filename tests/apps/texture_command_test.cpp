@@ -226,7 +226,7 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
         return complaint({"build", "square.obj", "-o", "x.vdt"});
     };
     EXPECT_THAT(complaint_about("missing.png"),
-                AllOf(HasSubstr("missing.png"), HasSubstr("no such image"), HasSubstr("--no-texture")));
+                AllOf(HasSubstr("missing.png"), HasSubstr("no such file"), HasSubstr("--no-texture")));
     write_text(path("empty.png"), "");
     EXPECT_THAT(complaint_about("empty.png"), HasSubstr("is empty"));
     write_text(path("text.png"), "hello");

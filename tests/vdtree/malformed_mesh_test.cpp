@@ -4,6 +4,7 @@
 #include <unseen/vdtree/tree_io.h>
 
 #include "compressed_glb.h"
+#include "gltf_data.h"
 #include "largest_allocation.h"
 #include "mesh_files.h"
 #include "mesh_readers.h"
@@ -558,6 +559,22 @@ TEST(MalformedMesh, GltfEmptyPrimitivesMayNotMultiplyEither) {
     json = replaced(json, R"("nodes":[0])", R"("nodes":[)" + list + "10000]");
     json = replaced(json, R"("primitives":[)", R"("primitives":[)" + primitives);
     EXPECT_THAT(error_of(mesh_files::glb(json, mesh_files::gltf_triangle_data()), "a.glb"), HasSubstr("multiply"));
+}
+
+TEST(MalformedMesh, GltfBuffersAreReadOnceAndNoFurtherThanNeeded) {
+    const support::TempFolder folder;
+    support::write_bytes(folder / "data.bin", mesh_files::gltf_triangle_data());
+    fs::resize_file(folder / "data.bin", std::uintmax_t{1} << 26);
+    nlohmann::json document = {{"buffers", nlohmann::json::array()}};
+    for (std::string name = "data.bin"; document["buffers"].size() < 24; name = "./" + name)
+        document["buffers"].push_back({{"byteLength", 42}, {"uri", name}});
+    const meshio::ReadOptions options;
+    const meshio::MeshSource source{"", "a.gltf", folder.path(), options};
+    largest_allocation = 0;
+    const meshio::gltf::Buffers buffers(source, document, std::nullopt);
+    EXPECT_LE(largest_allocation.load(), allowed_bytes);
+    EXPECT_EQ(buffers.external_bytes(), 42u);
+    for (std::size_t i = 0; i < buffers.count(); ++i) EXPECT_EQ(buffers[i], mesh_files::gltf_triangle_data());
 }
 
 TEST(MalformedMesh, GltfJsonMayNotHaveMillionsOfNodes) {

@@ -166,6 +166,9 @@ TEST(SceneFile, NamesWhatIsWrong) {
     EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 7, "name": "x"}]})"), HasSubstr("node 0 uses mesh 7"));
     EXPECT_THAT(complaint(R"({"nodes": [{"children": [9]}], "scenes": [{"nodes": [0]}]})"), HasSubstr("node 9"));
     EXPECT_THAT(complaint(R"({"nodes": [{"camera": 2, "name": "eye"}]})"), HasSubstr("node 0 'eye' uses camera 2"));
+    EXPECT_THAT(complaint(R"({"nodes": [{"camera": 0}], "cameras": [null]})"),
+                HasSubstr("node 0 uses camera 0, which is no object"));
+    EXPECT_EQ(complaint(R"({"nodes": [{"mesh": 0}], "images": [null], "cameras": [null]})"), "");
     EXPECT_THAT(complaint(R"({"nodes": [{"camera": 0}], "cameras": [{"type": "perspective"}]})"), HasSubstr("yfov"));
     EXPECT_THAT(complaint(R"({"nodes": [{"camera": 0}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 4}}]})"),

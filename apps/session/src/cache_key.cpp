@@ -1,5 +1,5 @@
-// Names of files are looked for in the text, without a parser: one that is found and does not matter only makes a tree
-// be built once more, so every name that might be meant counts.
+// Names of files are looked for in the text of a mesh, without a parser. One that only seems to be named makes a tree be
+// built once more, or an output be refused; so every name that might be meant counts.
 #include "cache_key.h"
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <set>
 #include <span>
 #include <string_view>
@@ -18,6 +17,7 @@
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/lit_folds.h>
+#include <unseen/vdtree/internal/input_file.h>
 
 namespace unseen::session {
 namespace {
@@ -50,17 +50,6 @@ private:
     XXH3_state_t state_;
 };
 
-std::optional<std::string> bytes_of(const fs::path& file) {
-    std::error_code failure;
-    if (!fs::is_regular_file(file, failure)) return std::nullopt;
-    const std::uintmax_t size = fs::file_size(file, failure);
-    if (failure) return std::nullopt;
-    std::string bytes(size, '\0');
-    std::ifstream in(file, std::ios::binary);
-    if (!in.read(bytes.data(), static_cast<std::streamsize>(size))) return std::nullopt;
-    return bytes;
-}
-
 // Names that a text may mean, relative to its file. Nothing where that is not clear.
 using Names = std::optional<std::set<std::string>>;
 
@@ -68,7 +57,7 @@ void add(Names& names, std::string_view name) {
     if (!names || name.empty()) return;
     std::string slashes(name);
     std::replace(slashes.begin(), slashes.end(), '\\', '/');
-    names->insert(std::move(slashes));
+    names->insert(fs::path(slashes).lexically_normal().string());
     if (names->size() > most_names) names.reset();
 }
 
@@ -107,6 +96,16 @@ std::string decode_percent(std::string_view uri) {
     return name;
 }
 
+// The text of a JSON string; nothing if it has other escapes than of slashes, as exporters write them.
+std::optional<std::string> unescaped(std::string_view text) {
+    std::string plain;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] == '\\' && (++i == text.size() || (text[i] != '/' && text[i] != '\\'))) return std::nullopt;
+        plain += text[i];
+    }
+    return plain;
+}
+
 // The uris of a glTF document, whether it stands alone or in a .glb file.
 void add_uris(std::string_view text, Names& names) {
     constexpr std::string_view key = "\"uri\"";
@@ -119,19 +118,44 @@ void add_uris(std::string_view text, Names& names) {
         const std::string_view uri = text.substr(begin + 1, end - begin - 1);
         at = end;
         if (uri.starts_with("data:")) continue;
-        if (uri.find('\\') != uri.npos) names.reset(); // escaped in some way
-        else add(names, decode_percent(uri));
+        if (const auto plain = unescaped(uri)) add(names, decode_percent(*plain));
+        else names.reset();
     }
 }
 
 // Readers look at nothing else than what lies beside the mesh or below.
-bool is_beside(const fs::path& name) {
-    return name.is_relative() && std::find(name.begin(), name.end(), "..") == name.end();
+std::optional<std::string> read_beside(const fs::path& mesh, const fs::path& name) {
+    if (!name.is_relative() || std::find(name.begin(), name.end(), "..") != name.end()) return std::nullopt;
+    auto bytes = read_regular_file(mesh.parent_path() / name);
+    return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
+}
+
+// All that a mesh's text names, relative to its folder: libraries, buffers, images.
+Names names_in(const fs::path& file, std::string_view mesh) {
+    Names names = std::set<std::string>();
+    add_after("mtllib", mesh, names);
+    add_uris(mesh, names);
+    if (!names) return names;
+    const std::set<std::string> of_mesh = *names;
+    for (const std::string& name : of_mesh) {
+        const auto library = read_beside(file, name);
+        if (!library || library->find("newmtl") == library->npos) continue;
+        Names images = std::set<std::string>();
+        for (const char* keyword : {"map_", "bump", "disp", "decal", "norm", "refl"})
+            add_after(keyword, *library, images);
+        if (!images) return images;
+        for (const std::string& image : *images) { // beside the library, or beside the mesh
+            add(names, image);
+            add(names, (fs::path(name).parent_path() / image).string());
+        }
+    }
+    return names;
 }
 
 } // namespace
 
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures) {
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
+                           bool conserves_light) {
     Hash hash;
     const auto add_all = [&](const auto& values) {
         hash.add({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0])});
@@ -141,6 +165,7 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
                                      std::endian::native == std::endian::little,
                                      prelit,
                                      measures,
+                                     conserves_light,
                                      dropped_triangles,
                                      static_cast<std::uint64_t>(mesh.texture.width),
                                      static_cast<std::uint64_t>(mesh.texture.height),
@@ -175,6 +200,7 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
     const std::uint32_t numbers[] = {revision,
                                      std::endian::native == std::endian::little,
                                      options.measures,
+                                     options.conserves_light,
                                      options.without_textures,
                                      options.prelit,
                                      options.drop.skins,
@@ -186,29 +212,35 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     hash.add(file.extension().string());
 
-    const auto mesh = bytes_of(file);
+    const auto mesh = read_regular_file(file);
     if (!mesh) return std::nullopt;
     hash.add(*mesh);
-    Names names = std::set<std::string>();
-    add_after("mtllib", *mesh, names);
-    add_uris(*mesh, names);
-    if (!names) return std::nullopt;
-    const std::set<std::string> of_mesh = *names;
-    for (const std::string& name : of_mesh) {
-        const auto library = is_beside(name) ? bytes_of(file.parent_path() / name) : std::nullopt;
-        if (library) add_after("map_", *library, names);
-    }
+    const Names names = names_in(file, *mesh);
     if (!names) return std::nullopt;
     for (const std::string& name : *names) {
-        const auto bytes = is_beside(name) ? bytes_of(file.parent_path() / name) : std::nullopt;
+        const auto bytes = read_beside(file, name);
         if (bytes) hash.add(name), hash.add(*bytes);
     }
     if (!options.texture.empty()) {
-        const auto texture = bytes_of(options.texture);
+        const auto texture = read_regular_file(options.texture);
         if (!texture) return std::nullopt;
         hash.add("texture"), hash.add(*texture);
     }
     return hash.digits();
+}
+
+std::vector<fs::path> files_named_by(const fs::path& mesh) {
+    const auto bytes = read_regular_file(mesh);
+    if (!bytes) return {};
+    const Names names = names_in(mesh, *bytes);
+    std::vector<fs::path> files;
+    if (names)
+        for (const std::string& name : *names) files.push_back(mesh.parent_path() / name);
+    else // it may be any file there
+        for (std::error_code failure;
+             const auto& entry : fs::directory_iterator(fs::absolute(mesh).parent_path(), failure))
+            files.push_back(entry.path());
+    return files;
 }
 
 } // namespace unseen::session

@@ -14,7 +14,8 @@ namespace unseen::session {
 std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
 
 // Of the tree of a mesh that was read, with its texture and document.
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures);
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
+                           bool conserves_light);
 
 // Of what a tree's folds change under lights, whichever these are. `key`: the tree's.
 std::string lights_key(const std::string& key);

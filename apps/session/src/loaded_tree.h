@@ -36,6 +36,10 @@ struct LoadedTree {
 // open_tree() where `may_map`, else load_tree().
 Result<LoadedTree> load(const std::filesystem::path& file, const LoadOptions& options, bool may_map);
 
+// A tree that was just built, measured or with its light conserved as the options say, unless it is too large for that.
+Result<vdtree::VertexTree> measured_as_asked(vdtree::VertexTree tree, const LoadOptions& options,
+                                             const Progress& progress);
+
 // Null where nothing is kept.
 std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, const std::string& key,
                                                       const std::filesystem::path& file,

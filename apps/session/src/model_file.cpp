@@ -44,12 +44,10 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     building.dropped_before = read->dropped_triangles;
     building.prelit = options.prelit;
     auto tree = vdtree::build_tree(read->mesh.view(), building);
-    if (!tree) return tree;
+    if (!tree) return Error{tree.error().code, file.string() + ": " + tree.error().message};
     if (const Message hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
-    const bool measures =
-        options.measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree);
-    return measures ? measured(*tree, 0, options.messages.progress) : std::move(tree);
+    return measured_as_asked(std::move(*tree), options, options.messages.progress);
 }
 
 // Of files in the cache, behind the source's name.
@@ -82,6 +80,8 @@ Result<LoadedTree> load_mesh(const fs::path& file, const LoadOptions& options) {
     const TreeCache cache(options.cache);
     std::optional<std::string> key;
     if (cache.is_on()) key = cache_key(file, options);
+    if (const auto sound = cache.check(); !sound && options.messages.warning)
+        options.messages.warning(sound.error().message);
     const auto with_place = [&](vdtree::VertexTree tree, TreeOrigin origin) {
         LoadedTree loaded{std::move(tree), origin};
         if (key) loaded.measurement = place_of_mesh(cache, *key, file, loaded.tree);
@@ -112,6 +112,13 @@ Result<LoadedTree> load_mesh(const fs::path& file, const LoadOptions& options) {
 
 Message kept_in(const TreeCache& cache) {
     return Message::of("kept in {} for the next time ({session::TreeCache})", {cache.folder().string()});
+}
+
+Result<vdtree::VertexTree> measured_as_asked(vdtree::VertexTree tree, const LoadOptions& options,
+                                             const Progress& progress) {
+    if (tree.interior_count() > most_measured || !perception::knows_texture(tree)) return tree;
+    if (options.measures) return measured(tree, 0, progress);
+    return options.conserves_light && tree.texture().empty() ? vdtree::conserve_light(tree) : std::move(tree);
 }
 
 std::string name_of(TreeOrigin origin) {

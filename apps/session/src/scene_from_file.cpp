@@ -11,6 +11,7 @@
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
@@ -32,6 +33,7 @@ constexpr double usual_ambient = 0.15; // relative luminance of white
 struct Part {
     std::size_t mesh = 0;
     glm::dmat3 stretch = glm::dmat3(1);
+    bool is_copy = false;                        // of a mesh that has another stretch, too
     bool folds = false;                          // shown by other nodes than those of the background, too
     std::optional<vdtree::VertexTree> tree = {}; // none: it has no triangles
     TreeOrigin origin = TreeOrigin::built;
@@ -51,8 +53,9 @@ Error in_file(const fs::path& file, const Error& error) {
 // Builds the trees of all parts: several at a time, for small ones leave cores idle.
 class Builder {
 public:
-    Builder(meshio::SceneFile& file, const fs::path& name, const LoadOptions& options, bool measures)
-        : file_(file), name_(name), options_(options), measures_(measures), cache_(options.cache) {}
+    Builder(meshio::SceneFile& file, const fs::path& name, const LoadOptions& options, bool is_lit)
+        : file_(file), name_(name), options_(options), is_lit_(is_lit), cache_(options.cache),
+          stretched_triangles_(file.contents().file_bytes, 1, std::uint64_t{1} << 19) {}
 
     Result<void> build(std::vector<Part>& parts) {
         const auto start = vdtree::Clock::now();
@@ -83,8 +86,10 @@ private:
         auto read = read_part(part);
         if (!read) return read.error();
         if (!*read) return {};
-        const bool measures = measures_ && part.folds;
-        const std::string key = mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, measures);
+        const bool is_measured = !is_lit_ && part.folds;
+        const std::string key =
+            mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, is_measured && options_.measures,
+                           is_measured && options_.conserves_light);
         if (cache_.is_on()) {
             auto kept = cache_.find(key);
             if (!kept) return kept.error();
@@ -100,8 +105,7 @@ private:
         building.prelit = options_.prelit;
         auto tree = vdtree::build_tree((*read)->mesh.view(), building);
         if (!tree) return in_file(name_, tree.error());
-        if (measures && tree->interior_count() <= most_measured && perception::knows_texture(*tree))
-            tree = measured(*tree);
+        if (is_measured) tree = measured_as_asked(std::move(*tree), options_, {});
         if (!tree) return in_file(name_, tree.error());
         const std::lock_guard lock(mutex_);
         ++built_;
@@ -122,6 +126,12 @@ private:
             ++empty_;
             return read;
         }
+        if (part.is_copy && !stretched_triangles_.spend((*read)->mesh.triangles.size()))
+            return Error{ErrorCode::unsupported,
+                         Message::of("{}: its nodes stretch meshes in so many ways, each of which needs a tree of its "
+                                     "own, that they multiply to far more than the file holds: scale evenly, or read "
+                                     "the file with {load.as = }model.",
+                                     {name_.string()})};
         if (const auto laid = lay_texture(name_, **read, options_); !laid) return laid.error();
         for (std::string& warning : (*read)->warnings) warnings_.push_back(std::move(warning));
         for (std::string& note : (*read)->notes) notes_.push_back(std::move(note));
@@ -149,6 +159,8 @@ private:
             warnings_.push_back(std::to_string(empty_) + (empty_ == 1 ? " mesh has" : " meshes have") +
                                 " no triangles and is not drawn.");
         tell_each(std::move(warnings_), name_, options_.messages.warning);
+        if (const auto sound = cache_.check(); !sound && options_.messages.warning)
+            options_.messages.warning(sound.error().message);
         tell_each(std::move(notes_), name_, options_.messages.note);
         if (built_ == 0 || !options_.messages.note) return;
         const Message becomes = !not_kept_.empty() ? Message("not kept for the next time: " + not_kept_)
@@ -161,8 +173,9 @@ private:
     meshio::SceneFile& file_;
     const fs::path& name_;
     const LoadOptions& options_;
-    bool measures_;
+    bool is_lit_;
     TreeCache cache_;
+    Budget stretched_triangles_;
     std::mutex mutex_;
     std::atomic<bool> is_over_{false};
     std::optional<Error> failure_;
@@ -242,6 +255,11 @@ Result<calibration::LightRig> lights_of(const meshio::SceneContents& contents, c
     return calibration::LightRig::of(std::move(lighting), file);
 }
 
+bool is_in_reach(const vdtree::Similarity& placement) {
+    constexpr double least = 1e-15, most = 1e15;
+    return placement.scale >= least && placement.scale <= most && glm::length(placement.translation) <= most;
+}
+
 bool is_turned(const vdtree::Similarity& placement) {
     constexpr double same_direction = 1e-6; // of a unit quaternion's vector: less than any light shows
     const glm::dquat& q = placement.rotation;
@@ -280,6 +298,12 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
                                      {name.string(), std::to_string(node.node), node.name})};
         factored->placement.scale *= options.unit_metres;
         factored->placement.translation *= options.unit_metres;
+        if (!is_in_reach(factored->placement))
+            return Error{ErrorCode::malformed_data,
+                         Message::of("{}: node {} '{}' is too small, too large or too far away for single floats "
+                                     "(beyond 1e-15 to 1e15 metres): correct its transform, or give "
+                                     "{load.unit_metres}.",
+                                     {name.string(), std::to_string(node.node), node.name})};
         turns = turns || is_turned(factored->placement);
         const auto mesh = static_cast<std::size_t>(node.mesh);
         std::vector<std::size_t>& same = of_mesh[mesh];
@@ -288,8 +312,8 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         });
         const std::size_t part = found != same.end() ? *found : parts.size();
         if (found == same.end()) {
+            parts.push_back({mesh, factored->stretch, !same.empty()});
             same.push_back(part);
-            parts.push_back({mesh, factored->stretch});
         }
         parts[part].folds = parts[part].folds || !node.is_background;
         placed.push_back({&node, factored->placement, part});
@@ -301,12 +325,18 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
 
     // The test by errors knows the trees' own light alone.
     const bool is_lit = !options.prelit && (!contents.lights.empty() || turns);
-    if (const auto built = Builder(file, name, options, options.measures && !is_lit).build(parts); !built)
-        return built.error();
+    if (const auto built = Builder(file, name, options, is_lit).build(parts); !built) return built.error();
     Scene scene;
+    // What an object takes in a session, with its cut, and what it adds to a file.
+    constexpr std::uint64_t bytes_per_object = 8192, bytes_per_leaf = 32;
+    Budget budget(contents.file_bytes, 256, std::uint64_t{2} << 30);
     for (const Placed& node : placed) {
         const Part& part = parts[node.part];
         if (!part.tree) continue;
+        if (!budget.spend(1, bytes_per_object + bytes_per_leaf * part.tree->leaf_count()))
+            return Error{ErrorCode::unsupported,
+                         name.string() + ": its " + grouped(placed.size()) +
+                             " nodes multiply to far more than the file holds; split the scene."};
         Object object{part.tree->share(), node.placement, node.node->name};
         object.texture_left_out = options.without_textures;
         object.origin = part.origin;

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <unseen/vdtree/internal/budget.h>
+
 #include "texture_atlas.h"
 #include "texture_image.h"
 
@@ -102,6 +104,10 @@ public:
             auto texture =
                 is_embedded ? decode_texture(*material.image_bytes, file, from_top_) : read_texture(file, from_top_);
             if (!texture) return Error{texture.error().code, with_advice(texture.error().message)};
+            if (!texels_.spend(texture->texels.size()))
+                return Error{ErrorCode::unsupported,
+                             with_advice(mesh_file_.string() + ": its images have more than 2^29 pixels in all; scale "
+                                                               "them down")};
             entry->second = std::move(*texture);
             entry->second.wrap_u = material.wrap_u;
             entry->second.wrap_v = material.wrap_v;
@@ -112,6 +118,7 @@ public:
 private:
     std::filesystem::path mesh_file_;
     bool from_top_;
+    Budget texels_{0, 0, std::uint64_t{1} << 29};
     std::map<std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
 };
 

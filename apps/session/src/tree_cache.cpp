@@ -2,12 +2,17 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdio>
 #include <cstdlib>
 #include <limits>
 #include <string_view>
 #include <system_error>
 
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -18,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t default_most_bytes = std::uint64_t{4} << 30;
 constexpr std::string_view ending = ".vdt";
-constexpr std::size_t key_digits = 32;
+constexpr std::size_t key_digits = 32, sum_digits = 16;
 constexpr std::size_t longest_source = 120; // bytes of a name; with the rest it is shorter than file systems allow
 
 std::string variable(const char* name) {
@@ -42,14 +47,26 @@ std::uint64_t most_bytes_of(const CacheOptions& options) {
     return set ? *set : default_most_bytes;
 }
 
-// Files are called KEY-SOURCE.vdt.
+// Files are called KEY-SUM-SOURCE.vdt. The sum is that of the file's header, in which all its checksums come together:
+// by it, a tree that lies under the key of another mesh is found out.
+std::string sum_of(const fs::path& file) {
+    constexpr std::size_t header_bytes = 48;
+    const auto header = read_regular_file(file, header_bytes);
+    char text[sum_digits + 1] = {};
+    if (header)
+        std::snprintf(text, sizeof text, "%016llx",
+                      static_cast<unsigned long long>(XXH3_64bits(header->data(), header->size())));
+    return text;
+}
+
 bool is_kept(const std::string& name) {
     return name.size() > key_digits + ending.size() && name[key_digits] == '-' && name.ends_with(ending) &&
            name.find_first_not_of("0123456789abcdef") == key_digits;
 }
 
 std::string source_of(const std::string& name) {
-    return name.substr(key_digits + 1, name.size() - key_digits - 1 - ending.size());
+    const std::string rest = name.substr(key_digits + 1, name.size() - key_digits - 1 - ending.size());
+    return rest.size() > sum_digits && rest[sum_digits] == '-' ? rest.substr(sum_digits + 1) : rest;
 }
 
 // The files' clock is not the system's in this version of the standard's library.
@@ -74,13 +91,28 @@ Result<std::uint64_t> parse_size(const std::string& text) {
     return number << shift;
 }
 
+Result<void> TreeCache::check() const {
+    std::error_code unknown;
+    if (is_on() && fs::exists(folder_, unknown) && !fs::is_directory(folder_, unknown))
+        return Error{ErrorCode::io_failure, "'" + folder_.string() +
+                                                "' is no folder: no trees are kept. Set $UNSEEN_CACHE "
+                                                "to the name of a folder."};
+    const std::string size = variable("UNSEEN_CACHE_SIZE");
+    if (size.empty() || parse_size(size)) return {};
+    return Error{ErrorCode::invalid_argument, "$UNSEEN_CACHE_SIZE is passed over: " + parse_size(size).error().message};
+}
+
 TreeCache::TreeCache(const CacheOptions& options) : folder_(folder_of(options)), most_bytes_(most_bytes_of(options)) {}
 
 Result<std::optional<vdtree::VertexTree>> TreeCache::find(const std::string& key, const Progress& progress) const {
     for (const CachedTree& kept : trees()) {
         if (!kept.file.filename().string().starts_with(key)) continue;
-        auto tree = vdtree::read_tree(kept.file, progress);
         std::error_code ignored;
+        if (kept.file.filename().string().substr(key_digits + 1, sum_digits) != sum_of(kept.file)) {
+            fs::remove(kept.file, ignored);
+            continue;
+        }
+        auto tree = vdtree::read_tree(kept.file, progress);
         if (tree) {
             fs::last_write_time(kept.file, fs::file_time_type::clock::now(), ignored);
             return std::optional(std::move(*tree));
@@ -99,10 +131,13 @@ Result<void> TreeCache::keep(const std::string& key, const fs::path& source, con
         return Error{ErrorCode::io_failure, "Cannot make '" + folder_.string() + "': " + failure.message() + "."};
     if (tree.byte_size() > most_bytes_)
         return unsupported("The tree is larger than the " + grouped(most_bytes_) + " bytes that are kept.");
-    const fs::path file =
-        folder_ / (key + "-" + source.filename().string().substr(0, longest_source) + std::string(ending));
+    const std::string name = source.filename().string().substr(0, longest_source) + std::string(ending);
+    const fs::path file = folder_ / (key + "-" + name);
     if (const auto ready = vdtree::prepare_tree_file(file); !ready) return ready;
     if (const auto written = vdtree::write_tree(file, tree); !written) return written;
+    fs::rename(file, folder_ / (key + "-" + sum_of(file) + "-" + name), failure);
+    if (failure)
+        return Error{ErrorCode::io_failure, "Cannot rename '" + file.string() + "': " + failure.message() + "."};
     shrink(most_bytes_);
     return {};
 }

@@ -126,11 +126,15 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
     const auto settings = tree.attribute<float>(settings_name);
     const auto textures = tree.attribute<FoldTexture>(texture_name);
     if (records.empty())
-        return Error{ErrorCode::invalid_argument,
-                     "The errors of the tree's folds have not been measured (perception::measure_folds)."};
+        return Error{
+            ErrorCode::invalid_argument,
+            Message::of(
+                "The errors of the tree's folds are not measured: measure them with {perception::measure_folds()}.")};
     if (!std::ranges::equal(settings, measurement::settings))
-        return Error{ErrorCode::unsupported, "The tree's folds were measured with other settings than this program "
-                                             "knows: measure them again (perception::measure_folds)."};
+        return Error{
+            ErrorCode::unsupported,
+            Message::of("The tree's folds were measured with other settings than this program knows: measure them "
+                        "again with {perception::measure_folds()}.")};
     const std::size_t nodes = tree.interior_count();
     if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
         textures.size() != (tree.texture().empty() ? 0 : nodes))

@@ -38,6 +38,8 @@ std::optional<std::string> decode_base64(std::string_view text) {
     return bytes;
 }
 
+bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
+
 // Of views that are compressed: stands for what they hold uncompressed, and may have no data.
 bool is_fallback(const json& buffer) {
     const json* extensions = member(buffer, "extensions");
@@ -68,15 +70,30 @@ std::string decode_percent(std::string_view text) {
 Buffers::Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin)
     : source_(source) {
     const json& array = array_of(document, "buffers");
-    for (std::size_t i = 0; i < array.size(); ++i) {
+    const auto size_of = [&](std::size_t i) {
         const std::string where = numbered("buffer", i);
         if (!array[i].is_object()) fail(where + " is no object; correct the JSON.");
         const json* length = member(array[i], "byteLength");
         if (length == nullptr) fail(where + " has no byteLength; correct the JSON.");
-        const auto size = static_cast<std::size_t>(to_integer_in_range(*length, max_size, where + ": byteLength"));
+        return static_cast<std::size_t>(to_integer_in_range(*length, max_size, where + ": byteLength"));
+    };
+    const auto uri_of = [&](std::size_t i) {
         const json* uri = member(array[i], "uri");
+        return uri != nullptr && uri->is_string() ? &uri->get_ref<const std::string&>() : nullptr;
+    };
+    for (std::size_t i = 0; i < array.size(); ++i) { // the same file in several spellings is read once
+        const std::size_t size = size_of(i);
+        if (const std::string* uri = uri_of(i); uri != nullptr && !is_data(*uri)) {
+            External& file = external_[place_of(*uri, numbered("buffer", i))];
+            file.wanted = std::max(file.wanted, size);
+        }
+    }
+    for (std::size_t i = 0; i < array.size(); ++i) {
+        const std::string where = numbered("buffer", i);
+        const std::size_t size = size_of(i);
+        const std::string* uri = uri_of(i);
         std::string_view bytes;
-        if (uri != nullptr && uri->is_string()) bytes = resolve(uri->get_ref<const std::string&>(), where);
+        if (uri != nullptr) bytes = resolve(*uri, where);
         else if (i == 0 && bin) bytes = *bin;
         else if (is_fallback(array[i])) {
             buffers_.emplace_back();
@@ -112,19 +129,32 @@ fs::path Buffers::below_folder(const std::string& uri, const std::string& where)
 }
 
 std::string_view Buffers::resolve(const std::string& uri, const std::string& where) {
-    const auto [found, is_new] = loaded_.try_emplace(uri);
-    if (!is_new) return found->second;
-    const bool is_data = uri.starts_with("data:");
-    found->second = is_data ? decode_data(uri, where) : read_beside(uri, where);
-    if (!is_data) external_bytes_ += found->second.size();
-    return found->second;
+    if (is_data(uri)) {
+        const auto [found, is_new] = decoded_.try_emplace(uri);
+        if (is_new) found->second = decode_data(uri, where);
+        return found->second;
+    }
+    External& file = external_[place_of(uri, where)];
+    if (!file.bytes) {
+        file.bytes = read_beside(uri, where, file.wanted);
+        external_bytes_ += file.bytes->size();
+        if (external_bytes_ > machine_memory())
+            fail("its buffers need more memory than this machine has; split the scene.");
+    }
+    return *file.bytes;
+}
+
+fs::path Buffers::place_of(const std::string& uri, const std::string& where) const {
+    std::error_code unknown;
+    const fs::path file = source_.folder / below_folder(uri, where), real = fs::weakly_canonical(file, unknown);
+    return unknown ? file : real;
 }
 
 // Only files in the mesh file's folder and below: a mesh must not be able to name any file of the machine.
-std::string Buffers::read_beside(const std::string& uri, const std::string& where) const {
+std::string Buffers::read_beside(const std::string& uri, const std::string& where, std::uint64_t most_bytes) const {
     const fs::path relative = below_folder(uri, where);
     if (source_.folder.empty()) fail(where + " lies in another file, which a mesh in memory cannot have.");
-    Result<std::string> bytes = read_whole_file(source_.folder / relative);
+    Result<std::string> bytes = read_regular_file(source_.folder / relative, most_bytes);
     if (!bytes) fail(where + ": " + bytes.error().message);
     return std::move(*bytes);
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,8 +29,9 @@ public:
     static std::string decode_data(std::string_view uri, const std::string& where); // "data:...;base64,..."
     static std::filesystem::path below_folder(const std::string& uri, const std::string& where);
 
-    // Beside the mesh file; fails where it cannot be read.
-    std::string read_beside(const std::string& uri, const std::string& where) const;
+    // The first bytes of a file beside the mesh file; fails if it cannot be read.
+    std::string read_beside(const std::string& uri, const std::string& where,
+                            std::uint64_t most_bytes = std::numeric_limits<std::uint64_t>::max()) const;
 
     // A buffer that no file has; its number.
     std::size_t add(std::string bytes);
@@ -39,10 +41,16 @@ public:
     std::uint64_t external_bytes() const { return external_bytes_; }
 
 private:
+    struct External {
+        std::size_t wanted = 0; // bytes
+        std::optional<std::string> bytes = {};
+    };
     std::string_view resolve(const std::string& uri, const std::string& where);
+    std::filesystem::path place_of(const std::string& uri, const std::string& where) const;
 
     const MeshSource& source_;
-    std::map<std::string, std::string> loaded_;
+    std::map<std::string, std::string> decoded_;         // by data URI
+    std::map<std::filesystem::path, External> external_; // by the file that a name leads to
     std::deque<std::string> added_;
     std::vector<std::string_view> buffers_;
     std::uint64_t external_bytes_ = 0;

@@ -327,7 +327,8 @@ tinygltf::Model to_model(const json& reduced) {
         error = exception.what();
     }
     while (!error.empty() && is_space(error.back())) error.pop_back();
-    if (!is_loaded) fail("it is no valid glTF: " + error + ".");
+    constexpr std::size_t longest = 200; // it may quote the file
+    if (!is_loaded) fail("it is no valid glTF: " + error.substr(0, longest) + (error.size() > longest ? "..." : "."));
     return model;
 }
 

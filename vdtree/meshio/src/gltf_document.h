@@ -24,6 +24,10 @@ struct Broken {
 };
 [[noreturn]] void fail(Message what);
 
+// What is said of a document in which the library of JSON does not find what glTF asks for.
+inline constexpr const char* wrong_type =
+    "its JSON lacks a value, or has one of another type than glTF asks for; correct it.";
+
 std::string numbered(const char* what, std::size_t index); // "buffer 3"
 
 struct Container {

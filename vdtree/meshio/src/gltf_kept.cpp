@@ -61,9 +61,12 @@ std::set<std::string> unknown_required(const json& document) {
 }
 
 std::string listed(const std::set<std::string>& names) {
+    constexpr std::size_t enough = 10;
     std::string list;
-    for (const std::string& name : names) list += (list.empty() ? "" : ", ") + in_quotes(name);
-    return list;
+    std::size_t count = 0;
+    for (const std::string& name : names)
+        if (count++ < enough) list += (list.empty() ? "" : ", ") + in_quotes(name);
+    return list + (count > enough ? " and " + std::to_string(count - enough) + " more" : "");
 }
 
 // Removes the extensions of an object, and of all within it, that are not kept.
@@ -169,7 +172,7 @@ json without_geometry(json document, std::vector<Message>& warnings) {
     for (const char* key : {"extensionsUsed", "extensionsRequired"}) keep_names(document, key);
     const auto change_each = [&](const char* key, auto&& change) {
         if (const auto found = document.find(key); found != document.end())
-            for (json& element : *found) element = change(std::move(element));
+            for (json& element : *found) element = element.is_object() ? change(std::move(element)) : json::object();
     };
     change_each("meshes", kept_mesh);
     change_each("images", kept_image);

@@ -44,8 +44,8 @@ Result<void> guarded_writing(Write&& write) {
         return write();
     } catch (const gltf::Broken& broken) {
         return damaged(broken.what);
-    } catch (const nlohmann::json::exception& error) {
-        return damaged(std::string("its JSON is wrong: ") + error.what() + ".");
+    } catch (const nlohmann::json::exception&) {
+        return damaged(gltf::wrong_type);
     } catch (const std::out_of_range&) {
         return damaged("texture coordinates are missing.");
     }

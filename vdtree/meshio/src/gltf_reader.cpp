@@ -113,9 +113,13 @@ private:
         return file;
     }
 
+    // Images with the same bytes are one.
     std::shared_ptr<const std::string> kept(std::string bytes) {
+        if (const auto same = known_.find(bytes); same != known_.end()) return same->second;
         spend_(bytes.size());
-        return std::make_shared<const std::string>(std::move(bytes));
+        auto image = std::make_shared<const std::string>(std::move(bytes));
+        known_.emplace(*image, image);
+        return image;
     }
 
     const json& images_;
@@ -123,6 +127,7 @@ private:
     const Buffers& buffers_;
     Callback<void(std::uint64_t)> spend_;
     std::vector<std::optional<SourceDocument::File>> files_;
+    std::map<std::string_view, std::shared_ptr<const std::string>> known_;
 };
 
 // ---- materials ----
@@ -176,10 +181,10 @@ private:
         const json* value = member(in, of);
         if (value == nullptr) fail(where_ + " has no " + of + "; correct the JSON.");
         const auto index = static_cast<std::size_t>(to_integer_in_range(*value, max_int, where_ + ": " + of));
-        if (index >= array.size() || !array[index].is_object()) {
+        if (index >= array.size())
             fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " +
                  std::to_string(array.size()) + " " + key + "; correct the JSON.");
-        }
+        if (!array[index].is_object()) fail(where_ + ": its " + of + " is no object; correct the JSON.");
         where_ = numbered(key, index);
         return array[index];
     }
@@ -269,8 +274,7 @@ class SceneReader {
 public:
     SceneReader(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
         : source_(source), whole_(document), model_(model), accessors_(model, buffers),
-          bytes_left_(
-              std::max(min_bytes_out, max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
+          budget_(source.bytes.size() + buffers.external_bytes(), max_bytes_out_per_byte_in, min_bytes_out) {
         for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
         const json::json_pointer texture("/pbrMetallicRoughness/baseColorTexture");
         for (const json& material : array_of(document, "materials")) {
@@ -317,10 +321,8 @@ public:
     }
 
     void spend(std::uint64_t count, std::uint64_t bytes_each) {
-        if (bytes_each > 0 && count > bytes_left_ / bytes_each) {
+        if (!budget_.spend(count, bytes_each))
             fail("its instances and shared data multiply to far more than the file holds; split the scene.");
-        }
-        bytes_left_ -= count * bytes_each;
     }
 
 private:
@@ -550,7 +552,7 @@ private:
     std::vector<bool> is_textured_;                              // by material
     std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
     SourceDocument document_;
-    std::uint64_t bytes_left_;
+    Budget budget_;
     std::uint64_t skipped_primitives_ = 0, primitives_without_uvs_ = 0;
 };
 
@@ -617,8 +619,8 @@ Result<ReadResult> read_gltf(const MeshSource& source) {
         return gltf::read_document(source);
     } catch (const gltf::Broken& broken) {
         return malformed(source, broken.what);
-    } catch (const nlohmann::json::exception& error) {
-        return malformed(source, std::string("its JSON cannot be used: ") + error.what() + ".");
+    } catch (const nlohmann::json::exception&) {
+        return malformed(source, gltf::wrong_type);
     }
 }
 

@@ -148,9 +148,11 @@ private:
     // The element of an array that a node names.
     const json& element(const json& array, const json& index, const char* what, const std::string& where) const {
         const auto i = static_cast<std::size_t>(gltf::to_integer_in_range(index, gltf::max_int, where + ": " + what));
-        if (i >= array.size() || !array[i].is_object())
+        if (i >= array.size())
             fail(where + " uses " + numbered(what, i) + ", but there are " + std::to_string(array.size()) +
                  "; correct the JSON.");
+        if (!array[i].is_object())
+            fail(where + " uses " + numbered(what, i) + ", which is no object; correct the JSON.");
         return array[i];
     }
 
@@ -285,8 +287,8 @@ Result<Value> guarded(const MeshSource& source, Do&& run) {
         return run();
     } catch (const gltf::Broken& broken) {
         return malformed(source, broken.what);
-    } catch (const json::exception& error) {
-        return malformed(source, std::string("its JSON cannot be used: ") + error.what() + ".");
+    } catch (const json::exception&) {
+        return malformed(source, gltf::wrong_type);
     } catch (const std::bad_alloc&) {
         return out_of_memory(source.name);
     } catch (const std::length_error&) {
@@ -326,6 +328,7 @@ struct SceneFile::Impl {
         auto read = Contents(source, document, reduced.model).read();
         if (!read) return cancelled(source);
         contents = std::move(*read);
+        contents.file_bytes = source.bytes.size() + buffers->external_bytes();
         meshes.emplace(source, document, reduced.model, *buffers);
         contents.source.files = meshes->files(warnings);
         kept = gltf::without_geometry(document, warnings);
@@ -342,7 +345,7 @@ SceneFile::~SceneFile() = default;
 const SceneContents& SceneFile::contents() const noexcept { return impl_->contents; }
 
 Result<SceneFile> SceneFile::read(const fs::path& file, const ReadOptions& options) {
-    Result<std::string> bytes = read_whole_file(file);
+    Result<std::string> bytes = read_regular_file(file);
     if (!bytes) return bytes.error();
     return from_bytes(std::move(*bytes), file, options, file.has_parent_path() ? file.parent_path() : fs::path("."));
 }

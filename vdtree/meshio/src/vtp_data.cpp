@@ -87,10 +87,9 @@ std::uint64_t VtpDecoder::header(Stream& stream) const {
 }
 
 void VtpDecoder::spend(std::uint64_t bytes) {
-    if (bytes > bytes_left_)
+    if (!budget_.spend(bytes))
         throw VtkFault{"with it the arrays become far more than the file holds; save the file without compression.",
                        ErrorCode::unsupported};
-    bytes_left_ -= bytes;
 }
 
 std::vector<std::byte> VtpDecoder::decode(std::string_view data, bool is_base64, std::uint64_t bytes) {

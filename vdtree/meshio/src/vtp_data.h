@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include <unseen/vdtree/internal/budget.h>
+
 namespace unseen::meshio {
 
 // What the file's first element says.
@@ -21,8 +23,7 @@ class VtpDecoder {
 public:
     // All arrays of a file together may become so many bytes: an array's bytes may be compressed, and may be meant by
     // any number of arrays.
-    VtpDecoder(VtpEncoding encoding, std::uint64_t most_bytes)
-        : encoding_(std::move(encoding)), bytes_left_(most_bytes) {}
+    VtpDecoder(VtpEncoding encoding, Budget budget) : encoding_(std::move(encoding)), budget_(budget) {}
 
     // `data` begins with an array, and may go on behind it. In the order of the file. Throws VtkFault where it does not
     // hold exactly so many bytes; nothing is allocated that it cannot hold.
@@ -37,7 +38,7 @@ private:
     void spend(std::uint64_t bytes);
 
     VtpEncoding encoding_;
-    std::uint64_t bytes_left_;
+    Budget budget_;
 };
 
 } // namespace unseen::meshio

@@ -36,7 +36,7 @@ public:
         const pugi::xml_node file = document_.child("VTKFile");
         if (!file) throw VtkFault{"it has no element VTKFile; it is no file of VTK."};
         check_type(file);
-        decoder_.emplace(encoding_of(file), std::max(always_allowed_bytes, most_bytes_a_byte * source_.bytes.size()));
+        decoder_.emplace(encoding_of(file), Budget(source_.bytes.size(), most_bytes_a_byte, always_allowed_bytes));
         int pieces = 0;
         for (const pugi::xml_node piece : file.child("PolyData").children("Piece")) read_piece(piece, pieces++);
         return polygons_.finish();

@@ -78,7 +78,7 @@ Result<void> write_beside(const fs::path& file, const SourceDocument& document, 
             missing.emplace(target, beside.bytes.get());
             continue;
         }
-        const auto there = read_whole_file(target);
+        const auto there = read_regular_file(target);
         if (!there) return there.error();
         if (*there != *beside.bytes)
             return failed_to_write(target, "another file of that name is there; write the mesh to another folder.");
@@ -384,17 +384,19 @@ private:
             ++empty_;
             return {};
         }
-        // Trees that differ by a stretch alone are the same mesh where nothing is folded.
-        const auto known = is_whole(*cut.cut) ? whole_.find(cut.mesh) : whole_.end();
-        std::size_t number = 0;
-        if (known != whole_.end()) {
-            number = known->second;
-        } else {
-            const auto made = mesh_of(cut);
+        ExtractedMesh extracted = extract_with_sources(*cut.cut);
+        // The same vertices of one tree are one mesh. Trees that differ by a stretch alone are the same mesh if nothing
+        // is folded.
+        const bool is_all = is_whole(*cut.cut);
+        Look look{cut.mesh, is_all ? nullptr : cut.cut->tree().positions().data(), {}};
+        if (!is_all) look.vertices = extracted.nodes;
+        auto known = written_as_.find(look);
+        if (known == written_as_.end()) {
+            const auto made = mesh_of(cut, std::move(extracted));
             if (!made) return made.error();
-            number = *made;
-            if (is_whole(*cut.cut)) whole_.emplace(cut.mesh, number);
+            known = written_as_.emplace(std::move(look), *made).first;
         }
+        const std::size_t number = known->second;
         if (cut.node >= 0) {
             out_["nodes"].at(static_cast<std::size_t>(cut.node))["mesh"] = number;
             return {};
@@ -405,11 +407,19 @@ private:
         return {};
     }
 
-    Result<std::size_t> mesh_of(const SceneCut& cut) {
+    // What a mesh of the output is of.
+    struct Look {
+        std::int32_t mesh;
+        const void* tree;
+        std::vector<NodeId> vertices;
+        auto operator<=>(const Look&) const = default;
+    };
+
+    Result<std::size_t> mesh_of(const SceneCut& cut, ExtractedMesh extracted) {
         const auto document = unpack(cut.cut->tree().document());
         if (!document) return document.error();
         if (document->format != SourceDocument::Format::gltf) gltf::fail("it is of another format.");
-        auto restored = restore(*cut.cut, extract_with_sources(*cut.cut), *document, drawn_uvs(*document));
+        auto restored = restore(*cut.cut, extracted, *document, drawn_uvs(*document));
         if (!restored) return restored.error();
         parts_.push_back(std::move(*restored));
         std::sort(parts_.back().begin(), parts_.back().end(), [&](const RestoredPart& a, const RestoredPart& b) {
@@ -432,7 +442,7 @@ private:
     GltfFile file_;
     std::deque<std::vector<RestoredPart>> parts_; // which the file refers to
     json out_, meshes_, written_ = json::array();
-    std::map<std::int32_t, std::size_t> whole_; // by mesh of the document
+    std::map<Look, std::size_t> written_as_;
     std::size_t empty_ = 0;
 };
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/session/messages.h>
@@ -27,7 +28,8 @@ struct LoadOptions {
     // Of a mesh: measure what folds change, too (see measured()), where its tree has at most two million folds
     // and `error` knows its texture (perception::knows_texture()).
     bool measures = true;
-    CacheOptions cache = {}; // where trees of meshes, and measurements, are kept for the next time
+    bool conserves_light = false; // the same light as a measured tree, where nothing is measured
+    CacheOptions cache = {};      // where trees of meshes, and measurements, are kept for the next time
     Messages messages = {};
 };
 
@@ -36,6 +38,9 @@ struct LoadOptions {
 // and notes are messages. Of `reading`, only the colours are not taken from the options.
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
                                               meshio::ReadOptions reading = {});
+
+// The files that a mesh's file names: libraries of materials, buffers, images. Also some that it only seems to name.
+std::vector<std::filesystem::path> files_named_by(const std::filesystem::path& mesh);
 
 // Where a tree comes from: made by the program, a tree file, just built, or built before and kept (TreeCache).
 enum class TreeOrigin { given, file, built, cache };

@@ -42,8 +42,11 @@ public:
     const std::filesystem::path& folder() const noexcept { return folder_; }
     std::uint64_t most_bytes() const noexcept { return most_bytes_; }
 
-    // The tree under a key, read and checked to the last byte; it counts as used now. Nothing where there is none; a
-    // damaged file is removed. Fails only where `progress` cancels.
+    // Fails if $UNSEEN_CACHE_SIZE is no size, or if the folder is a file.
+    Result<void> check() const;
+
+    // The tree under a key, read and checked to the last byte; it counts as used now. Nothing if there is none. A file
+    // that is damaged, or whose tree was kept under another key, is removed. Fails only if `progress` cancels.
     Result<std::optional<vdtree::VertexTree>> find(const std::string& key, const Progress& progress = {}) const;
 
     // Keeps a tree, and removes those not used for longest where there are more than most_bytes(). Fails where the

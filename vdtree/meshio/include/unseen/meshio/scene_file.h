@@ -68,6 +68,7 @@ struct SceneContents {
     std::optional<double> ambient; // relative luminance of white without lights, 0..1
     // Cameras, lights, a mark of what is background, or a mesh under several nodes: more than one model.
     bool is_scene = false;
+    std::uint64_t file_bytes = 0; // with its buffers
     SceneSource source;
     std::vector<Message> warnings, notes; // one sentence each
 };
