@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::vector<std::string> checked_outputs; // of this run
+std::vector<std::string> checked_inputs, checked_outputs; // of this run
 
 // Parents first. A signal's handler may read them at any time; folders beyond these are left.
 std::array<fs::path, 64> made_folders;
@@ -87,7 +87,18 @@ std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& 
     return {model, view.lights, view.texture.file, display.file, display.observer, display.csf};
 }
 
+Message with_file_name(const Error& error) {
+    const auto is_named = [&](const std::string& input) {
+        return is_file(input) && error.message.find(fs::path(input).filename().string()) != std::string::npos;
+    };
+    if (error.code != ErrorCode::malformed_data || checked_inputs.empty() ||
+        std::any_of(checked_inputs.begin(), checked_inputs.end(), is_named))
+        return error.message;
+    return checked_inputs.front() + ": " + error.message;
+}
+
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
+    checked_inputs = inputs;
     for (auto output = outputs.begin(); output != outputs.end(); ++output) {
         if (std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) {
                 return is_same(input, *output) || is_read_by(input, *output);

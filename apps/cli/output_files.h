@@ -18,6 +18,9 @@ namespace unseen::app {
 // are made, and what a killed writer has left in them is removed.
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
+// A sentence about what a file holds, with the first input's name if it names none.
+Message with_file_name(const Error& error);
+
 // One of them, to be written and committed later; nothing if the name is empty.
 Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file);
 

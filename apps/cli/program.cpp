@@ -126,7 +126,7 @@ int run(const std::vector<Command>& commands) {
         const auto status = command.run();
         end_if_interrupted();
         if (status) return finish(*status);
-        print_error(with_option_names(status.error().message));
+        print_error(with_option_names(with_file_name(status.error())));
         return exit_failed;
     }
     return exit_usage; // the parser insists on a verb

@@ -109,5 +109,16 @@ TEST_F(HostileFilesTest, CleanUpAfterAWriterThatWasKilled) {
     EXPECT_FALSE(fs::exists(path("f/.unseen-0123456789ab.tmp")));
 }
 
+TEST_F(HostileFilesTest, LeaveNoEmptyFolderBehind) {
+    build_ball();
+    const fs::path log = folder().string() + ".log";
+    const pid_t process = start({"study", "make", "ball.vdt", "-o", "study"}, log, log);
+    for (int i = 0; i < 1000 && !fs::exists(path("study")); ++i) usleep(1'000);
+    kill(process, SIGTERM);
+    EXPECT_THAT(wait_for(process), ::testing::AnyOf(-SIGTERM, 1)); // 1: there is no OpenGL
+    for (const fs::path& file : {log, fs::path(log.string() + ".in")}) fs::remove(file);
+    EXPECT_FALSE(fs::exists(path("study")));
+}
+
 } // namespace
 } // namespace unseen::app::testing
