@@ -55,6 +55,7 @@ public:
                           : options_.kind == SceneKind::treasure ? treasure()
                           : options_.kind == SceneKind::house    ? house()
                           : options_.kind == SceneKind::forest   ? forest()
+                          : options_.kind == SceneKind::building ? building()
                           : options_.kind == SceneKind::spheres  ? spheres()
                           : options_.kind == SceneKind::bunnies  ? bunnies()
                                                                  : models();
@@ -328,6 +329,62 @@ private:
         draft_.add_sun({0.4, 0.8, 0.5}, sun_lux, true);
         draft_.set_light(0.8, 0.2);
         draft_.set_camera({0, 1.7, 9}, {0, 1.8, -20}, 50);
+        return {};
+    }
+
+    // Fifty rooms in five rows of ten, with a door in each wall between two of them. One walks through the middle row,
+    // where the doors are in line; those between rows are each somewhere else in their wall.
+    Result<void> building() {
+        constexpr int rows = 5, columns = 10, things = 8;
+        constexpr double side = 5, thick = 0.2, high = 3, door = 1, door_high = 2.1, pier = (side - door) / 2;
+        const std::uint64_t each = std::max<std::uint64_t>(triangles(5'000'000) / (rows * columns * things), 200);
+        auto kinds = statues(each);
+        if (!kinds) return kinds.error();
+        kinds->push_back(draft_.add_mesh("sphere", sphere(each), 0.6));
+        kinds->push_back(draft_.add_mesh("column", column(each), 0.7));
+        kinds->push_back(draft_.add_mesh("ring", ring(each), 0.75));
+        const std::size_t table = draft_.add_mesh("table", box({0.8, 0.7, 0.8}, 0.1), 0.45);
+        const std::size_t whole = draft_.add_mesh("wall", box({side, high, thick}, 0.25), 0.6);
+        const std::size_t half = draft_.add_mesh("pier", box({pier, high, thick}, 0.25), 0.6);
+        const std::size_t lintel = draft_.add_mesh("lintel", box({door, high - door_high, thick}, 0.25), 0.6);
+        // `middle`: of the wall's foot; `aside`: of the door, from there.
+        const auto wall_at = [&](glm::dvec3 middle, double turn_degrees, bool has_door, double aside) {
+            if (!has_door) return draft_.add(whole, "wall", {.at = middle, .turn_degrees = turn_degrees}, true);
+            const glm::dvec3 along = turn_degrees == 0 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 0, 1);
+            for (const int end : {-1, 1}) // each as wide as the door leaves
+                draft_.add(half, "pier",
+                           {.at = middle + along * (aside / 2 + end * (pier + door) / 2),
+                            .turn_degrees = turn_degrees,
+                            .scale = {1 + end * -aside / pier, 1, 1}},
+                           true);
+            draft_.add(lintel, "lintel",
+                       {.at = middle + along * aside + glm::dvec3(0, door_high, 0), .turn_degrees = turn_degrees},
+                       true);
+        };
+        for (int row = 0; row < rows; ++row)
+            for (int column = 0; column < columns; ++column) {
+                const glm::dvec3 foot((row - rows / 2) * side, 0, -column * side);
+                wall_at(foot + glm::dvec3(0, 0, side / 2), 0, column > 0, 0);
+                wall_at(foot - glm::dvec3(side / 2, 0, 0), 90, row > 0, chance_.next(-1.2, 1.2));
+                if (column + 1 == columns) wall_at(foot - glm::dvec3(0, 0, side / 2), 0, false, 0);
+                if (row + 1 == rows) wall_at(foot + glm::dvec3(side / 2, 0, 0), 90, false, 0);
+                for (int i = 0; i < things; ++i) { // beside the way between doors, half of them on tables
+                    const glm::dvec3 at = foot + glm::dvec3((i % 2 == 0 ? -1 : 1) * chance_.next(1.0, 1.9), 0,
+                                                            (i / 2 - 1.5) * 1.1 + chance_.next(-0.2, 0.2));
+                    if (i % 3 == 0) draft_.add(table, "table", {.at = at}, true);
+                    draft_.add((*kinds)[static_cast<std::size_t>(row + column + i) % kinds->size()],
+                               "thing " + std::to_string((row * columns + column) * things + i),
+                               {.at = at + glm::dvec3(0, i % 3 == 0 ? 0.7 : 0, 0),
+                                .turn_degrees = chance_.next(0, 360),
+                                .scale = glm::dvec3(chance_.next(0.7, 1.1))});
+                }
+            }
+        const glm::dvec3 middle(0, 0, -side * (columns - 1) / 2);
+        wall("floor", {rows * side, 0.2, columns * side}, middle - glm::dvec3(0, 0.2, 0));
+        wall("ceiling", {rows * side, 0.2, columns * side}, middle + glm::dvec3(0, high, 0));
+        draft_.add_sun({0.3, 0.8, 0.5}, 0.6);
+        draft_.set_light(0.8, 0.3);
+        draft_.set_camera({0, 1.6, side / 2 - 0.5}, {0, 1.4, -side}, 60);
         return {};
     }
 

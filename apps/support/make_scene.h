@@ -16,6 +16,7 @@ enum class SceneKind {
     treasure, // a chamber with many statues, urns and rings
     house,    // a front with columns, statues and balcony bars, trees before it
     forest,   // statues among trees of thousands of leaves
+    building, // fifty furnished rooms with doors between them
     // After those of Arlebrink and Linde (2018), forty objects each:
     spheres, // spheres alone, close to each other
     bunnies, // two of the statues, far from each other: bunnies and dragons where these are given

@@ -50,6 +50,7 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
                 a->options.kind = kind == "museum"     ? SceneKind::museum
                                   : kind == "treasure" ? SceneKind::treasure
                                   : kind == "house"    ? SceneKind::house
+                                  : kind == "building" ? SceneKind::building
                                   : kind == "spheres"  ? SceneKind::spheres
                                   : kind == "bunnies"  ? SceneKind::bunnies
                                   : kind == "models"   ? SceneKind::models
@@ -57,17 +58,19 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
             },
             "museum: a statue behind a gate, in the sun through a window with bars; treasure: a chamber of statues; "
             "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
-            "trees; spheres, bunnies (two of the statues) and models (all of them): forty objects on a plain, to "
+            "trees; building: fifty furnished rooms with doors between them; spheres, bunnies (two of the statues) and "
+            "models (all of them): forty objects on a plain, to "
             "select "
             "levels of detail in")
         ->required()
-        ->type_name("museum|treasure|house|forest|spheres|bunnies|models")
-        ->check(one_of({"museum", "treasure", "house", "forest", "spheres", "bunnies", "models"}));
+        ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models")
+        ->check(one_of({"museum", "treasure", "house", "forest", "building", "spheres", "bunnies", "models"}));
     make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
-    add_triangles_option(*make, a->triangles,
-                         "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
-                         "(default: museum 0.3, house 1.5, treasure and forest 2, spheres 1.1, bunnies and models 2.8 "
-                         "million); a forest has 0.3 million at least")
+    add_triangles_option(
+        *make, a->triangles,
+        "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+        "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
+        "million); a forest has 0.3 million at least")
         ->type_name("N");
     make->add_option("--mesh", a->statues,
                      "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "
