@@ -1,4 +1,4 @@
-// How old what a frame goes by may be: where the viewer looked, and what a picture of depth showed.
+// How old the gaze that a frame goes by may be.
 #include "accuracy_axes.h"
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 
 #include "bench_tools.h"
 #include "terminal.h"
-#include "tree_walk.h"
 
 namespace unseen::app {
 
@@ -57,32 +56,6 @@ Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyB
         if (auto ok = add(name, gaze_at(degrees, 0), false); !ok) return ok.error();
         if (auto ok = add(name + ", margin of " + shortest(degrees) + " deg", gaze_at(degrees, degrees), false); !ok)
             return ok.error();
-    }
-    return points;
-}
-
-Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    constexpr int frames = 16;
-    auto judge = session::PictureJudge::create(subject.context, subject.session, view_on_walk(subject.view, frames),
-                                               options.samples);
-    if (!judge) return judge.error();
-    AccuracyPoints points;
-    double without = 0;
-    for (const int served : {0, 1, 2, 4, 8}) { // frames; 0: no pictures
-        TreeWalkOptions how;
-        how.frames = frames;
-        how.first_counted = 3;
-        how.judge = &*judge;
-        if (served > 0) how.occlusion = session::MovingOcclusionOptions{.frames = served};
-        const auto walk = walk_tree(subject.session, subject.context, judge->renderer(), subject.view, how);
-        if (!walk) return walk.error();
-        if (served == 0) without = std::max(walk->triangles, 1.0);
-        points.push_back(
-            {.name = served == 0 ? "no pictures"
-                                 : "serves " + std::to_string(served) + (served == 1 ? " frame" : " frames"),
-             .values = {walk->triangles / without, walk->verdict->v, static_cast<double>(walk->verdict->visible),
-                        static_cast<double>(walk->pictures) / (how.frames + 1)},
-             .is_default = served == session::MovingOcclusionOptions().frames});
     }
     return points;
 }

@@ -46,7 +46,6 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
 
 // accuracy_age.cpp
 Result<AccuracyPoints> gaze_age_points(AccuracySubject& subject, const AccuracyBenchOptions& options);
-Result<AccuracyPoints> depth_age_points(AccuracySubject& subject, const AccuracyBenchOptions& options);
 
 // accuracy_measurement.cpp
 Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const AccuracyBenchOptions& options);

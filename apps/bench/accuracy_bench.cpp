@@ -112,14 +112,7 @@ const std::vector<AxisMeasure>& all_axes() {
           "costs. The gaze moves at 30 degrees a second; frames are 1/60 s.",
           {"triangles, of those without a gaze", "V, for the gaze as it is by now", "pixels visible"}},
          Of::all,
-         gaze_age_points},
-        {{"depth",
-          "age of a picture of depth",
-          "How long one picture of depth serves a moving eye, what it may not hide for that, and whether what it hides "
-          "shows at the end of a walk.",
-          {"triangles kept, of those without occlusion", "V", "pixels visible", "pictures a frame"}},
-         Of::scenes,
-         depth_age_points}};
+         gaze_age_points}};
     return axes;
 }
 

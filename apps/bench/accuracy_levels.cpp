@@ -3,15 +3,28 @@
 
 #include <algorithm>
 
+#include <glm/geometric.hpp>
+
 #include <unseen/session_gpu/level_control.h>
 #include <unseen/session_gpu/picture_judge.h>
 
 #include "bench_tools.h"
 #include "level_cuts.h"
 #include "terminal.h"
-#include "tree_walk.h"
 
 namespace unseen::app {
+namespace {
+
+// Towards the target at walking speed, at 60 frames a second. Frame 0 is the first view.
+vdtree::View view_on_walk(const vdtree::View& first, int frame) {
+    const glm::dvec3 way = frame * (1.5 / 60) * glm::normalize(first.target - first.eye);
+    vdtree::View view = first;
+    view.eye += way;
+    view.target += way;
+    return view;
+}
+
+} // namespace
 
 Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     using session::LevelControlOptions;

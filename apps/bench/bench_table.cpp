@@ -11,22 +11,13 @@ bool holds(const BenchRow& row, double bound) { return row.more_is_better ? *row
 
 std::string bound_text(const std::optional<double>& bound) { return bound ? rounded(*bound, 4) : ""; }
 
-// Of the two the better that is met, or else the one that had to be.
-std::string verdict(const BenchRow& row) {
-    const auto& [must, aim] = row.target;
-    if (!row.value || (!must && !aim)) return "";
-    if (aim && holds(row, *aim)) return "aim met";
-    if (!must) return "aim missed";
-    return holds(row, *must) ? "must met" : "must missed";
-}
-
 } // namespace
 
 BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows) {
-    BenchTable table{title, {{"measure", "measured", "unit", "must", "aim", "verdict"}}, {}};
+    BenchTable table{title, {{"measure", "measured", "unit", "target"}}, {}};
     for (const BenchRow& row : rows) {
         table.rows.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
-                              bound_text(row.target.must), bound_text(row.target.aim), verdict(row)});
+                              bound_text(row.target.must ? row.target.must : row.target.aim)});
         if (!row.note.empty()) table.notes.push_back(row.name + ": " + row.note);
     }
     return table;

@@ -14,8 +14,6 @@
 
 #include "accuracy_bench.h"
 #include "bench_tools.h"
-#include "budget_bench.h"
-#include "effects_bench.h"
 #include "engine_bench.h"
 #include "fit_bench.h"
 #include "libraries_bench.h"
@@ -25,9 +23,9 @@
 #include "output_files.h"
 #include "people_bench.h"
 #include "perception_bench.h"
+#include "points_bench.h"
 #include "program.h"
 #include "report.h"
-#include "requests_bench.h"
 #include "scenes_bench.h"
 #include "selection_bench.h"
 #include "terminal.h"
@@ -272,87 +270,37 @@ Command perception_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
-struct EffectsArguments {
-    EffectsBenchOptions options;
+struct PointsArguments {
+    PointsBenchOptions options;
     ReportArguments report;
+    bool quick = false;
 };
 
-Result<int> run(EffectsArguments& a) {
-    auto bench = BenchRun::open(a.options.meshes, {}, a.report);
+Result<int> run(PointsArguments& a) {
+    auto bench = BenchRun::open(a.options.models, {}, a.report);
     if (!bench) return bench.error();
-    const auto result = bench_effects(a.options);
+    const auto result = bench_points(a.options);
     if (!result) return result.error();
-    return bench->close({{"effects", result->effects}}, {result->table});
+    return bench->close({{"points", result->points}}, result->tables);
 }
 
-Command effects_command(CLI::App& app) {
-    auto a = std::make_shared<EffectsArguments>();
-    CLI::App* verb =
-        app.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
-    verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen-bench perception')")
-        ->type_name("MESH");
-    verb->add_flag("--quick", a->options.quick, "Few repetitions");
-    add_report_options(*verb, a->report);
-    verb->footer("Examples:\n  unseen-bench effects --mesh bunny.ply horse.ply dragon.ply");
-    return {verb, [a] { return run(*a); }};
-}
-
-struct BudgetArguments {
-    BudgetBenchOptions options;
-    std::optional<glm::dvec3> direction, up;
-    ReportArguments report;
-};
-
-Result<int> run(BudgetArguments& a) {
-    if (a.direction) a.options.direction = *a.direction;
-    a.options.up = a.up;
-    auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.report);
-    if (!bench) return bench.error();
-    const auto result = bench_budget(a.options);
-    if (!result) return result.error();
-    return bench->close({{"tests", result->tests}}, {result->table});
-}
-
-Command budget_command(CLI::App& app) {
-    auto a = std::make_shared<BudgetArguments>();
-    CLI::App* verb = app.add_subcommand(
-        "budget", "What two fold tests make of one triangle budget: node extent, and the perceptual test");
-    verb->add_option("MODEL", a->options.mesh, "A mesh or a tree")->required()->type_name("TREE.vdt|MESH");
-    verb->add_option("-o,--output", a->options.picture, "The two wireframes side by side")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}));
-    add_triangles_option(*verb, a->options.triangles, "The budget (default: 18000)");
-    add_vector(*verb, "--direction", a->direction, "From the model towards the eye (default: 1 0 0)");
-    add_vector(*verb, "--up", a->up, "Up in the picture (default: 0 1 0)");
+Command points_command(CLI::App& app) {
+    auto a = std::make_shared<PointsArguments>();
+    CLI::App* verb = app.add_subcommand("points", "What usual requests keep of models, take, and show");
+    verb->add_option("MODEL", a->options.models, "Meshes or trees (default: as for 'unseen-bench perception')")
+        ->type_name("TREE.vdt|MESH");
+    add_triangles_option(*verb, a->options.budget, "The budget (default: 10000)");
+    add_vector(*verb, "--direction", a->options.direction, "From the model towards the eye (default: 0 0 1)");
+    add_vector(*verb, "--up", a->options.up, "Up in the picture (default: 0 1 0)");
+    verb->add_flag("--quick", a->quick, "Four samples a pixel: rough figures");
     add_report_options(*verb, a->report);
     verb->callback([a] {
-        if (a->direction && *a->direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
-        if (a->up && *a->up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
+        for (const auto& given : {a->options.direction, a->options.up})
+            if (given && *given == glm::dvec3(0)) refuse("--direction and --up must not be 0 0 0.");
+        if (a->quick) a->options.samples = 4;
     });
-    verb->footer("Examples:\n  unseen-bench budget horse.vdt --triangles 18000 --direction 1 0 0 -o horse.png");
-    return {verb, [a] { return run(*a); }};
-}
-
-struct RequestsArguments {
-    std::string model;
-    ReportArguments report;
-};
-
-Result<int> run(RequestsArguments& a) {
-    auto bench = BenchRun::open({a.model}, {}, a.report);
-    if (!bench) return bench.error();
-    const auto result = bench_requests(a.model);
-    if (!result) return result.error();
-    return bench->close({{"requests", result->requests}}, {result->table});
-}
-
-Command requests_command(CLI::App& app) {
-    auto a = std::make_shared<RequestsArguments>();
-    CLI::App* verb =
-        app.add_subcommand("requests", "What usual requests keep of a model, take, and show: the table of README.md");
-    verb->add_option("MODEL", a->model, "A mesh or a tree")->required()->type_name("TREE.vdt|MESH");
-    add_report_options(*verb, a->report);
-    verb->footer("Examples:\n  unseen-bench requests bunny.vdt");
+    verb->footer("Examples:\n  unseen-bench points bunny.vdt\n"
+                 "  unseen-bench points horse.ply --triangles 18000 --direction 1 0 0");
     return {verb, [a] { return run(*a); }};
 }
 
@@ -674,9 +622,9 @@ constexpr const char* examples = R"(Examples:
 int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
-        return std::vector<Command>{engine_command(app),    perception_command(app), effects_command(app),
-                                    budget_command(app),    requests_command(app),   lod_bench_command(app),
-                                    fit_command(app),       people_command(app),     scenes_command(app),
-                                    selection_command(app), accuracy_command(app),   libraries_command(app)};
+        return std::vector<Command>{engine_command(app),    perception_command(app), points_command(app),
+                                    lod_bench_command(app), fit_command(app),        people_command(app),
+                                    scenes_command(app),    selection_command(app),  accuracy_command(app),
+                                    libraries_command(app)};
     });
 }

@@ -1,10 +1,9 @@
 // The benchmarks that draw, in a build without OpenGL: they say so.
 #include "accuracy_bench.h"
-#include "budget_bench.h"
 #include "fit_bench.h"
 #include "lod_bench.h"
 #include "perception_bench.h"
-#include "requests_bench.h"
+#include "points_bench.h"
 #include "scenes_bench.h"
 #include "selection_bench.h"
 
@@ -20,9 +19,8 @@ Error no_pictures() {
 } // namespace
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { return no_pictures(); }
-Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
 Result<LodBenchResult> bench_lod(const std::vector<std::string>&, int) { return no_pictures(); }
-Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
+Result<PointsBenchResult> bench_points(const PointsBenchOptions&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }
 Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions&) { return no_pictures(); }

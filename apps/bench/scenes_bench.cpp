@@ -16,7 +16,6 @@
 #include "level_cuts.h"
 #include "made_scenes.h"
 #include "terminal.h"
-#include "tree_walk.h"
 
 namespace unseen::app {
 namespace {
@@ -85,10 +84,6 @@ public:
 
     std::vector<vdtree::Cut> cuts_of(const LevelControl& control, const session::LevelFrame& frame) const {
         return level_cuts(*session_, control, frame);
-    }
-
-    Result<TreeWalk> walk(const TreeWalkOptions& how) const {
-        return walk_tree(*session_, context_, judge_->renderer(), view_, how);
     }
 
     Result<LevelControl> levels(const session::LevelControlOptions& how) const {
@@ -267,44 +262,7 @@ Result<Walk> walk(JudgedScene& scene, int frames) {
     return walk;
 }
 
-// ---- the same walk with one cut an object
-
-struct TreeWalks {
-    TreeWalk without, with, where_it_saves_time;
-};
-
-Result<TreeWalks> walk_trees(const JudgedScene& scene) {
-    using Use = session::MovingOcclusionOptions::Use;
-    auto without = scene.walk({});
-    if (!without) return without.error();
-    auto with = scene.walk({.occlusion = session::MovingOcclusionOptions{.use = Use::always}});
-    if (!with) return with.error();
-    auto tried = scene.walk({.occlusion = session::MovingOcclusionOptions{.use = Use::where_it_saves_time}});
-    if (!tried) return tried.error();
-    return TreeWalks{std::move(*without), std::move(*with), std::move(*tried)};
-}
-
 // ---- tables
-
-BenchTable tree_walks_table(const std::vector<std::pair<std::string, TreeWalks>>& walks) {
-    BenchTable table;
-    table.title = "Walking with cuts: what earlier frames hide, and whether that is worth it";
-    table.rows.push_back({"scene", "triangles without", "with", "saved", "ms a frame without", "with", "of it for that",
-                          "pictures", "where it saves time"});
-    for (const auto& [name, w] : walks)
-        table.rows.push_back({name, grouped(static_cast<std::uint64_t>(std::llround(w.without.triangles))),
-                              grouped(static_cast<std::uint64_t>(std::llround(w.with.triangles))),
-                              rounded(100 * (1 - w.with.triangles / w.without.triangles), 2) + "%",
-                              rounded(w.without.frame_ms, 3), rounded(w.with.frame_ms, 3),
-                              rounded(w.with.occlusion_ms, 2), std::to_string(w.with.pictures),
-                              w.where_it_saves_time.effect.on ? "on" : "off"});
-    return table;
-}
-
-Json to_json(const TreeWalk& walk) {
-    return {{"triangles", walk.triangles}, {"frame_ms", walk.frame_ms}, {"occlusion_ms", walk.occlusion_ms},
-            {"pictures", walk.pictures},   {"on", walk.effect.on},      {"why", walk.effect.why}};
-}
 
 BenchTable table_of(const std::string& scene, const std::vector<Row>& rows, std::uint64_t all) {
     BenchTable table;
@@ -401,7 +359,6 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
     if (!context) return context.error();
     ScenesBenchResult result;
     std::vector<std::pair<std::string, Walk>> walks;
-    std::vector<std::pair<std::string, TreeWalks>> tree_walks;
     std::vector<std::pair<std::string, std::vector<session::PassEffect>>> passes;
     for (const std::string& file : files) {
         auto scene = JudgedScene::create(*context, file, options);
@@ -417,15 +374,8 @@ Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions& options) {
         if (!walked) return walked.error();
         result.walks.push_back(to_json(*walked, scene->name()));
         walks.emplace_back(scene->name(), std::move(*walked));
-        auto by_trees = walk_trees(*scene);
-        if (!by_trees) return by_trees.error();
-        result.walks.back()["tree"] = {{"without", to_json(by_trees->without)},
-                                       {"with", to_json(by_trees->with)},
-                                       {"where_it_saves_time", to_json(by_trees->where_it_saves_time)}};
-        tree_walks.emplace_back(scene->name(), std::move(*by_trees));
     }
     result.tables.push_back(passes_table(passes));
-    result.tables.push_back(tree_walks_table(tree_walks));
     result.tables.push_back(renderings_table(walks));
     result.tables.push_back(times_table(walks));
     return result;

@@ -487,18 +487,11 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     });
 }
 
-void add_visibility_option(CLI::App& verb, WhatOptions& o, bool flies) {
-    std::vector<std::pair<std::string, Visibility>> choices = {{"spheres", Visibility::spheres},
-                                                               {"picture", Visibility::picture}};
-    std::string what =
-        "What counts as hidden: what faces away or lies behind spheres inside solids (spheres; of 'unseen render' and "
-        "'unseen view' the default), or also all that lies behind what this picture shows (picture)";
-    if (flies) {
-        choices.emplace_back("auto", Visibility::where_it_saves_time);
-        what += ". Of moving views, behind what the frames before showed, as far as the eye can have gone since; or "
-                "that only while it saves time (auto)";
-    }
-    add_choice<Visibility, Visibility>(verb, "--visibility", o.visibility, std::move(choices), what);
+void add_visibility_option(CLI::App& verb, WhatOptions& o) {
+    add_choice<Visibility, Visibility>(
+        verb, "--visibility", o.visibility, {{"spheres", Visibility::spheres}, {"picture", Visibility::picture}},
+        "What counts as hidden: what faces away or lies behind spheres inside solids (spheres; of 'unseen render' the "
+        "default), or also all that lies behind what this picture shows (picture)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, bool adds_layers) {

@@ -76,7 +76,7 @@ struct TriangleCount {
 // WHAT.
 // How it is known what of a picture cannot be seen: by spheres inside solids, or by what the picture shows, too; or, of
 // flights, by that where frames take less time.
-enum class Visibility { spheres, picture, where_it_saves_time };
+enum class Visibility { spheres, picture };
 
 struct WhatOptions {
     session::Request request; // of budgets, without the number of triangles
@@ -111,7 +111,7 @@ void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
 // Of verbs for one view. Without `adds_layers` the verb has a --layers of its own.
-void add_visibility_option(CLI::App& verb, WhatOptions& options, bool flies); // flies: of moving views, too
+void add_visibility_option(CLI::App& verb, WhatOptions& options);
 void add_masking_option(CLI::App& verb, WhatOptions& options, bool adds_layers);
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);

@@ -10,7 +10,6 @@
 #include <unseen/perception/image.h>
 #include <unseen/session/follower.h>
 #include <unseen/session_gpu/frame_image.h>
-#include <unseen/session_gpu/moving_occlusion.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/internal/stopwatch.h>
@@ -25,7 +24,6 @@
 #include "report.h"
 #include "session_options.h"
 #include "terminal.h"
-#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -33,8 +31,7 @@ namespace {
 constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
 
 bool draws_frames(const FlyThroughOptions& options) {
-    return options.draws.value_or(!options.pictures.empty() || options.judges_changes ||
-                                  options.what.visibility == Visibility::where_it_saves_time);
+    return options.draws.value_or(!options.pictures.empty() || options.judges_changes);
 }
 
 // What one frame came to. Times in milliseconds of the wall clock.
@@ -53,22 +50,14 @@ struct FrameRecord {
 struct Drawing {
     std::unique_ptr<render::Context> context; // whose place does not change: the others refer to it
     session::SceneRenderer renderer;
-    std::optional<session::MovingOcclusion> occlusion;
 };
 
-Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context,
-                                            Visibility visibility) {
+Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context) {
     if (!context) return std::optional<Drawing>();
     auto kept = std::make_unique<render::Context>(std::move(*context));
     auto renderer = session::SceneRenderer::create(*kept, session);
     if (!renderer) return renderer.error();
-    std::optional<Drawing> drawing(Drawing{std::move(kept), std::move(*renderer), {}});
-    const auto options = moving_occlusion(visibility, true);
-    if (!options) return drawing;
-    auto occlusion = session::MovingOcclusion::create(*drawing->context, session, *options);
-    if (!occlusion) return occlusion.error();
-    drawing->occlusion = std::move(*occlusion);
-    return drawing;
+    return std::optional<Drawing>(Drawing{std::move(kept), std::move(*renderer)});
 }
 
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
@@ -256,7 +245,7 @@ public:
             if (!made) return made.error();
             changes_.emplace(std::move(*made));
         }
-        auto drawing = make_drawing(session_, std::move(context), options_.what.visibility);
+        auto drawing = make_drawing(session_, std::move(context));
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
@@ -313,11 +302,6 @@ private:
             if (auto drawn = changes_->before(follower_, request_, view_, *draw); !drawn) return drawn.error();
         }
         const auto start = vdtree::Clock::now();
-        if (drawing && drawing->occlusion) {
-            auto hidden = drawing->occlusion->begin_frame(view_);
-            if (!hidden) return hidden.error();
-            request_.hidden = std::move(*hidden);
-        }
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
         if (!request_.reasons) simplified->effects = std::move(last_.effects);
@@ -331,7 +315,6 @@ private:
             record.gliding = static_cast<double>(last_.gliding);
         }
         Result<render::Frame> frame = render::Frame{};
-        const auto frame_ms = [&] { return vdtree::ms_since(start); };
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
@@ -342,11 +325,8 @@ private:
                 record.draw_ms = frame->draw_ms;
                 record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
             }
-            if (drawing->occlusion)
-                if (auto seen = occlude(*drawing, cuts, *draw, frame_ms()); !seen) return seen.error();
-            if (drawing->occlusion) last_.passes = {drawing->occlusion->effect()};
         }
-        record.frame_ms = frame_ms();
+        record.frame_ms = vdtree::ms_since(start);
         if (changes_) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
@@ -359,15 +339,6 @@ private:
         }
         records_.push_back(record);
         return frame;
-    }
-
-    Result<void> occlude(Drawing& drawing, std::span<const session::DrawnCut> cuts, const render::DrawOptions& draw,
-                         double frame_ms) {
-        const auto depth = draws_frames(options_) ? drawing.renderer.drawn_depth() : std::nullopt;
-        if (depth) return drawing.occlusion->end_frame(*depth, view_, frame_ms);
-        const auto items = drawing.renderer.items(cuts, view_, draw);
-        if (!items) return items.error();
-        return drawing.occlusion->end_frame(*items, view_, frame_ms);
     }
 
     session::Session& session_;
@@ -403,7 +374,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (!opened) return opened.error();
     std::optional<vdtree::AtomicFile> csv = std::move(*opened);
     std::optional<render::Context> context;
-    if (draws_frames(options) || options.what.visibility != Visibility::spheres) {
+    if (draws_frames(options)) {
         auto made = render::Context::headless();
         if (!made) return made.error();
         context = std::move(*made);

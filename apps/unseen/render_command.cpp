@@ -220,8 +220,6 @@ void check(const RenderArguments& a) {
     if (o.gaze.tracker.error_deg > 0 && !may_have_gaze) refuse("--gaze-error needs a gaze: --gaze or --gaze-mode.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
-        if (a.what.visibility == Visibility::where_it_saves_time)
-            refuse("--visibility auto is of flights: give --path, or --visibility picture.");
         if (a.show.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
         if (a.show.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full)
             refuse("--show cost and --full exclude each other: nothing is folded.");
@@ -234,10 +232,8 @@ void check(const RenderArguments& a) {
         return;
     }
     if (a.show.map) refuse("--show is for single pictures, and excludes --path.");
-    if (a.what.visibility != Visibility::spheres && o.judges_changes)
-        refuse("--changes are judged without --visibility picture or auto.");
-    if (a.what.visibility == Visibility::where_it_saves_time && o.draws && !*o.draws)
-        refuse("--visibility auto goes by how long frames take, and excludes --no-draw.");
+    if (a.what.visibility != Visibility::spheres)
+        refuse("--visibility picture is for single pictures, and excludes --path.");
     if (a.what.masks) refuse("--masking scene is for single pictures, and excludes --path.");
     if (o.judges_changes && o.draws && !*o.draws) refuse("--no-draw and --changes exclude each other.");
     if (o.judges_changes && a.draw.wireframe) refuse("--changes are those of the model: leave --wireframe away.");
@@ -376,7 +372,7 @@ Command render_command(CLI::App& app) {
     add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what, true);
+    add_visibility_option(*verb, a->what);
     add_masking_option(*verb, a->what, false);
     add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer(
@@ -391,7 +387,6 @@ Command render_command(CLI::App& app) {
         "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
         "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
         "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
-        "  unseen render museum.glb --path walk:1.5:120 --visibility picture --csv walk.csv --json -\n"
         "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60\n"
         "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv\n"
         "  unseen render museum.glb --method perceptual --maps rpg99 -o levels.png --show levels\n"

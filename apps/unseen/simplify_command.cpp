@@ -114,7 +114,7 @@ Command simplify_command(CLI::App& app) {
     add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what, false);
+    add_visibility_option(*verb, a->what);
     add_masking_option(*verb, a->what, true);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"

@@ -64,7 +64,6 @@ Command view_command(CLI::App& app) {
     add_orthographic_option(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
-    add_visibility_option(*verb, a->viewer.what, true);
     add_moving_gaze_options(*verb, a->gaze, true);
     verb->callback([o = a.get()] {
         check_gaze(o->viewer.what, o->gaze);
@@ -73,8 +72,7 @@ Command view_command(CLI::App& app) {
     verb->footer(viewer_help() + "\nExamples:\n  unseen view bunny.vdt\n"
                                  "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                  "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25\n"
-                                 "  unseen view part.stl --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
-                                 "  unseen view museum.glb --visibility auto");
+                                 "  unseen view part.stl --orthographic fit --direction 0 -1 0 --up 0 0 1");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -16,7 +16,6 @@
 
 #include <unseen/perception/image.h>
 #include <unseen/session_gpu/frame_image.h>
-#include <unseen/session_gpu/moving_occlusion.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
@@ -24,7 +23,6 @@
 #include "terminal.h"
 #include "viewer_overlay.h"
 #include "viewer_text.h"
-#include "visibility.h"
 
 namespace unseen::app {
 
@@ -75,12 +73,12 @@ private:
 class Viewer {
 public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
-           session::SceneRenderer renderer, std::optional<session::MovingOcclusion> occlusion)
+           session::SceneRenderer renderer)
         : session_(session), options_(options), context_(context), window_(context.glfw_window()),
-          renderer_(std::move(renderer)), occlusion_(std::move(occlusion)), overlay_(context), follower_(session),
-          view_(options.first_view), request_(options.what.request_for(session.triangle_count())),
-          gaze_px_(options.what.gaze_px), draw_(options.draw),
-          gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse), gaze_(std::move(gaze)) {
+          renderer_(std::move(renderer)), overlay_(context), follower_(session), view_(options.first_view),
+          request_(options.what.request_for(session.triangle_count())), gaze_px_(options.what.gaze_px),
+          draw_(options.draw), gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse),
+          gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
         request_.reasons = false;
@@ -267,8 +265,6 @@ private:
 
     // Between perspective and parallel, where what is as far as the target keeps its size.
     void switch_projection() {
-        if (occlusion_)
-            return say("The view stays in perspective: pictures of what is hidden are made of no other.", true);
         vdtree::View view = view_;
         const std::optional<session::Gaze> gaze = session_.observer().gaze;
         if (view.orthographic_height) {
@@ -308,22 +304,11 @@ private:
         const double now_s = std::chrono::duration<double>(start - first_frame_).count();
         take_gaze(now_s);
         session_.set_time(now_s);
-        if (occlusion_) {
-            auto hidden = occlusion_->begin_frame(view_);
-            if (!hidden) return hidden.error();
-            request_.hidden = std::move(*hidden);
-        }
         auto result = follower_.follow(view_, request_);
         if (!result) return result.error();
         const auto drawn = renderer_.draw_to_window(cuts(), view_, draw_);
         if (!drawn) return drawn;
         if (auto done = context_.finish(); !done) return done;
-        if (occlusion_) {
-            const auto items = renderer_.items(cuts(), view_, draw_);
-            if (!items) return items.error();
-            if (auto ended = occlusion_->end_frame(*items, view_, vdtree::ms_since(start)); !ended) return ended;
-            result->passes = {occlusion_->effect()};
-        }
         // The first frame compiles and uploads: its time says nothing of those that follow.
         if (has_drawn_) times_.add(vdtree::ms_since(start), result->adapt_ms);
         if (auto shown = show(state_of(*result)); !shown) return shown;
@@ -448,7 +433,6 @@ private:
     const render::Context& context_;
     GLFWwindow* window_;
     session::SceneRenderer renderer_;
-    std::optional<session::MovingOcclusion> occlusion_;
     ViewerOverlay overlay_;
     session::Follower follower_;
     vdtree::View view_;
@@ -485,15 +469,9 @@ Result<void> run_viewer(render::Context& window, session::Session& session, sess
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
     auto renderer = session::SceneRenderer::create(window, session);
     if (!renderer) return renderer.error();
-    std::optional<session::MovingOcclusion> occlusion;
-    if (const auto wanted = moving_occlusion(options.what.visibility, false)) {
-        auto made = session::MovingOcclusion::create(window, session, *wanted);
-        if (!made) return made.error();
-        occlusion = std::move(*made);
-    }
     glfwShowWindow(window.glfw_window());
     if (options.frames == 0) print_note("press h in the window to see its keys.");
-    return Viewer(session, std::move(gaze), options, window, std::move(*renderer), std::move(occlusion)).run();
+    return Viewer(session, std::move(gaze), options, window, std::move(*renderer)).run();
 }
 
 } // namespace unseen::app

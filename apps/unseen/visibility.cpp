@@ -1,7 +1,6 @@
 #include "visibility.h"
 
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/moving_occlusion.h>
 
 namespace unseen::app {
 
@@ -17,16 +16,6 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
     const auto own = render::Context::headless();
     if (!own) return own.error();
     return session::simplify_as_seen(session, *own, view, request, options);
-}
-
-std::optional<session::MovingOcclusionOptions> moving_occlusion(Visibility visibility, bool waits) {
-    if (visibility == Visibility::spheres) return std::nullopt;
-    session::MovingOcclusionOptions options;
-    options.waits = waits;
-    if (!waits) options.frames *= 2; // they come later
-    if (visibility == Visibility::where_it_saves_time)
-        options.use = session::MovingOcclusionOptions::Use::where_it_saves_time;
-    return options;
 }
 
 } // namespace unseen::app

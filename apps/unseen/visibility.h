@@ -11,10 +11,6 @@ namespace unseen::render {
 class Context;
 }
 
-namespace unseen::session {
-struct MovingOcclusionOptions;
-}
-
 namespace unseen::app {
 
 // Where the options go by pictures session::simplify_as_seen(), by default in a context of its own; in builds without
@@ -22,8 +18,5 @@ namespace unseen::app {
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context = nullptr);
-
-// Of moving views; none: nothing goes by pictures. `waits`: cuts do not depend on the machine's speed.
-std::optional<session::MovingOcclusionOptions> moving_occlusion(Visibility visibility, bool waits);
 
 } // namespace unseen::app

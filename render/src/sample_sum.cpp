@@ -40,7 +40,6 @@ struct SampleSum::Impl {
     VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
     float background = default_background;
     int count = 0; // of samples that were added
-    std::optional<DrawnDepth> drawn_depth;
     std::vector<glm::vec4> pixels;
 };
 
@@ -59,7 +58,6 @@ Result<void> SampleSum::Impl::prepare() {
 void SampleSum::Impl::begin(float background_) {
     background = background_;
     count = 0;
-    drawn_depth.reset();
     set_fixed_state(sum.impl());
     const glm::vec4 nothing(0);
     glClearNamedFramebufferfv(sum.id(), GL_COLOR, 0, &nothing.x);
@@ -125,15 +123,6 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
             pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
             impl_->add(&used);
         }
-        if (view.orthographic_height) return {}; // its depth is not near / distance
-        impl_->drawn_depth = DrawnDepth{sample.depth.id(),
-                                        width(),
-                                        height(),
-                                        used.left,
-                                        used.top,
-                                        used.left + used.width,
-                                        used.top + used.height,
-                                        pass->near_plane().value_or(1)};
         return {};
     });
 }
@@ -163,8 +152,6 @@ Result<std::span<const glm::vec4>> SampleSum::mean() {
     for (glm::vec4& pixel : pixels) pixel = glm::vec4(glm::dvec4(pixel) * share + glm::dvec4(impl_->background));
     return std::span<const glm::vec4>(pixels);
 }
-
-std::optional<DrawnDepth> SampleSum::drawn_depth() const noexcept { return impl_->drawn_depth; }
 
 LuminanceTexture SampleSum::mean_luminance() const noexcept {
     constexpr int luminance = 3;

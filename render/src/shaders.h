@@ -9,7 +9,6 @@ extern const std::string_view accumulate_frag;
 extern const std::string_view blur_frag;
 extern const std::string_view combine_frag;
 extern const std::string_view compare_frag;
-extern const std::string_view depth_cells_frag;
 extern const std::string_view elevate_frag;
 extern const std::string_view energy_frag;
 extern const std::string_view examine_comp;

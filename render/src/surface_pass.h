@@ -70,10 +70,6 @@ public:
     // Which pixels of draws of these points can show anything: all of them where a part of an item may lie behind the
     // eye.
     PixelBox pixels_of(std::span<const glm::dvec2> points) const;
-    // World units: of all items; none: there is none.
-    std::optional<double> near_plane() const {
-        return items_.empty() ? std::nullopt : std::optional(items_.front().projection.near_plane);
-    }
 
 private:
     enum class Cull { nothing, back, front }; // faces that are left out

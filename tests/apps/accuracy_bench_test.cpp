@@ -129,17 +129,13 @@ TEST_F(AccuracyBenchTest, BoundsHoldAndTighterOnesCostMore) {
     EXPECT_GE(error(points, "slabs"), error(points, "slabs, then mask of 6 x 8 x 8"));
 }
 
-TEST_F(AccuracyBenchTest, ScenesHaveLevelsAndPicturesOfDepth) {
+TEST_F(AccuracyBenchTest, ScenesHaveLevels) {
     ASSERT_EQ(run({"scene", "make", "museum", "--triangles", "10000", "-o", "museum.glb"}).status, 0);
-    const Outcome outcome = bench(
-        {"accuracy", "--quick", "museum.glb", "--only", "levels", "--only", "depth", "--window", "96", "--json", "-"});
+    const Outcome outcome =
+        bench({"accuracy", "--quick", "museum.glb", "--only", "levels", "--window", "96", "--json", "-"});
     if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const Json report = outcome.json();
-    EXPECT_EQ(sound_axes(report), (std::set<std::string>{"depth", "levels"}));
-    EXPECT_EQ(cost(report["points"], "no pictures"), 1);
-    EXPECT_LE(cost(report["points"], "serves 1 frame"), 1);
-    EXPECT_LT(error(report["points"], "serves 1 frame"), 1) << "what is hidden does not show";
+    EXPECT_EQ(sound_axes(outcome.json()), std::set<std::string>{"levels"});
 }
 
 TEST_F(AccuracyBenchTest, NamesTheAxesThatThereAre) {

@@ -1,4 +1,4 @@
-// unseen-bench perception, effects and budget, on a mesh and in a window so small that the figures mean little: every
+// unseen-bench perception and points, on a mesh and in a window so small that the figures mean little: every
 // row is there, and measured.
 #include "run_bench.h"
 
@@ -80,26 +80,36 @@ TEST_F(PerceptionBenchTest, DeviationsFromReferencesAreFound) {
     }
 }
 
-// Both stay within the budget and use most of it; their picture shows them side by side.
-TEST_F(PerceptionBenchTest, BudgetsAreSpentByBothTests) {
-    const Outcome outcome = bench(
-        {"budget", "ball.vdt", "--triangles", "700", "--direction", "0", "0", "1", "-o", "both.png", "--json", "-"});
+TEST_F(PerceptionBenchTest, PointsSayWhatRequestsKeepAndShow) {
+    const Outcome outcome = bench({"points", "ball.vdt", "--quick", "--triangles", "700", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const Json tests = outcome.json()["tests"];
-    ASSERT_EQ(tests.size(), 2u);
-    for (const Json& test : tests) {
-        EXPECT_LE(test["triangles"], 700) << test;
-        EXPECT_GT(test["triangles"], 500) << test;
-        EXPECT_GT(test["contour_percent"], 0) << test;
-        EXPECT_LT(test["contour_percent"], 100) << test;
+    const Json points = outcome.json()["points"];
+    std::map<std::string, Json> named;
+    for (const Json& point : points) {
+        std::string name = point["request"];
+        if (const std::size_t gaze = name.find(" --gaze"); gaze != std::string::npos)
+            name.replace(gaze, name.npos, " gazed");
+        EXPECT_TRUE(named.emplace(name, point).second) << name << " is there twice";
+        EXPECT_EQ(point["model"], "ball");
+        EXPECT_LE(point["picture_triangles"], point["triangles"]) << name;
     }
-    EXPECT_GT(tests[1]["contour_percent"], tests[0]["contour_percent"])
-        << "the perceptual test spends more of it on the contour";
-    const auto both = unseen::perception::read_image(path("both.png"));
-    ASSERT_TRUE(both) << both.error().message;
-    EXPECT_EQ(both->image.width, 2 * 1024);
-    EXPECT_EQ(bench({"budget", "ball.vdt", "--direction", "0", "0", "0"}).status, 2);
-    EXPECT_EQ(bench({"budget"}).status, 2);
+    ASSERT_EQ(named.size(), 13u);
+    const auto kept = [&](const char* name) { return named.at(name)["picture_triangles"].get<int>(); };
+    EXPECT_EQ(named.at("--full")["triangles"], kept("--full"));
+    EXPECT_EQ(named.at("--full")["v"], 0);
+    EXPECT_LT(kept("--imperceptible"), kept("--full"));
+    EXPECT_LT(kept("--imperceptible gazed"), kept("--imperceptible"));
+    EXPECT_EQ(named.at("--imperceptible gazed")["visible_pixels"], 0);
+    EXPECT_LE(kept("--fold-test luebke-hallen"), kept("--fold-test luebke-hallen-safe"));
+    EXPECT_EQ(kept("--fold-test luebke-hallen --chroma gazed"), kept("--fold-test luebke-hallen gazed"))
+        << "it is grey";
+    EXPECT_GE(kept("--fold-test luebke-hallen --lights gazed"), kept("--fold-test luebke-hallen gazed"));
+    for (const char* test : {"", " --fold-test luebke-hallen", " --fold-test extent"}) {
+        EXPECT_LE(kept((std::string("--triangles 700") + test).c_str()), 700) << test;
+        EXPECT_GT(kept((std::string("--triangles 700") + test).c_str()), 500) << test;
+    }
+    EXPECT_EQ(bench({"points", "ball.vdt", "--direction", "0", "0", "0"}).status, 2);
+    EXPECT_EQ(bench({"points", "missing.ply"}).status, 1);
 }
 
 TEST_F(PerceptionBenchTest, MakesHardMeshes) {
@@ -113,21 +123,6 @@ TEST_F(PerceptionBenchTest, MakesHardMeshes) {
             EXPECT_EQ(view["visible_pixels"], 0) << view;
         }
     }
-}
-
-TEST_F(PerceptionBenchTest, EffectsAreComparedWithoutEach) {
-    const Outcome outcome = bench({"effects", "--quick", "--mesh", "ball.vdt", "--json", "-"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    std::map<std::string, double> kept;
-    const Json report = outcome.json();
-    for (const Json& one : report["effects"]) kept[one["variation"]] = one["triangles"];
-    EXPECT_GT(kept["no gaze"], kept["luebke-hallen, all effects"]);
-    EXPECT_GT(kept["no contrast"], kept["luebke-hallen, all effects"]);
-    EXPECT_LE(kept["no silhouettes"], kept["luebke-hallen, all effects"]);
-    EXPECT_GE(kept["luebke-hallen-safe"], kept["luebke-hallen, all effects"]);
-    EXPECT_EQ(kept["chroma"], kept["luebke-hallen, all effects"]) << "the ball is grey";
-    const Outcome people = bench({"effects", "--quick", "--mesh", "ball.vdt"});
-    EXPECT_THAT(people.out, HasSubstr("no silhouettes"));
 }
 
 TEST_F(PerceptionBenchTest, PeopleAreComparedWithModels) {
@@ -219,7 +214,6 @@ TEST_F(PerceptionBenchTest, RefusesWrongUsage) {
         EXPECT_EQ(bench(all).status, 2) << words[0];
     }
     EXPECT_EQ(bench({"perception", "--mesh", "missing.ply"}).status, 1);
-    EXPECT_EQ(bench({"effects", "--mesh", "missing.ply"}).status, 1);
 }
 
 } // namespace perception_bench_test

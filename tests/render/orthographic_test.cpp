@@ -87,7 +87,6 @@ TEST_F(Orthographic, WhatIsNearerHidesWhatIsFarther) {
             EXPECT_NEAR((*pixels)[16 * 32 + 24].a, 0.6f, exactly) << distance;
         }
     }
-    EXPECT_FALSE(sum->drawn_depth()); // which is near / distance, and so of perspective alone
 }
 
 // From so far away that what perspective is left moves nothing by more than a thousandth of a pixel.

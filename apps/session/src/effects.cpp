@@ -247,10 +247,6 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
         return {name, true,
                 std::string("what lies behind what this view shows is folded, by a picture of its depths") +
                     (casts_shadows(sight) ? but_shadows : "")};
-    if (decision.hidden)
-        return {name, true,
-                std::string("what lies behind what an earlier picture showed is folded, for eyes near that one's") +
-                    (casts_shadows(sight) ? but_shadows : "")};
     if (may_cast_anything(sight, decision)) return {name, false, may_cast};
     if (!folds_hidden(sight, decision))
         return {name, false,

@@ -272,7 +272,6 @@ vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
-    viewpoint.hidden = decision.hidden;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
         // An orthographic view that shows a small part stands for eyes so near that they may lie among the spheres.
@@ -369,17 +368,6 @@ keep_outlines(const Sight& sight, const Decision& decision, const std::shared_pt
     return state.criterion;
 }
 
-// What is hidden may cast shadows that are not. The same bits as long as nothing changes, so that nothing is tested again.
-std::shared_ptr<const std::vector<std::uint64_t>>
-without_kept(ShadowState& state, const std::shared_ptr<const std::vector<std::uint64_t>>& hidden) {
-    if (!hidden || count(state.kept) == 0) return hidden;
-    std::vector<std::uint64_t> left = *hidden;
-    for (std::size_t word = 0; word < left.size(); ++word) left[word] &= ~state.kept[word];
-    if (!state.hidden || *state.hidden != left)
-        state.hidden = std::make_shared<const std::vector<std::uint64_t>>(std::move(left));
-    return state.hidden;
-}
-
 } // namespace
 
 Result<Decision> decide(const Sight& sight, const Request& request, std::size_t object) {
@@ -404,21 +392,7 @@ Result<Decision> decide(const Sight& sight, const Request& request, std::size_t 
             "{request.fold_test = }error goes by errors that the tree does not hold: allow {request.may_measure}, or "
             "call {session::measured()}.");
     const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
-    Decision decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
-    if (request.hidden && !why_not_hidden(sight, decision))
-        decision.hidden = request.hidden->of(object, sight.object.tree);
-    return decision;
-}
-
-const char* why_not_hidden(const Sight& sight, const Decision& decision) {
-    const Request& request = decision.request;
-    if (request.purpose == Purpose::mesh) return "the mesh may be looked at from elsewhere";
-    if (!is_perceptual(decision)) return "only the perceptual fold tests know what a fold changes";
-    if (may_cast_anything(sight, decision)) return may_cast;
-    if (sight.lighting && decision.test != FoldTest::error) return "under lights only the fold test error knows it";
-    if (sight.view.orthographic_height) return "the last picture was in perspective";
-    if (!request.hidden->holds_for(sight.view.eye)) return "the eye has gone beyond the reach of the last picture";
-    return nullptr;
+    return Decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
 }
 
 const char* why_unmasked(const Sight& sight) {
@@ -488,7 +462,6 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
         auto with_outlines = keep_outlines(sight, decision, kept);
         if (!with_outlines) return with_outlines.error();
         recipe.criterion = std::move(*with_outlines);
-        recipe.viewpoint.hidden = without_kept(shadow_of(sight), recipe.viewpoint.hidden);
         return recipe;
     }
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);

@@ -29,8 +29,6 @@ bool is_out_of_sight(const Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
 // Shadows of what is not seen.
 inline constexpr const char* may_cast = "what is not seen may cast shadows that are";
-// Why what request.hidden says does not count for an object; null where it may. There is one.
-const char* why_not_hidden(const Sight& sight, const Decision& decision);
 // Why what a scene masks does not count for an object; null where it may.
 const char* why_unmasked(const Sight& sight);
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows

@@ -63,7 +63,6 @@ struct ShadowState {
     double threshold = 0;                                            // with this threshold
     std::vector<std::uint64_t> kept = {};                            // see shadowing_outlines()
     std::shared_ptr<const vdtree::DistanceCriterion> criterion = {}; // that keeps them
-    std::shared_ptr<const std::vector<std::uint64_t>> hidden = {};   // of the last view, without what is kept
 };
 
 // What a follower keeps of the views that it has seen, so that shadows do not flicker. A single view begins anew.
@@ -101,7 +100,6 @@ struct Decision {
     std::string_view why;                                // not the default
     bool measures = false;                               // the tree lacks the errors of its folds
     const perception::MaskingPicture* masking = nullptr; // of what the scene masks of the object; null: nothing is
-    std::shared_ptr<const std::vector<std::uint64_t>> hidden = {}; // nodes that earlier pictures tell to be; null: none
 };
 
 // Around all that fold tests look at: vertices, proxies, rings. Larger than that of the triangles.

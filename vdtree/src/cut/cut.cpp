@@ -199,12 +199,6 @@ Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const Dis
         if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius) + viewpoint.eye_spread))
             return invalid("The eye is inside an occluder, or one of the eyes within the spread is.");
     }
-    if (viewpoint.hidden) {
-        constexpr std::size_t word = 64;
-        if (viewpoint.hidden->size() != (std::size_t{tree.interior_count()} + word - 1) / word)
-            return invalid("What is hidden is of another tree: there must be a bit for each interior node.");
-        if (criterion.parts().lit) return invalid("Criteria with lights cannot fold what is hidden.");
-    }
     if (criterion.parts().lit) return validate(viewpoint.lighting);
     return {};
 }

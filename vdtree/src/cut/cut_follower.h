@@ -42,7 +42,6 @@ private:
     void start_at(const Viewpoint& viewpoint);
     void move_to(const Viewpoint& viewpoint, const Motion& motion);
     void look_from(const Viewpoint& viewpoint);
-    void look_again_at_hidden(const Viewpoint& viewpoint);
     // By a threshold.
     void follow_threshold(CutState& cut, const Viewpoint& viewpoint, const Motion& motion);
     void step(CutState& cut, const Motion& motion);

@@ -71,8 +71,8 @@ AdjustStats CutFollower::follow(CutState& cut, const DistanceCriterion& criterio
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                             : Motion{.position = std::numeric_limits<double>::infinity()};
     if (criterion.parts().lit) motion = with_lights(motion, viewpoint, is_same);
-    const bool is_still = is_same && motion.position == 0 && motion.facing == 0 && motion.planes == 0 &&
-                          motion.light == 0 && viewpoint.hidden == viewpoint_.hidden;
+    const bool is_still =
+        is_same && motion.position == 0 && motion.facing == 0 && motion.planes == 0 && motion.light == 0;
     settler_.keep_costs_if(is_still);
     const float cost_before = max_fold_cost_;
     if (is_still && was_complete_) { // nothing can have changed
@@ -126,18 +126,6 @@ void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
     // Where lights stand still nothing is due by them, not even what any motion would make due.
     if (motion.light > 0) settler_.front().advance_lights(motion.light);
     settler_.front().advance_planes(motion.planes, tester_->view());
-    look_again_at_hidden(viewpoint);
-}
-
-// What is hidden now and was not, or the reverse, is due: all of it lies under nodes that are watched, or is watched.
-void CutFollower::look_again_at_hidden(const Viewpoint& viewpoint) {
-    const auto &before = viewpoint_.hidden, &now = viewpoint.hidden;
-    if (before == now) return;
-    const auto word_of = [](const auto& bits, std::size_t word) { return bits ? (*bits)[word] : 0; };
-    settler_.test_again(*tester_, [&](NodeId node) {
-        const std::size_t word = node / 64;
-        return ((word_of(before, word) ^ word_of(now, word)) >> (node % 64) & 1) != 0;
-    });
 }
 
 void CutFollower::look_from(const Viewpoint& viewpoint) {

@@ -47,19 +47,6 @@ public:
     void watch_all(const CutState& cut, const Rules& rules, Deadlines deadlines);
     void watch_and_settle(CutState& cut, const Rules& rules);
 
-    // Makes those of the watched nodes due now, by what the tester says of them from now on.
-    template <class Which>
-    void test_again(const FoldTester& tester, Which&& which) {
-        front_.for_each_slot([&](Slot slot) {
-            const FoldCandidate& watched = front_[slot];
-            if (!which(watched.node)) return;
-            FoldCandidate again = tester.candidate(watched.node);
-            tester.find_still_rows({&again, 1});
-            front_.set_rows(slot, again.rows);
-            front_.set_deadlines(slot, Verdict{.unfolded = watched.is_unfolded});
-        });
-    }
-
     // Within the cut's changes in steps. `due`: of the front's collect_due().
     void settle(CutState& cut, const Rules& rules, std::span<const CutFront::Slot> due);
     // As far as the time goes, the worst folds first; keeps what is left to do.

@@ -151,10 +151,6 @@ Result<SceneItems> SceneRenderer::items(std::span<const DrawnCut> cuts, const vd
     return impl_->items(cuts, view, options);
 }
 
-std::optional<render::DrawnDepth> SceneRenderer::drawn_depth() const noexcept {
-    return impl_->sum ? impl_->sum->drawn_depth() : std::nullopt;
-}
-
 std::uint64_t SceneRenderer::uploaded_bytes() const noexcept {
     std::uint64_t bytes = 0;
     for (const render::GpuCut& cut : impl_->objects) bytes += cut.uploaded_bytes();

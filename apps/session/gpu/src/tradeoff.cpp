@@ -197,7 +197,9 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     auto measurement = Measurement::create(session, context, view, options);
     if (!measurement) return measurement.error();
     const auto begin = vdtree::Clock::now();
-    const std::vector<Way> all = ways(session);
+    std::vector<Way> all = ways(session);
+    if (!options.requests.empty()) all.resize(1);
+    for (const auto& [name, request] : options.requests) all.push_back({name, request});
     const auto samples = measurement->choose_samples(all.size());
     if (!samples) return samples.error();
     result.samples = *samples;

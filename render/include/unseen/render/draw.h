@@ -64,15 +64,6 @@ struct Clear {
     bool depth = true;
 };
 
-// Depth that a draw has left in a texture: near / distance along the view's axis, 0 for the background, first row on top.
-struct DrawnDepth {
-    unsigned texture = 0;      // GL name; stays its owner's
-    int width = 0, height = 0; // pixels
-    int left = 0, top = 0, right = 0,
-        bottom = 0;        // the part that was drawn to, the last ones excluded; the rest is background
-    double near_plane = 0; // world units
-};
-
 // Draws the items in their order, in perspective or in parallel; what is nearer hides what is farther, across items.
 // Items share the target's context. Programs are compiled when they are first needed. `attachment`: the colour that is
 // drawn to, others are kept; without any, only depth is drawn. Fails on an invalid view, placement or light, and on a GL

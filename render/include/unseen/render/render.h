@@ -14,7 +14,6 @@
 
 #include <unseen/render/context.h>
 #include <unseen/render/depth.h>
-#include <unseen/render/depth_cells.h>
 #include <unseen/render/difference_count.h>
 #include <unseen/render/draw.h>
 #include <unseen/render/elevation.h>

@@ -53,9 +53,6 @@ public:
     // Waits for the GPU. The pixels are the sum's and stay until the next call.
     Result<std::span<const glm::vec4>> mean();
 
-    // The depth of the last draw()'s last sample, until the next draw; none after begin().
-    std::optional<DrawnDepth> drawn_depth() const noexcept;
-
     // The mean relative luminance where it is, on the GPU, for passes that read it: of what was added so far.
     LuminanceTexture mean_luminance() const noexcept;
 

@@ -151,10 +151,6 @@ struct Viewpoint {
     // from the eye, as those of inner_spheres(). The eye is outside of all. Not for criteria of support spheres, which
     // do not contain all that a fold changes.
     std::vector<Sphere> occluders = {};
-    // Interior nodes that fold whatever else is said of them, a bit each, of whole words, lowest first: those that are
-    // found to be hidden, see OcclusionMap. All under one of these should be of them, too. Null: none. A follow() that finds
-    // other ones tests only those that differ. Not for criteria with lit classes.
-    std::shared_ptr<const std::vector<std::uint64_t>> hidden = {};
     Lighting lighting = {}; // for criteria with lit classes; a valid one there
 };
 

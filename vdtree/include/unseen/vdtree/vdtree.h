@@ -37,7 +37,6 @@
 #include <unseen/vdtree/geomorph.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/occluders.h>
-#include <unseen/vdtree/occlusion_map.h>
 #include <unseen/vdtree/view.h>
 
 // Errors and callbacks.

@@ -37,9 +37,6 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
         const bool never = parts.switch_distance[i] <= DistanceCriterion::never_visible;
         switch_distance_[i] = never ? -infinity : always ? infinity : parts.switch_distance[i];
     }
-    const auto hidden_row = static_cast<std::uint16_t>(parts.switch_distance.size() / parts.eccentricity_bins);
-    hidden_rows_ = {hidden_row, hidden_row};
-    switch_distance_.insert(switch_distance_.end(), parts.eccentricity_bins, -infinity);
     view_.switch_distance = switch_distance_;
     view_.bins = static_cast<std::int32_t>(parts.eccentricity_bins);
     view_.bins_per_radian = static_cast<float>(180 / (std::numbers::pi * parts.bin_degrees));
@@ -76,7 +73,6 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         const glm::vec3 towards(glm::dvec3(occluder.centre) - viewpoint.eye);
         view_.occluders.push_back({{towards.x, towards.y, towards.z}, occluder.radius});
     }
-    hidden_ = viewpoint.hidden;
     view_.turn_per_length = static_cast<float>(1 / length_per_radian);
     costs_view_ = view_;
     costs_view_.everybody = true;
@@ -89,8 +85,7 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
     candidate.sphere = arrays_.support ? arrays_.support[node] : around.ring;
     candidate.length = arrays_.lengths ? arrays_.lengths[node] : candidate.sphere.radius;
     candidate.silhouette_length = arrays_.silhouette_lengths ? arrays_.silhouette_lengths[node] : candidate.length;
-    if (is_hidden(node)) candidate.rows = hidden_rows_;
-    else if (arrays_.classes) candidate.rows = arrays_.classes[node];
+    if (arrays_.classes) candidate.rows = arrays_.classes[node];
     candidate.ring = around.ring;
     candidate.slabs = arrays_.facing ? arrays_.facing[node] : around.slabs;
     candidate.flags = around.flags;
@@ -138,10 +133,7 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdi
 }
 
 void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
-    if (!lit_) {
-        vdtree::decide(view_, arrays_, nodes, unfolded);
-        return fold_hidden(nodes, unfolded);
-    }
+    if (!lit_) return vdtree::decide(view_, arrays_, nodes, unfolded);
     std::fill_n(unfolded, (nodes.size() + 63) / 64, 0);
     static_assert(64 % kernel_lanes == 0);
     for_each_batch(view_, nodes, [&](std::size_t first, std::size_t count, const FoldBatch& batch) {
@@ -151,27 +143,14 @@ void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) 
 }
 
 void FoldTester::decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
-    if (!lit_ && !hidden_) return vdtree::decide_range(view_, arrays_, first, count, unfolded);
+    if (!lit_) return vdtree::decide_range(view_, arrays_, first, count, unfolded);
     std::vector<NodeId> nodes(count);
     std::iota(nodes.begin(), nodes.end(), first);
     decide(nodes, unfolded);
 }
 
-void FoldTester::fold_hidden(std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
-    if (!hidden_) return;
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-        if (is_hidden(nodes[i])) unfolded[i / 64] &= ~(std::uint64_t{1} << (i % 64));
-}
-
 void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const {
-    if (!lit_) {
-        vdtree::find_costs(costs_view_, arrays_, cost_tables(), nodes, costs);
-        if (!hidden_) return;
-        fold_hidden(nodes, costs.unfolded);
-        for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (is_hidden(nodes[i])) costs.cost[i] = costs.seen_cost[i] = 0;
-        return;
-    }
+    if (!lit_) return vdtree::find_costs(costs_view_, arrays_, cost_tables(), nodes, costs);
     std::fill_n(costs.unfolded, (nodes.size() + 63) / 64, 0);
     for_each_batch(costs_view_, nodes, [&](std::size_t first, std::size_t count, const FoldBatch& batch) {
         alignas(64) float cost[kernel_lanes], seen_cost[kernel_lanes];
@@ -192,16 +171,12 @@ void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* fo
                                   float* seen_cost) const {
     vdtree::find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost,
                              seen_cost);
-    if (!hidden_) return;
-    for (std::size_t i = 0; i < nodes.size(); ++i)
-        if (is_hidden(nodes[i])) cost[i] = seen_cost[i] = 0;
 }
 
 void FoldTester::decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
     KernelView view = view_;
     view.inverse_threshold = 1 / threshold;
     vdtree::decide(view, arrays_, nodes, unfolded);
-    fold_hidden(nodes, unfolded);
 }
 
 // ---- with lights

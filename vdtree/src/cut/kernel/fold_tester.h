@@ -93,9 +93,6 @@ public:
 private:
     using Lanes = std::span<const FoldCandidate* const>; // of one batch, at most sixteen
 
-    bool is_hidden(NodeId node) const noexcept { return hidden_ && ((*hidden_)[node / 64] >> (node % 64) & 1) != 0; }
-    void fold_hidden(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
-
     template <class F>
     void for_each_batch(const KernelView& view, std::span<const NodeId> nodes, F&& f) const;
     void find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const;
@@ -107,10 +104,8 @@ private:
 
     const DistanceCriterion& criterion_;
     NodeArrays arrays_; // of the tree and the criterion
-    // Of the criterion; infinite where the fold is seen from everywhere. The last row is that of hidden nodes.
+    // The criterion's; infinite where the fold is seen from everywhere.
     std::vector<float> switch_distance_;
-    FoldClass hidden_rows_;
-    std::shared_ptr<const std::vector<std::uint64_t>> hidden_; // of the viewpoint
     KernelView view_, costs_view_;
     std::optional<LitTester> lit_; // where lights give the classes
     bool do_lights_move_ = true;

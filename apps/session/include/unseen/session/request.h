@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <unseen/perception/masking.h>
-#include <unseen/session/hidden_nodes.h>
 #include <unseen/vdtree/depth_picture.h>
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
@@ -58,10 +57,6 @@ struct Request {
     // Of pictures: what this view, and no other, shows. What lies behind that is folded, too: simplify_as_seen() of
     // <unseen/session_gpu/as_seen.h> draws it. Under lights only by the test error.
     std::optional<vdtree::DepthPicture> shown = {};
-    // Of pictures: what an earlier view's picture showed to hide, for eyes within its reach; elsewhere it does not count,
-    // nor where shadows are kept, where light gives the classes of folds, and for tests that count pixels. See
-    // MovingOcclusion of <unseen/session_gpu/moving_occlusion.h>.
-    std::shared_ptr<const HiddenNodes> hidden = {};
     // Of pictures: what the scene of this view, and of no other, masks of each object; by object, or empty: nothing.
     // Counts for the test error, for gazes that are known for sure and where nothing moves over the retina.
     std::vector<perception::MaskingPicture> masking = {};

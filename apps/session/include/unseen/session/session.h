@@ -22,7 +22,6 @@
 #include <unseen/perception/cut_rings.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
-#include <unseen/session/hidden_nodes.h>
 #include <unseen/session/level_chain.h>
 #include <unseen/session/messages.h>
 #include <unseen/session/model_file.h>

@@ -49,9 +49,6 @@ public:
     Result<SceneItems> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
                              const render::DrawOptions& options = {});
 
-    std::optional<render::DrawnDepth>
-    drawn_depth() const noexcept; // by the last draw() in perspective, until the next one
-
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
 
     // Of the last draw; nothing where no light casts shadows. Waits for the GPU.

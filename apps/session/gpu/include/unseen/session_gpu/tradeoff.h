@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <unseen/render/context.h>
@@ -19,6 +20,8 @@ struct TradeoffOptions {
     // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but not below least_samples.
     // Fewer show steps of samples, so V is larger than it is of a finer picture.
     int samples = 64, least_samples = 8;
+    // Measured after the full model, in place of the usual ones: names, and requests of pictures.
+    std::vector<std::pair<std::string, Request>> requests = {};
     std::function<void(double)> progress = {}; // hears what share of the points is done
 };
 
