@@ -192,6 +192,93 @@ std::vector<double> map_errors(const std::vector<float>& map, int map_width, int
     return errors;
 }
 
+// A way to make a map on the GPU.
+struct MapVariant {
+    std::string name; // begins with the recipe
+    const perception::Image& picture;
+    int block = 1;            // each of its pixels stands for so many by so many
+    std::size_t bands = 0;    // at most; 0: all
+    double picture_bytes = 4; // a pixel
+    std::string note = {};
+};
+
+struct GpuMap {
+    std::vector<float> thresholds;
+    double milliseconds = 0; // median
+    std::string note;
+};
+
+class MapMaker {
+public:
+    MapMaker(AccuracySubject& subject, int repeats)
+        : context_(subject.context), observer_(subject.session.observer()), repeats_(repeats) {}
+
+    perception::JudgeOptions judging() const { return session::judge_options(observer_); }
+    perception::Rpg99Options rpg99_options(int width, int block) const {
+        return {.field_degrees = perception::physical_field(display(block), width).value(), .masked_by_both = false};
+    }
+
+    Result<GpuMap> modern(const MapVariant& variant) const {
+        perception::JudgeOptions how = judging();
+        how.display = display(variant.block);
+        if (how.gaze_px) *how.gaze_px /= static_cast<double>(variant.block);
+        const auto [least, most] = std::ranges::minmax(variant.picture.values);
+        auto tables = perception::judge_tables(variant.picture.width, variant.picture.height, least, most, how);
+        if (!tables) return tables.error();
+        if (variant.bands > 0 && tables->bands.size() > variant.bands) tables->bands.resize(variant.bands);
+        auto up = upload(variant.picture);
+        if (!up) return up.error();
+        auto passes = render::VisibilityPasses::create(context_, session::visibility_tables(*tables), up->texture());
+        if (!passes) return passes.error();
+        return timed(*passes, std::to_string(tables->bands.size()) + " bands", [&]() -> Result<void> {
+            if (auto set = passes->set_reference(up->texture()); !set) return set;
+            return passes->map_thresholds();
+        });
+    }
+
+    Result<GpuMap> rpg99(const MapVariant& variant) const {
+        const int width = variant.picture.width, height = variant.picture.height;
+        const auto tables = perception::rpg99_tables(width, rpg99_options(width, variant.block));
+        if (!tables) return tables.error();
+        auto up = upload(variant.picture);
+        if (!up) return up.error();
+        auto passes = render::ElevationPasses::create(context_, width, height, session::elevation_tables(*tables));
+        if (!passes) return passes.error();
+        return timed(*passes, "against rpg99's", [&] { return passes->map_thresholds(up->texture()); });
+    }
+
+private:
+    perception::Display display(int block) const {
+        perception::Display display = observer_.display;
+        if (block > 1)
+            perception::set_pixels_per_degree(
+                display, perception::PixelsPerDegree(perception::pixels_per_degree(display).value() / block));
+        return display;
+    }
+    Result<render::LuminanceImage> upload(const perception::Image& picture) const {
+        return render::LuminanceImage::create(context_, picture.width, picture.height, picture.values);
+    }
+    template <class Passes, class Make>
+    Result<GpuMap> timed(Passes& passes, std::string note, Make&& make) const {
+        GpuMap map{.note = std::move(note)};
+        std::vector<double> times;
+        for (int i = 0; i <= repeats_; ++i) {
+            const auto start = BenchClock::now();
+            if (auto made = make(); !made) return made.error();
+            auto read = passes.read_thresholds();
+            if (!read) return read.error();
+            map.thresholds = std::move(*read);
+            if (i > 0) times.push_back(1e3 * seconds_since(start)); // the first one compiles
+        }
+        map.milliseconds = median(std::move(times));
+        return map;
+    }
+
+    const render::Context& context_;
+    const session::Observer& observer_;
+    int repeats_;
+};
+
 double median_ratio(const perception::Image& map, const perception::Image& other) {
     std::vector<double> ratios;
     for (std::size_t i = 0; i < map.values.size(); ++i)
@@ -268,7 +355,6 @@ Result<AccuracyPoints> csf_points(const AccuracyBenchOptions& options) {
 }
 
 Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    const session::Observer& observer = subject.session.observer();
     auto renderer = session::SceneRenderer::create(subject.context, subject.session);
     if (!renderer) return renderer.error();
     render::DrawOptions drawing;
@@ -277,129 +363,54 @@ Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchO
     const auto whole = session::whole_cuts(subject.session);
     const auto frame = renderer->draw(session::drawn_cuts(whole), subject.view, drawing);
     if (!frame) return frame.error();
-    const perception::Image picture = session::luminance_image(*frame, observer.display);
-    const auto pixels = static_cast<double>(picture.values.size());
-    const perception::JudgeOptions judging = session::judge_options(observer);
+    const perception::Image picture = session::luminance_image(*frame, subject.session.observer().display);
+    const MapMaker maker(subject, std::max(1, options.repeats / 3));
 
+    // The CPU's are the truth.
     AccuracyPoints points;
-    const auto add = [&](const std::string& name, double ms, const std::vector<double>& errors, double bytes,
-                         const std::string& note, bool is_default) {
-        points.push_back({.name = name,
-                          .values = {ms, quantile(errors, 0.99), quantile(errors, 0.5), bytes},
-                          .note = note,
-                          .is_default = is_default});
-    };
-    const auto ms_of = [&](const std::function<Result<void>()>& make) -> Result<double> {
-        std::vector<double> times;
-        for (int i = 0; i <= std::max(1, options.repeats / 3); ++i) {
-            const auto start = BenchClock::now();
-            if (auto made = make(); !made) return made.error();
-            if (i > 0) times.push_back(1e3 * seconds_since(start)); // the first one compiles
-        }
-        return median(std::move(times));
-    };
-    // Display and options of pictures whose pixels are blocks of the picture's.
-    const auto display_of = [&](int block) {
-        perception::Display display = observer.display;
-        if (block > 1)
-            perception::set_pixels_per_degree(
-                display, perception::PixelsPerDegree(perception::pixels_per_degree(display).value() / block));
-        return display;
-    };
-
-    // The CPU's, which are the truth.
     auto start = BenchClock::now();
-    const auto modern = perception::threshold_map_modern(picture, judging);
+    const auto modern = perception::threshold_map_modern(picture, maker.judging());
     if (!modern) return modern.error();
-    add("modern, CPU", 1e3 * seconds_since(start), map_errors(modern->values, modern->width, 1, *modern), 4, "", false);
-    const auto rpg99_options = [&](int width, int block) {
-        return perception::Rpg99Options{.field_degrees = perception::physical_field(display_of(block), width).value(),
-                                        .masked_by_both = false};
-    };
+    points.push_back({.name = "modern, CPU", .values = {1e3 * seconds_since(start), 0, 0, 4}});
     start = BenchClock::now();
-    const auto rpg99 = perception::rpg99_map(picture, picture, rpg99_options(picture.width, 1));
+    const auto rpg99 = perception::rpg99_map(picture, picture, maker.rpg99_options(picture.width, 1));
     if (!rpg99) return rpg99.error();
-    add("rpg99, CPU", 1e3 * seconds_since(start),
-        map_errors(rpg99->threshold.values, rpg99->threshold.width, 1, rpg99->threshold), 4,
-        "thresholds are " + rounded(median_ratio(rpg99->threshold, *modern), 2) + " x modern's at the median pixel",
-        false);
+    points.push_back({.name = "rpg99, CPU",
+                      .values = {1e3 * seconds_since(start), 0, 0, 4},
+                      .note = "thresholds are " + rounded(median_ratio(rpg99->threshold, *modern), 2) +
+                              " x modern's at the median pixel"});
 
+    const perception::Image half = block_means(picture, 2), quarter = block_means(picture, 4),
+                            rounded_picture = in_half_floats(picture);
     const std::string twin = ", a twin: the picture is rounded before";
-    const auto add_modern = [&](const std::string& name, const perception::Image& image, int block, std::size_t bands,
-                                double bytes, bool is_default, const std::string& note = {}) -> Result<void> {
-        perception::JudgeOptions how = judging;
-        how.display = display_of(block);
-        if (how.gaze_px) *how.gaze_px /= static_cast<double>(block);
-        const auto [least, most] = std::ranges::minmax(image.values);
-        auto tables = perception::judge_tables(image.width, image.height, least, most, how);
-        if (!tables) return tables.error();
-        if (bands > 0 && tables->bands.size() > bands) tables->bands.resize(bands);
-        auto up = render::LuminanceImage::create(subject.context, image.width, image.height, image.values);
-        if (!up) return up.error();
-        auto passes =
-            render::VisibilityPasses::create(subject.context, session::visibility_tables(*tables), up->texture());
-        if (!passes) return passes.error();
-        std::vector<float> map;
-        const auto ms = ms_of([&]() -> Result<void> {
-            if (auto set = passes->set_reference(up->texture()); !set) return set;
-            if (auto mapped = passes->map_thresholds(); !mapped) return mapped;
-            auto read = passes->read_thresholds();
-            if (!read) return read.error();
-            map = std::move(*read);
-            return {};
-        });
-        if (!ms) return ms.error();
-        add(name, *ms, map_errors(map, image.width, block, *modern), bytes,
-            std::to_string(tables->bands.size()) + " bands" + note, is_default);
-        return {};
-    };
-    const auto bytes_of = [&](const perception::Image& image, double each) {
-        return each * static_cast<double>(image.values.size()) / pixels;
-    };
-    constexpr double of_picture = 4, of_half = 2, of_map = 4; // bytes
-    const perception::Image half = block_means(picture, 2), quarter = block_means(picture, 4);
-    if (auto ok = add_modern("modern", picture, 1, 0, of_picture + of_map, true); !ok) return ok.error();
-    if (auto ok = add_modern("modern, 16 bits", in_half_floats(picture), 1, 0, of_half + of_map, false, twin); !ok)
-        return ok.error();
-    if (auto ok = add_modern("modern, half the resolution", half, 2, 0, bytes_of(half, of_picture + of_map), false);
-        !ok)
-        return ok.error();
-    if (auto ok = add_modern("modern, a quarter", quarter, 4, 0, bytes_of(quarter, of_picture + of_map), false); !ok)
-        return ok.error();
-    for (const std::size_t bands : {1u, 2u, 3u, 4u, 5u})
-        if (auto ok = add_modern("modern, " + std::to_string(bands) + (bands == 1 ? " band" : " bands"), picture, 1,
-                                 bands, of_picture + of_map, false);
-            !ok)
-            return ok.error();
-
-    const auto add_rpg99 = [&](const std::string& name, const perception::Image& image, int block, double bytes,
-                               const std::string& note = {}) -> Result<void> {
-        const auto tables = perception::rpg99_tables(image.width, rpg99_options(image.width, block));
-        if (!tables) return tables.error();
-        auto up = render::LuminanceImage::create(subject.context, image.width, image.height, image.values);
-        if (!up) return up.error();
-        auto passes = render::ElevationPasses::create(subject.context, image.width, image.height,
-                                                      session::elevation_tables(*tables));
-        if (!passes) return passes.error();
-        std::vector<float> map;
-        const auto ms = ms_of([&]() -> Result<void> {
-            if (auto mapped = passes->map_thresholds(up->texture()); !mapped) return mapped;
-            auto read = passes->read_thresholds();
-            if (!read) return read.error();
-            map = std::move(*read);
-            return {};
-        });
-        if (!ms) return ms.error();
-        add(name, *ms, map_errors(map, image.width, block, rpg99->threshold), bytes, "against rpg99's" + note, false);
-        return {};
-    };
-    if (auto ok = add_rpg99("rpg99", picture, 1, of_picture + of_map); !ok) return ok.error();
-    if (auto ok = add_rpg99("rpg99, 16 bits", in_half_floats(picture), 1, of_half + of_map, twin); !ok)
-        return ok.error();
-    if (auto ok = add_rpg99("rpg99, half the resolution", half, 2, bytes_of(half, of_picture + of_map)); !ok)
-        return ok.error();
-    if (auto ok = add_rpg99("rpg99, a quarter", quarter, 4, bytes_of(quarter, of_picture + of_map)); !ok)
-        return ok.error();
+    const MapVariant variants[] = {{"modern", picture},
+                                   {"modern, 16 bits", rounded_picture, 1, 0, 2, twin},
+                                   {"modern, half the resolution", half, 2},
+                                   {"modern, a quarter", quarter, 4},
+                                   {"modern, 1 band", picture, 1, 1},
+                                   {"modern, 2 bands", picture, 1, 2},
+                                   {"modern, 3 bands", picture, 1, 3},
+                                   {"modern, 4 bands", picture, 1, 4},
+                                   {"modern, 5 bands", picture, 1, 5},
+                                   {"rpg99", picture},
+                                   {"rpg99, 16 bits", rounded_picture, 1, 0, 2, twin},
+                                   {"rpg99, half the resolution", half, 2},
+                                   {"rpg99, a quarter", quarter, 4}};
+    for (const MapVariant& variant : variants) {
+        const bool is_modern = variant.name.starts_with("modern");
+        const auto map = is_modern ? maker.modern(variant) : maker.rpg99(variant);
+        if (!map) return map.error();
+        const std::vector<double> errors =
+            map_errors(map->thresholds, variant.picture.width, variant.block, is_modern ? *modern : rpg99->threshold);
+        constexpr double of_map = 4; // bytes
+        const double share =
+            static_cast<double>(variant.picture.values.size()) / static_cast<double>(picture.values.size());
+        points.push_back({.name = variant.name,
+                          .values = {map->milliseconds, quantile(errors, 0.99), quantile(errors, 0.5),
+                                     share * (variant.picture_bytes + of_map)},
+                          .note = map->note + variant.note,
+                          .is_default = variant.name == "modern"});
+    }
     return points;
 }
 

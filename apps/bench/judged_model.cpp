@@ -99,35 +99,32 @@ Result<session::Simplification> JudgedModel::simplify(Stand& stand, const WhatOp
     return stand.session->simplify(view_, request);
 }
 
-Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const WhatOptions& what, bool wireframe) {
+Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const WhatOptions& what) {
     const auto simplified = simplify(stand, what);
     if (!simplified) return simplified.error();
-    return draw(stand, simplified->cuts.front(), wireframe);
+    return draw(stand, simplified->cuts.front());
 }
 
-Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const vdtree::Cut& cut, bool wireframe) {
+Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const vdtree::Cut& cut) {
     render::DrawOptions options;
     options.samples = samples_to_judge;
     options.background = stand.session->background();
-    options.wireframe = wireframe;
     const auto frame = stand.renderer->draw(cut, view_, options);
     if (!frame) return frame.error();
-    const perception::Display& display = stand.session->observer().display;
-    return Picture{cut.triangle_count(), session::luminance_image(*frame, display),
-                   session::code_image(*frame, display)};
+    return Picture{cut.triangle_count(), session::luminance_image(*frame, stand.session->observer().display)};
 }
 
-Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what, bool wireframe) {
+Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what) {
     const auto stood = stand(what.request.goal.kind == Goal::Kind::full ? FoldTest::luebke_hallen : test_of(what));
     if (!stood) return stood.error();
-    return draw(**stood, what, wireframe);
+    return draw(**stood, what);
 }
 
 Result<const perception::Image*> JudgedModel::full() {
     if (!full_) {
         WhatOptions what;
         what.request.goal = Goal::full();
-        auto drawn = draw(plain_, what, false);
+        auto drawn = draw(plain_, what);
         if (!drawn) return drawn.error();
         full_ = std::move(drawn->luminance);
     }
@@ -159,7 +156,7 @@ Result<perception::Judgement> JudgedModel::judge(const WhatOptions& what, Judge 
 Result<perception::Judgement> JudgedModel::judge(const vdtree::Cut& cut, const std::optional<glm::dvec2>& gaze_px) {
     const auto stood = stand(FoldTest::error);
     if (!stood) return stood.error();
-    const auto picture = draw(**stood, cut, false);
+    const auto picture = draw(**stood, cut);
     if (!picture) return picture.error();
     return judge(*picture, gaze_px, Judge::modern);
 }

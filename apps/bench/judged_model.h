@@ -54,9 +54,8 @@ public:
     struct Picture {
         vdtree::Index triangles = 0;
         perception::Image luminance; // cd/m2
-        perception::Image codes;     // for people
     };
-    Result<Picture> draw(const WhatOptions& what, bool wireframe = false);
+    Result<Picture> draw(const WhatOptions& what);
     // Against the full model, which is drawn once a view.
     Result<Verdicts> judge(const WhatOptions& what); // by all judges
     Result<perception::Judgement> judge(const WhatOptions& what, Judge judge);
@@ -76,8 +75,8 @@ private:
     Result<Stand> make_stand(vdtree::VertexTree tree);
     Result<session::Session> make_session(vdtree::VertexTree tree) const;
     Result<session::Simplification> simplify(Stand& stand, const WhatOptions& what);
-    Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
-    Result<Picture> draw(Stand& stand, const vdtree::Cut& cut, bool wireframe);
+    Result<Picture> draw(Stand& stand, const WhatOptions& what);
+    Result<Picture> draw(Stand& stand, const vdtree::Cut& cut);
     Result<const perception::Image*> full();
     Result<perception::Judgement> judge(const Picture& picture, const std::optional<glm::dvec2>& gaze_px, Judge judge);
 

@@ -237,8 +237,6 @@ Command perception_command(CLI::App& app) {
                      "Published sensitivities, as CSV (default: tests/data in the checkout)")
         ->type_name("FOLDER")
         ->check(CLI::Validator(CLI::ExistingDirectory).description(""));
-    verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")
-        ->type_name("FOLDER");
     verb->add_option("--second-judge", o.second_judge,
                      "Its model of contrast sensitivity: barten-fitted (default), stela, daly, ...")
         ->type_name("MODEL")
@@ -264,8 +262,7 @@ Command perception_command(CLI::App& app) {
     verb->footer(
         "Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
         "Examples:\n  unseen-bench perception --quick\n"
-        "  unseen-bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --pictures judged --json "
-        "perception.json\n"
+        "  unseen-bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --json perception.json\n"
         "  unseen-bench perception --only far,hard");
     return {verb, [a] { return run(*a); }};
 }

@@ -14,10 +14,8 @@
 #include <turning_light.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/render/context.h>
-#include <visibility_map.h>
 
 #include "bench_tools.h"
-#include "drawing.h"
 #include "judged_model.h"
 #include "model_file.h"
 #include "progress_bar.h"
@@ -27,7 +25,6 @@ namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
-using perception::Image;
 using vdtree::Index;
 
 constexpr FoldTest tests[] = {FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error};
@@ -83,95 +80,11 @@ struct Judged {
 
 using Models = std::vector<std::unique_ptr<JudgedModel>>;
 
-// ---- pictures
-
-Image halved(const Image& image) {
-    Image half{image.width / 2, image.height / 2, image.channels, {}};
-    half.values.resize(static_cast<std::size_t>(half.width) * static_cast<std::size_t>(half.height) *
-                       static_cast<std::size_t>(half.channels));
-    for (int y = 0; y < half.height; ++y)
-        for (int x = 0; x < half.width; ++x)
-            for (int c = 0; c < half.channels; ++c)
-                half.at(x, y, c) = 0.25f * (image.at(2 * x, 2 * y, c) + image.at(2 * x + 1, 2 * y, c) +
-                                            image.at(2 * x, 2 * y + 1, c) + image.at(2 * x + 1, 2 * y + 1, c));
-    return half;
-}
-
-Image fitted(Image image, int side) {
-    while (image.width > side && image.width > 1 && image.height > 1) image = halved(image);
-    return image;
-}
-
-// Rows of pictures with a line of text each.
-class Sheet {
-public:
-    static constexpr int side = 512; // at most, in pixels
-
-    void add_row(std::string text, std::vector<Image> pictures) {
-        rows_.push_back({std::move(text), std::move(pictures)});
-    }
-
-    Result<void> write(const fs::path& file) const {
-        if (rows_.empty()) return {};
-        constexpr int gap = 10, text_height = 17, line = 24; // pixels
-        int width = 0, height = gap;
-        for (const Row& row : rows_) {
-            width = std::max({width, gap + static_cast<int>(row.pictures.size()) * (row.pictures.front().width + gap),
-                              2 * gap + static_cast<int>(std::ceil(Drawing::text_width(row.text, text_height)))});
-            height += line + row.pictures.front().height + gap;
-        }
-        auto drawing = Drawing::create(width, height, glm::vec3(0.12f));
-        if (!drawing) return drawing.error();
-        int top = gap;
-        for (const Row& row : rows_) {
-            drawing->text({gap, top}, row.text, glm::vec3(0.95f), text_height);
-            int left = gap;
-            for (const Image& picture : row.pictures) {
-                drawing->picture({left, top + line}, picture);
-                left += picture.width + gap;
-            }
-            top += line + row.pictures.front().height + gap;
-        }
-        return drawing->write(file);
-    }
-
-private:
-    struct Row {
-        std::string text;
-        std::vector<Image> pictures;
-    };
-    std::vector<Row> rows_;
-};
-
 WhatOptions what_of(FoldTest test, const Look& look) {
     WhatOptions what;
     what.request.fold_test = test;
     what.gaze_px = look.gaze_px;
     return what;
-}
-
-std::string words(const Judged& judged, const JudgedModel& model) {
-    return model.name() + ", " + judged.look.text + ", " + name_of(judged.test) + ": " +
-           grouped(judged.verdicts.triangles) + " of " + grouped(model.triangles()) + " triangles, " +
-           grouped(judged.verdicts.visible_pixels[0]) + " pixels visible, V " + rounded(judged.verdicts.largest[0], 3);
-}
-
-// The full model, the cut, its triangles, and what the judge sees.
-Result<void> add_exhibit(Sheet& sheet, JudgedModel& model, const Judged& judged) {
-    if (auto looked = look(model, judged.look); !looked) return looked;
-    WhatOptions full, what = what_of(judged.test, judged.look);
-    full.request.goal = Goal::full();
-    std::vector<Image> pictures;
-    for (const auto& [wish, wireframe] : {std::pair{&full, false}, std::pair{&what, false}, std::pair{&what, true}}) {
-        auto drawn = model.draw(*wish, wireframe);
-        if (!drawn) return drawn.error();
-        pictures.push_back(fitted(std::move(drawn->codes), Sheet::side));
-    }
-    const auto judgement = model.judge(what, Judge::modern);
-    if (!judgement) return judgement.error();
-    pictures.push_back(fitted(visibility_map(judgement->visibility), Sheet::side));
-    sheet.add_row(words(judged, model), std::move(pictures));
-    return {};
 }
 
 // ---- sums over views
@@ -284,10 +197,17 @@ private:
         return add(file.stem().string(), std::move(*tree));
     }
     Result<void> add(std::string name, vdtree::VertexTree tree) {
+        return add(models_, std::move(name), std::move(tree));
+    }
+    Result<void> add_hard(Models& models, const HardMesh& mesh) {
+        auto tree = build_hard_tree(mesh);
+        return tree ? add(models, mesh.name, std::move(*tree)) : tree.error();
+    }
+    Result<void> add(Models& models, std::string name, vdtree::VertexTree tree) {
         auto model = JudgedModel::create(*context_, std::move(name), std::move(tree), options_.window_px, second_,
                                          options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
         if (!model) return model.error();
-        models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+        models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         return {};
     }
 
@@ -367,98 +287,77 @@ private:
         }
     }
 
-    Result<void> write_sheet(const Sheet& sheet, const char* name) const {
-        return options_.pictures.empty() ? Result<void>() : sheet.write(fs::path(options_.pictures) / name);
-    }
-    // The worst view of each test.
-    Result<void> write_worst(const std::vector<Judged>& found, Models& models, const char* name) {
-        if (options_.pictures.empty()) return {};
-        Sheet sheet;
-        for (const FoldTest test : tests)
-            if (const Totals t = total(found, test, 0); t.worst)
-                if (auto added = add_exhibit(sheet, *models[t.worst->model], *t.worst); !added) return added;
-        return write_sheet(sheet, name);
-    }
-
     // ---- what is saved against the baseline
 
+    // Of one setting and test.
+    struct Saved {
+        std::vector<Judged> views;
+        std::vector<double> triangles; // by model, the mean of the directions
+    };
     struct Setting {
         double gaze, fill;
+        std::array<Saved, std::size(tests)> by_test;
     };
 
     Result<void> savings() {
-        std::vector<Judged> found;
-        const auto wanted = wanted_fills();
-        const std::size_t all = main_models_ * std::size(gazes) * wanted.size() * direction_count();
-        std::size_t done = 0;
-        // By setting, test, and model: the mean of the directions.
-        struct Cell {
-            std::vector<Judged> views;
-            std::vector<double> triangles; // by model
-        };
         std::vector<Setting> settings;
         for (const double gaze : gazes)
-            for (const double fill : wanted) settings.push_back({gaze, fill});
-        std::vector<std::array<Cell, std::size(tests)>> cells(settings.size());
-        for (auto& of_tests : cells)
-            for (Cell& cell : of_tests) cell.triangles.assign(main_models_, 0);
-        for (std::size_t model = 0; model < main_models_; ++model) {
-            for (std::size_t f = 0; f < wanted.size(); ++f) {
-                for (std::size_t d = 0; d < direction_count(); ++d) {
-                    for (std::size_t s = f; s < settings.size();
-                         s += wanted.size()) { // the gazes: the full model is drawn once for all
-                        progress(done++, all, "savings");
-                        const std::size_t first = found.size();
-                        if (auto ok = judge("savings", models_, model,
-                                            look(directions[d], settings[s].fill, settings[s].gaze), found);
-                            !ok)
-                            return ok;
-                        for (std::size_t t = 0; t < std::size(tests); ++t) {
-                            cells[s][t].views.push_back(found[first + t]);
-                            cells[s][t].triangles[model] +=
-                                found[first + t].verdicts.triangles / static_cast<double>(direction_count());
-                        }
-                    }
-                }
-            }
-        }
+            for (const double fill : wanted_fills()) settings.push_back({gaze, fill, {}});
+        std::vector<Judged> found;
+        if (auto judged = judge_savings(settings, found); !judged) return judged;
         BenchTable details{
             "Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " +
                 std::to_string(main_models_) +
                 " meshes; what can be seen of it in the worst view; V, and by the second judge",
             {{"setting", "test", "triangles", "over luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
-        for (std::size_t s = 0; s < settings.size(); ++s) {
-            const std::string where = gaze_name(settings[s].gaze) + ", " + percent(settings[s].fill);
-            for (std::size_t t = 0; t < std::size(tests); ++t) {
-                const Cell &cell = cells[s][t], &base = cells[s][0];
-                double fewer = 0, kept = 0;
-                std::string note;
-                for (std::size_t m = 0; m < main_models_; ++m) {
-                    fewer += base.triangles[m] / cell.triangles[m] / static_cast<double>(main_models_);
-                    kept += cell.triangles[m] / static_cast<double>(main_models_);
-                    note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " +
-                            thousands(cell.triangles[m]);
-                }
-                const Totals first = total(cell.views, tests[t], 0), second = total(cell.views, tests[t], 1);
-                details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3),
-                                        grouped(first.pixels), rounded(first.largest, 2), grouped(second.pixels),
-                                        rounded(second.largest, 2)});
-                if (tests[t] == baseline) continue;
-                BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, true, 2};
-                if (tests[t] == promised) row.target = target("fewer triangles, " + where + ", x");
-                result_.rows.push_back(std::move(row));
-            }
-        }
+        for (const Setting& setting : settings)
+            for (std::size_t t = 0; t < std::size(tests); ++t) add_saved(setting, t, details);
         result_.details.push_back(std::move(details));
-        add_visibility_rows("these " + std::to_string(all) + " views", found, models_);
-        if (options_.pictures.empty()) return {};
-        Sheet sheet;
-        for (const double gaze : {0.0, gaze_degrees})
-            for (const Judged& one : found)
-                if (one.model == 0 && one.look.text == look(directions[0], wanted[0], gaze).text &&
-                    one.test != FoldTest::luebke_hallen_safe)
-                    if (auto added = add_exhibit(sheet, *models_[0], one); !added) return added;
-        return write_sheet(sheet, "savings.png");
+        add_visibility_rows("these " + std::to_string(found.size() / std::size(tests)) + " views", found, models_);
+        return {};
+    }
+
+    Result<void> judge_savings(std::vector<Setting>& settings, std::vector<Judged>& found) {
+        for (Setting& setting : settings)
+            for (Saved& saved : setting.by_test) saved.triangles.assign(main_models_, 0);
+        const std::size_t all = main_models_ * settings.size() * direction_count();
+        for (std::size_t model = 0; model < main_models_; ++model)
+            for (const double fill : wanted_fills())
+                for (std::size_t d = 0; d < direction_count(); ++d)
+                    for (Setting& setting : settings) { // gazes inside: the full model is drawn once for all
+                        if (setting.fill != fill) continue;
+                        progress(found.size() / std::size(tests), all, "savings");
+                        const std::size_t first = found.size();
+                        if (auto ok = judge("savings", models_, model, look(directions[d], fill, setting.gaze), found);
+                            !ok)
+                            return ok;
+                        for (std::size_t t = 0; t < std::size(tests); ++t) {
+                            setting.by_test[t].views.push_back(found[first + t]);
+                            setting.by_test[t].triangles[model] +=
+                                found[first + t].verdicts.triangles / static_cast<double>(direction_count());
+                        }
+                    }
+        return {};
+    }
+
+    void add_saved(const Setting& setting, std::size_t t, BenchTable& details) {
+        const std::string where = gaze_name(setting.gaze) + ", " + percent(setting.fill);
+        const Saved &saved = setting.by_test[t], &base = setting.by_test[0];
+        double fewer = 0, kept = 0;
+        std::string note;
+        for (std::size_t m = 0; m < main_models_; ++m) {
+            fewer += base.triangles[m] / saved.triangles[m] / static_cast<double>(main_models_);
+            kept += saved.triangles[m] / static_cast<double>(main_models_);
+            note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " +
+                    thousands(saved.triangles[m]);
+        }
+        const Totals first = total(saved.views, tests[t], 0), second = total(saved.views, tests[t], 1);
+        details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3), grouped(first.pixels),
+                                rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
+        if (tests[t] == baseline) return;
+        BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, true, 2};
+        if (tests[t] == promised) row.target = target("fewer triangles, " + where + ", x");
+        result_.rows.push_back(std::move(row));
     }
 
     // ---- random views
@@ -477,6 +376,37 @@ private:
         return order;
     }
 
+    // `uniform`: draws a number between two.
+    template <class Uniform>
+    Look random_look(std::size_t i, Uniform&& uniform) const {
+        const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
+        const double fill = 0.03 * std::pow(50.0, uniform(0, 1)); // 3% to 150%
+        Look how = look({across * std::cos(turn), across * std::sin(turn), z}, fill, 0);
+        if (i % 3 == 2) {
+            how.view.fov_degrees = uniform(10, 70);
+            how.text += ", field " + rounded(*how.view.fov_degrees, 3);
+        }
+        perception::Display display;
+        std::optional<perception::Luminance> background;
+        if (i % 4 >= 2) {
+            const double ppd = 20 * std::pow(6.0, uniform(0, 1)); // to 120
+            set_pixels_per_degree(display, perception::PixelsPerDegree(ppd));
+            if (uniform(0, 1) < 0.5) display.peak = perception::Luminance(1000);
+            background = to_luminance(display, std::pow(uniform(0, 1), 3));
+            how.text += ", " + rounded(ppd, 3) + " pixels per degree, " + rounded(display.peak.value(), 4) +
+                        " cd/m2, before " + rounded(background->value(), 3);
+        }
+        how.around = {display, background};
+        if (i % 2) {
+            const double degrees = uniform(0, 70), where = uniform(0, 2 * std::numbers::pi);
+            const glm::dvec2 centre(options_.window_px * 0.5);
+            const double px = session::gaze_aside(display, window(), degrees).x - centre.x;
+            how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
+            how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(degrees, 3) + " degrees aside");
+        }
+        return how;
+    }
+
     // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside. Of the models, and
     // of regular waves drawn at random, which no factor was fitted on.
     Result<void> random_views() {
@@ -490,48 +420,19 @@ private:
             const double waves = 2 * std::pow(16.0, uniform(0, 1)), height = 0.0005 * std::pow(64.0, uniform(0, 1));
             HardMesh mesh = waved_square(options_.quick ? 3'000 : 60'000, height, waves);
             mesh.name = rounded(waves, 3) + " waves " + rounded(height, 2) + " high";
-            auto tree = build_hard_tree(mesh);
-            if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
-            if (!model) return model.error();
-            models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+            if (auto added = add_hard(models_, mesh); !added) return added;
         }
         const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
         const std::vector<std::size_t> order = models_of_random_views(count, models_);
         std::vector<Judged> found;
         for (std::size_t i = 0; i < count; ++i) {
             progress(i, count, "random views");
-            const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
-            const double fill = 0.03 * std::pow(50.0, uniform(0, 1)); // 3% to 150%
-            Look how = look({across * std::cos(turn), across * std::sin(turn), z}, fill, 0);
-            if (i % 3 == 2) {
-                how.view.fov_degrees = uniform(10, 70);
-                how.text += ", field " + rounded(*how.view.fov_degrees, 3);
-            }
-            perception::Display display;
-            std::optional<perception::Luminance> background;
-            if (i % 4 >= 2) {
-                const double ppd = 20 * std::pow(6.0, uniform(0, 1)); // to 120
-                set_pixels_per_degree(display, perception::PixelsPerDegree(ppd));
-                if (uniform(0, 1) < 0.5) display.peak = perception::Luminance(1000);
-                background = to_luminance(display, std::pow(uniform(0, 1), 3));
-                how.text += ", " + rounded(ppd, 3) + " pixels per degree, " + rounded(display.peak.value(), 4) +
-                            " cd/m2, before " + rounded(background->value(), 3);
-            }
-            how.around = {display, background};
-            if (i % 2) {
-                const double degrees = uniform(0, 70), where = uniform(0, 2 * std::numbers::pi);
-                const glm::dvec2 centre(options_.window_px * 0.5);
-                const double px = session::gaze_aside(display, window(), degrees).x - centre.x;
-                how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
-                how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(degrees, 3) + " degrees aside");
-            }
+            const Look how = random_look(i, uniform);
             if (auto ok = judge("random", models_, order[i], how, found); !ok) return ok;
         }
         add_visibility_rows(std::to_string(count) + " random views, seed " + std::to_string(seed), found, models_);
-        auto written = write_worst(found, models_, "random.png");
         models_.resize(own);
-        return written;
+        return {};
     }
 
     // ---- where the viewer looks
@@ -542,12 +443,7 @@ private:
         for (std::size_t m = 0; m < main_models_; ++m) models.push_back(std::move(models_[m]));
         for (const HardMesh& mesh : open_sheets(options_.quick ? 3'000 : 60'000)) {
             if (mesh.name.find("waves") == mesh.name.npos) continue;
-            auto tree = build_hard_tree(mesh);
-            if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_,
-                                             options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
-            if (!model) return model.error();
-            models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+            if (auto added = add_hard(models, mesh); !added) return added;
             if (options_.quick) break;
         }
         const double near_and_far[] = {0.9, 0.3}; // of the window's height
@@ -649,7 +545,7 @@ private:
             found.insert(found.end(), here.begin(), here.end());
         }
         add_visibility_rows("far away", found, models_);
-        return write_worst(found, models_, "far.png");
+        return {};
     }
 
     // ---- meshes made to be hard
@@ -658,12 +554,7 @@ private:
         Models hard_models;
         const int triangles = options_.quick ? 3'000 : 24'000;
         for (const HardMesh& mesh : hard_meshes(triangles)) {
-            auto tree = build_hard_tree(mesh);
-            if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_,
-                                             options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
-            if (!model) return model.error();
-            hard_models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+            if (auto added = add_hard(hard_models, mesh); !added) return added;
         }
         const std::vector<double> distances = options_.quick ? std::vector{0.85} : std::vector{0.85, 0.3, 0.08};
         const glm::dvec3 direction(0.3, 0.5, 1);
@@ -678,7 +569,6 @@ private:
         BenchTable details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V "
                            "of the second judge",
                            {{"mesh", "test", "kept", "visible", "largest V", "second: visible", "V"}}};
-        std::vector<Judged> worst;
         for (std::size_t m = 0; m < hard_models.size(); ++m) {
             std::vector<Judged> of_mesh;
             for (const Judged& one : found)
@@ -691,16 +581,11 @@ private:
                         kept += one.verdicts.triangles / static_cast<double>(first.views) / hard_models[m]->triangles();
                 details.rows.push_back({hard_models[m]->name(), name_of(test), percent(kept), grouped(first.pixels),
                                         rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
-                if (test == promised) worst.push_back(*first.worst);
             }
         }
         result_.details.push_back(std::move(details));
         add_visibility_rows("hard meshes", found, hard_models);
-        if (options_.pictures.empty()) return {};
-        Sheet sheet;
-        for (const Judged& one : worst)
-            if (auto added = add_exhibit(sheet, *hard_models[one.model], one); !added) return added;
-        return write_sheet(sheet, "hard.png");
+        return {};
     }
 
     // ---- a tolerance in pixels
@@ -825,7 +710,7 @@ private:
     // ---- models of sight
 
     SensitivityBenchOptions sensitivity_options() const {
-        return {options_.reference, options_.pictures, options_.quick, options_.targets};
+        return {options_.reference, options_.quick, options_.targets};
     }
     Result<void> add(Result<std::vector<BenchRow>> rows) {
         if (!rows) return rows.error();
@@ -935,13 +820,6 @@ private:
 } // namespace
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options) {
-    if (!options.pictures.empty()) {
-        std::error_code failed;
-        fs::create_directories(options.pictures, failed);
-        if (failed)
-            return Error{ErrorCode::io_failure,
-                         "Cannot make the folder '" + options.pictures + "': " + failed.message() + "."};
-    }
     const auto second =
         options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
     if (!second) return second.error();

@@ -19,7 +19,6 @@ struct PerceptionBenchOptions {
         meshes; // of all groups; empty: bunny and dragon where they are installed, or a sphere with bumps
     std::vector<std::string> others; // in the random views and far away, too
     std::vector<std::string> only;   // of perception_groups; empty: all
-    std::string pictures;            // a folder for a picture of each group; empty: none
     std::string reference;           // a folder of published sensitivities; empty: the checkout's own
     std::string second_judge;        // its model of contrast sensitivity; empty: Barten's, fitted
     bool judges_on_gpu = false;
@@ -37,13 +36,12 @@ struct PerceptionBenchResult {
     Json views = Json::array();      // every view that was judged
 };
 
-// Needs OpenGL, but for the groups csf and observers. The picture files are replaced.
+// Needs OpenGL, but for the groups csf and observers.
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options);
 
 // The groups that need no pictures (csf, observers): rows only.
 struct SensitivityBenchOptions {
     std::string reference;
-    std::string pictures;
     bool quick = false;
     Targets targets = Targets::built_in();
 };

@@ -20,7 +20,6 @@
 #include <unseen/vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
-#include "log_log_plot.h"
 #include "perception_bench.h"
 #include "progress_bar.h"
 #include "terminal.h"
@@ -212,36 +211,6 @@ double largest_table_error(CsfModel model, int places) {
     return largest;
 }
 
-Result<void> plot_models(const fs::path& file) {
-    LogLogPlot plot;
-    plot.title =
-        "Contrast sensitivity at 100 cd/m2, of patches of 1.5 cycles radius: fovea, and dashed 20 degrees aside";
-    plot.x_label = "cycles per degree";
-    plot.y_label = "sensitivity";
-    plot.x_range = {0.25, 64};
-    const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.1f, 0.6f, 0.7f}, {0.8f, 0.2f, 0.1f}, {0.6f, 0.4f, 0.1f},
-                                 {0.9f, 0.6f, 0.1f}, {0.4f, 0.6f, 0.1f}, {0.5f, 0.5f, 0.5f}, {0.6f, 0.2f, 0.6f}};
-    std::size_t colour = 0;
-    for (const CsfModel model : perception::csf_models) {
-        if (!perception::is_achromatic(model)) continue;
-        for (const double degrees : {0.0, 20.0}) {
-            Curve curve{degrees > 0 ? "" : std::string(perception::name(model)),
-                        colours[colour % std::size(colours)],
-                        degrees > 0,
-                        {}};
-            for (double octave = -2; octave <= 6; octave += 0.05) {
-                const double cpd = std::exp2(octave);
-                const double s = perception::sensitivity(
-                    model, perception::stimulus_of({}, CyclesPerDegree(cpd), Degrees(degrees), Luminance(100)));
-                if (s > plot.y_range.x && s < plot.y_range.y) curve.points.push_back({cpd, s});
-            }
-            plot.curves.push_back(std::move(curve));
-        }
-        ++colour;
-    }
-    return write_plot(file, plot);
-}
-
 // ---- observers
 
 // The last four are of other shapes than the castleCSF that is expected of everybody.
@@ -274,35 +243,6 @@ struct ObserverErrors {
     std::string observer;
     double mean = 0, worst = 0;
 };
-
-Result<void> plot_observer(const fs::path& file, const calibration::Procedure& procedure,
-                           const calibration::SimulatedObserver& observer, const std::string& name) {
-    LogLogPlot plot;
-    plot.title = "Sensitivity of the simulated observer " + name + ", and dashed as calibrated in " +
-                 std::to_string(procedure.answers().size()) + " trials";
-    plot.x_label = "cycles per degree";
-    plot.y_label = "sensitivity";
-    plot.x_range = {0.4, 20};
-    const auto made = procedure.table(name);
-    if (!made) return made.error();
-    const CsfTable& table = *made;
-    const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.8f, 0.2f, 0.1f}, {0.3f, 0.6f, 0.1f}, {0.5f, 0.3f, 0.6f}};
-    std::size_t colour = 0;
-    for (const double degrees : {0.0, 5.0, 10.0, 20.0}) {
-        Curve truth{rounded(degrees, 2) + " degrees", colours[colour], false, {}}, found{"", colours[colour], true, {}};
-        for (double octave = -1; octave <= 4; octave += 0.05) {
-            const double cpd = std::exp2(octave);
-            const double s = observer.sensitivity({cpd, degrees}, procedure.plan().luminance);
-            const double t = table.sensitivity(CyclesPerDegree(cpd), Degrees(degrees), procedure.plan().luminance);
-            if (s > plot.y_range.x && s < plot.y_range.y) truth.points.push_back({cpd, s});
-            if (t > plot.y_range.x && t < plot.y_range.y) found.points.push_back({cpd, t});
-        }
-        plot.curves.push_back(std::move(truth));
-        plot.curves.push_back(std::move(found));
-        ++colour;
-    }
-    return write_plot(file, plot);
-}
 
 BenchRow observer_row(const std::string& name, const std::vector<ObserverErrors>& errors, bool of_worst_run,
                       const Target& target) {
@@ -359,8 +299,6 @@ Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options) 
         if (!(error <= *tables.value)) tables.value = error;
     }
     rows.push_back(std::move(tables));
-    if (!options.pictures.empty())
-        if (auto plotted = plot_models(fs::path(options.pictures) / "csf.png"); !plotted) return plotted.error();
     return rows;
 }
 
@@ -393,11 +331,6 @@ Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& opt
                 procedure->choose(observer->choose(procedure->next(), plan.luminance));
             }
             note(of_many);
-            if (run > 1 || !at_many.empty() || options.pictures.empty()) continue;
-            if (auto plotted =
-                    plot_observer(fs::path(options.pictures) / "observer.png", *procedure, *observer, description);
-                !plotted)
-                return plotted.error();
         }
         at_few.push_back(std::move(of_few));
         at_many.push_back(std::move(of_many));

@@ -55,7 +55,8 @@ TEST_F(BenchCommandTest, ComparesClusterersAndRepair) {
     write_text(path("pages.obj"), "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
     const Outcome outcome = bench({"libraries", "ball.obj", "pages.obj", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const Json report = outcome.json(), rows = report["rows"];
+    const Json report = outcome.json();
+    const Json& rows = report["rows"];
     ASSERT_EQ(rows.size(), 12u); // two meshes, as they are and repaired, three clusterers
     EXPECT_EQ(rows[0]["clusterer"], "quadric");
     EXPECT_EQ(rows[0]["triangles"], 1472);

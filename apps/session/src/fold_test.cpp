@@ -333,7 +333,7 @@ bool find_shadowing_outlines(const Sight& sight, const Decision& decision,
     ShadowState& state = shadow_of(sight);
     const bool is_new = state.of != base || state.lighting != still || state.threshold != threshold;
     if (is_new) {
-        state = {base, still, {}, nullptr, threshold, {}, nullptr, nullptr};
+        state = {base, still, {}, nullptr, threshold, {}, nullptr};
         state.shifts = is_measured ? outline_shifts(tree, parts.silhouette_lengths, parts.facing, still.get())
                                    : outline_shifts(tree, tree.displacement(), {}, nullptr);
     }
