@@ -314,6 +314,43 @@ std::vector<bool> accuracy_front(const std::vector<AccuracyPoint>& points, std::
     return front;
 }
 
+namespace {
+
+Result<void> add(AccuracyBenchResult& result, const AccuracyAxis& axis, const std::string& subject,
+                 Result<AccuracyPoints> points) {
+    if (!points)
+        return Error{points.error().code,
+                     axis.name + (subject.empty() ? "" : " of " + subject) + ": " + points.error().message};
+    for (AccuracyPoint& point : *points) {
+        point.axis = axis.key;
+        if (point.subject.empty()) point.subject = subject;
+        point.values.resize(axis.columns.size(), std::numeric_limits<double>::quiet_NaN());
+        result.points.push_back(std::move(point));
+    }
+    return {};
+}
+
+// Along each axis that takes it; `begin` hears of each.
+Result<void> measure(LoadedSubject& loaded, const std::vector<const AxisMeasure*>& axes,
+                     const AccuracyBenchOptions& options, const std::function<void(const AxisMeasure&)>& begin,
+                     AccuracyBenchResult& result) {
+    for (const AxisMeasure* axis : axes) {
+        begin(*axis);
+        if (axis->of == Of::nothing || !axis->takes(loaded.subject.is_scene)) continue;
+        const auto start = BenchClock::now();
+        if (auto ok = add(result, axis->axis, loaded.subject.name, axis->measure(loaded.subject, options)); !ok)
+            return ok;
+        for (std::string& what : std::exchange(loaded.subject.left_out, {}))
+            result.gaps.push_back({axis->axis.key, loaded.subject.name, std::move(what)});
+        result.json["seconds"].push_back({{"axis", axis->axis.key},
+                                          {"subject", loaded.subject.name},
+                                          {"seconds", number_or_null(seconds_since(start))}});
+    }
+    return {};
+}
+
+} // namespace
+
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) {
     const std::vector<const AxisMeasure*> axes = wanted_axes(options);
     std::vector<std::string> models = options.models;
@@ -329,26 +366,12 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
     auto context = render::Context::headless();
     if (!context) return context.error();
     AccuracyBenchResult result;
-    Json seconds = Json::array(); // that the benchmark took
+    result.json["seconds"] = Json::array(); // that the benchmark took
     for (const AxisMeasure* axis : axes) result.axes.push_back(axis->axis);
-    const auto add = [&](const AccuracyAxis& axis, const std::string& subject,
-                         Result<AccuracyPoints> points) -> Result<void> {
-        if (!points)
-            return Error{points.error().code,
-                         axis.name + (subject.empty() ? "" : " of " + subject) + ": " + points.error().message};
-        for (AccuracyPoint& point : *points) {
-            point.axis = axis.key;
-            if (point.subject.empty()) point.subject = subject;
-            point.values.resize(axis.columns.size(), std::numeric_limits<double>::quiet_NaN());
-            result.points.push_back(std::move(point));
-        }
-        return {};
-    };
     for (const AxisMeasure* axis : axes)
         if (axis->of == Of::nothing)
-            if (auto ok = add(axis->axis, "", axis->measure_alone(options)); !ok) return ok.error();
-    const bool needs_models = std::ranges::any_of(axes, [](const AxisMeasure* a) { return a->of != Of::nothing; });
-    if (!needs_models) models.clear();
+            if (auto ok = add(result, axis->axis, "", axis->measure_alone(options)); !ok) return ok.error();
+    if (std::ranges::all_of(axes, [](const AxisMeasure* a) { return a->of == Of::nothing; })) models.clear();
     ProgressBar bar("Measuring");
     const double steps = static_cast<double>(models.size() * (axes.size() + 1));
     double step = 0;
@@ -356,28 +379,17 @@ Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions& options) 
         bar(step++ / steps, "loading");
         auto loaded = load_subject(file, *context, options);
         if (!loaded) return loaded.error();
-        for (const AxisMeasure* axis : axes) {
-            bar(step++ / steps, axis->axis.name.c_str());
-            if (axis->of == Of::nothing || !axis->takes(loaded->subject.is_scene)) continue;
-            const auto start = BenchClock::now();
-            if (auto ok = add(axis->axis, loaded->subject.name, axis->measure(loaded->subject, options)); !ok)
-                return ok.error();
-            for (std::string& what : std::exchange(loaded->subject.left_out, {}))
-                result.gaps.push_back({axis->axis.key, loaded->subject.name, std::move(what)});
-            seconds.push_back({{"axis", axis->axis.key},
-                               {"subject", loaded->subject.name},
-                               {"seconds", number_or_null(seconds_since(start))}});
-        }
+        const auto begin = [&](const AxisMeasure& axis) { bar(step++ / steps, axis.axis.name.c_str()); };
+        if (auto ok = measure(*loaded, axes, options, begin, result); !ok) return ok.error();
     }
-    // Levels and pictures of depth are of scenes alone, and other axes of meshes.
+    // Levels are of scenes alone, and other axes of meshes.
     std::erase_if(result.axes, [&](const AccuracyAxis& axis) {
         return std::ranges::find(result.points, axis.key, &AccuracyPoint::axis) == result.points.end();
     });
     find_fronts(result.axes, result.points);
     result.tables.push_back(defaults_table(result.axes, result.points));
     for (const AccuracyAxis& axis : result.axes) result.tables.push_back(axis_table(axis, result.points, result.gaps));
-    result.json = to_json(result);
-    result.json["seconds"] = std::move(seconds);
+    result.json.update(to_json(result));
     return result;
 }
 

@@ -254,106 +254,192 @@ struct Cone {
     }
 };
 
+// The leaves of some nodes, and the smallest radius around each.
+class SphereSets {
+public:
+    SphereSets(const vdtree::SoundTree& tree, const AccuracyBenchOptions& options)
+        : tree_(tree), repeats_(std::max(1, options.repeats / 3)) {
+        // Of fewer points all spheres are alike; more points take exact arithmetic too long.
+        constexpr Index fewest = 5, most = 1000;
+        nodes_ = some_nodes(tree, options.nodes, [&](NodeId node) {
+            const Index leaves = tree.leaf_end()[node] - tree.first_leaf()[node];
+            return leaves >= fewest && leaves <= most && tree.support_spheres()[node].radius > 0;
+        });
+        for (const NodeId node : nodes_) {
+            std::vector<glm::dvec3>& set = sets_.emplace_back();
+            for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf)
+                set.emplace_back(tree.positions()[tree.interior_count() + leaf]);
+            points_in_all_ += set.size();
+        }
+    }
+
+    bool empty() const { return nodes_.empty(); }
+    std::string size() const {
+        return std::to_string(nodes_.size()) + " nodes, " + std::to_string(points_in_all_ / nodes_.size()) +
+               " points on the average";
+    }
+
+    struct Made {
+        std::vector<DSphere> spheres;
+        double us = 0; // a node
+    };
+    Made make(const std::function<DSphere(std::span<const glm::dvec3>)>& around, int repeats = 0) const {
+        Made made{std::vector<DSphere>(sets_.size())};
+        std::vector<double> times;
+        for (int k = 0; k < (repeats > 0 ? repeats : repeats_); ++k) {
+            const auto start = BenchClock::now();
+            for (std::size_t i = 0; i < sets_.size(); ++i) made.spheres[i] = around(sets_[i]);
+            times.push_back(us_since(start));
+        }
+        made.us = median(std::move(times));
+        return made;
+    }
+
+    // As the builder does it: of children's spheres, several nodes at a time, and rounded outward to floats.
+    Made make_own() const {
+        constexpr double slack = 1e-3; // node_slack of bound_spheres.cpp
+        constexpr std::size_t lanes = vdtree::BallLanes::lanes;
+        vdtree::BallLanes balls;
+        std::array<vdtree::Sphere, lanes> out;
+        const auto start = BenchClock::now();
+        for (std::size_t i = 0; i < nodes_.size(); i += lanes) {
+            const std::size_t used = std::min(lanes, nodes_.size() - i);
+            for (std::size_t lane = 0; lane < used; ++lane) {
+                balls.begin(lane, tree_.positions()[nodes_[i + lane]]);
+                tree_.for_each_child(nodes_[i + lane], [&](NodeId child) {
+                    if (tree_.is_leaf(child)) balls.add(lane, tree_.positions()[child]);
+                    else balls.add(lane, tree_.support_spheres()[child]);
+                });
+            }
+            balls.enclose(slack, std::span(out).first(used));
+        }
+        Made made{{}, us_since(start)};
+        for (const NodeId node : nodes_) {
+            const vdtree::Sphere& s = tree_.support_spheres()[node];
+            made.spheres.push_back({glm::dvec3(s.centre), static_cast<double>(s.radius)});
+        }
+        return made;
+    }
+
+    void set_smallest(const std::vector<DSphere>& spheres) {
+        radii_.clear();
+        for (const DSphere& sphere : spheres) radii_.push_back(sphere.radius);
+    }
+
+    AccuracyPoint point(const std::string& name, const Made& made, const std::string& note = {},
+                        bool is_default = false) const {
+        double sum = 0, largest = 0, outside = 0;
+        for (std::size_t i = 0; i < made.spheres.size(); ++i) {
+            const DSphere& sphere = made.spheres[i];
+            const double beyond = std::max(sphere.radius / radii_[i] - 1, 0.0); // less is what rounding leaves
+            sum += beyond;
+            largest = std::max(largest, beyond);
+            for (const glm::dvec3& p : sets_[i])
+                outside = std::max(outside, glm::distance(p, sphere.centre) / radii_[i] - sphere.radius / radii_[i]);
+        }
+        return {.name = name,
+                .values = {made.us, sum / static_cast<double>(made.spheres.size()), largest, outside},
+                .note = note,
+                .is_default = is_default};
+    }
+
+private:
+    double us_since(BenchClock::time_point start) const {
+        return 1e6 * seconds_since(start) / static_cast<double>(nodes_.size());
+    }
+
+    const vdtree::SoundTree& tree_;
+    int repeats_;
+    std::vector<NodeId> nodes_;
+    std::vector<std::vector<glm::dvec3>> sets_;
+    std::size_t points_in_all_ = 0;
+    std::vector<double> radii_; // the smallest ones
+};
+
+// Rings of some nodes, looked at from all around, and how each truly faces.
+class FacingTests {
+public:
+    FacingTests(const AccuracySubject& subject, const vdtree::SoundTree& tree, const AccuracyBenchOptions& options)
+        : repeats_(std::max(1, options.repeats / 3)) {
+        constexpr Index most_leaves = 64; // larger nodes are silhouettes from nearly everywhere
+        nodes = some_nodes(tree, options.nodes, [&](NodeId node) {
+            const bool moves = tree.support_spheres()[node].radius > 0; // else the fold changes nothing, and none asks
+            return moves && tree.leaf_end()[node] - tree.first_leaf()[node] <= most_leaves;
+        });
+        const Rings around(tree);
+        for (const NodeId node : nodes) rings.push_back(around.of(node));
+        // Eyes all around, as far away as the view's.
+        const vdtree::Similarity& placement = subject.session.scene().objects[0].placement;
+        sights_.resize(nodes.size()), truth_.resize(nodes.size());
+        for (int i = 0; i < eyes; ++i) {
+            vdtree::View view = vdtree::orbited(subject.view, 360.0 * i / eyes);
+            view.eye.y += (i % 3 - 1) * 0.4 * glm::distance(view.eye, view.target); // from above, and from below
+            const glm::dvec3 eye = vdtree::eye_in_tree(tree, view, placement);
+            for (std::size_t k = 0; k < nodes.size(); ++k) sights_[k].emplace_back(eye, rings[k].sphere);
+        }
+        for (std::size_t k = 0; k < nodes.size(); ++k)
+            for (const Sight& sight : sights_[k]) {
+                truth_[k].push_back(facing_exactly(rings[k], sight));
+                one_sided_ += truth_[k].back() != Facing::mixed;
+            }
+    }
+
+    // `test`: of a node, by its place among the nodes.
+    template <class Test>
+    AccuracyPoint point(const std::string& name, double bytes, Test&& test, const std::string& note = {},
+                        bool is_default = false) const {
+        std::size_t false_silhouettes = 0, misses = 0;
+        std::vector<double> times;
+        for (int repeat = 0; repeat < repeats_; ++repeat) {
+            false_silhouettes = misses = 0;
+            const auto start = BenchClock::now();
+            for (std::size_t k = 0; k < nodes.size(); ++k)
+                for (std::size_t i = 0; i < sights_[k].size(); ++i) {
+                    const Facing found = test(k, sights_[k][i]);
+                    false_silhouettes += found == Facing::mixed && truth_[k][i] != Facing::mixed;
+                    misses += found != Facing::mixed && found != truth_[k][i];
+                }
+            times.push_back(1e9 * seconds_since(start) /
+                            (static_cast<double>(eyes) * static_cast<double>(nodes.size())));
+        }
+        return {.name = name,
+                .values = {median(std::move(times)),
+                           static_cast<double>(false_silhouettes) /
+                               static_cast<double>(std::max<std::size_t>(one_sided_, 1)),
+                           static_cast<double>(misses), bytes},
+                .note = note,
+                .is_default = is_default};
+    }
+
+    static constexpr int eyes = 12;
+    std::vector<NodeId> nodes;
+    std::vector<Ring> rings;
+
+private:
+    int repeats_;
+    std::vector<std::vector<Sight>> sights_;
+    std::vector<std::vector<Facing>> truth_;
+    std::size_t one_sided_ = 0;
+};
+
 } // namespace
 
 Result<AccuracyPoints> sphere_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
     const auto sound = vdtree::SoundTree::of(subject.session.tree());
     if (!sound) return sound.error();
-    const vdtree::SoundTree& tree = *sound;
-    // Of fewer points all spheres are alike; more points take exact arithmetic too long.
-    constexpr Index fewest = 5, most = 1000;
-    const std::vector<NodeId> nodes = some_nodes(tree, options.nodes, [&](NodeId node) {
-        const Index leaves = tree.leaf_end()[node] - tree.first_leaf()[node];
-        return leaves >= fewest && leaves <= most && tree.support_spheres()[node].radius > 0;
-    });
-    if (nodes.empty()) return AccuracyPoints();
-    std::vector<std::vector<glm::dvec3>> sets;
-    std::size_t points_in_all = 0;
-    for (const NodeId node : nodes) {
-        std::vector<glm::dvec3>& set = sets.emplace_back();
-        for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf)
-            set.emplace_back(tree.positions()[tree.interior_count() + leaf]);
-        points_in_all += set.size();
-    }
-    std::vector<double> radii(nodes.size()); // the smallest ones
-    AccuracyPoints points;
-    const auto add = [&](const std::string& name, double us, const std::vector<DSphere>& spheres,
-                         const std::string& note, bool is_default) {
-        double sum = 0, largest = 0, outside = 0;
-        for (std::size_t i = 0; i < spheres.size(); ++i) {
-            const double beyond = std::max(spheres[i].radius / radii[i] - 1, 0.0); // less is what rounding leaves
-            sum += beyond;
-            largest = std::max(largest, beyond);
-            for (const glm::dvec3& p : sets[i])
-                outside =
-                    std::max(outside, glm::distance(p, spheres[i].centre) / radii[i] - spheres[i].radius / radii[i]);
-        }
-        points.push_back({.name = name,
-                          .values = {us, sum / static_cast<double>(spheres.size()), largest, outside},
-                          .note = note,
-                          .is_default = is_default});
-    };
-    const auto us_since = [&](BenchClock::time_point start) {
-        return 1e6 * seconds_since(start) / static_cast<double>(nodes.size());
-    };
-    const auto make = [&](const std::function<DSphere(std::span<const glm::dvec3>)>& around, double& us) {
-        std::vector<double> times;
-        std::vector<DSphere> spheres(sets.size());
-        for (int k = 0; k < std::max(1, options.repeats / 3); ++k) {
-            const auto start = BenchClock::now();
-            for (std::size_t i = 0; i < sets.size(); ++i) spheres[i] = around(sets[i]);
-            times.push_back(us_since(start));
-        }
-        us = median(std::move(times));
-        return spheres;
-    };
-    double us = 0;
-    const auto smallest = make([](auto set) { return vdtree::smallest_sphere(set); }, us);
-    const double smallest_us = us;
-    for (std::size_t i = 0; i < nodes.size(); ++i) radii[i] = smallest[i].radius;
-    std::vector<DSphere> exact;
-    if (has_exact_spheres()) {
-        const auto start = BenchClock::now();
-        for (const auto& set : sets) exact.push_back(exact_sphere(set));
-        us = us_since(start);
-        for (std::size_t i = 0; i < nodes.size(); ++i) radii[i] = exact[i].radius;
-    }
-    const double exact_us = us;
-    const std::string size = std::to_string(nodes.size()) + " nodes, " + std::to_string(points_in_all / nodes.size()) +
-                             " points on the average";
-    const auto centroid = make(around_centroid, us);
-    add("around the centroid", us, centroid, size, false);
-    const auto ritter = make(by_ritter, us);
-    add("Ritter", us, ritter, "", false);
-    add("Welzl, of points", smallest_us, smallest, "", false);
-    if (!exact.empty()) add("CGAL, exact", exact_us, exact, "", false);
-    else points.back().note = "taken as exact, for this build has no CGAL";
-
-    // As the builder does it: of children's spheres, several nodes at a time, and rounded outward to floats.
-    constexpr double slack = 1e-3; // node_slack of bound_spheres.cpp
-    constexpr std::size_t lanes = vdtree::BallLanes::lanes;
-    vdtree::BallLanes balls;
-    std::array<vdtree::Sphere, lanes> out;
-    const auto start = BenchClock::now();
-    for (std::size_t i = 0; i < nodes.size(); i += lanes) {
-        const std::size_t used = std::min(lanes, nodes.size() - i);
-        for (std::size_t lane = 0; lane < used; ++lane) {
-            balls.begin(lane, tree.positions()[nodes[i + lane]]);
-            tree.for_each_child(nodes[i + lane], [&](NodeId child) {
-                if (tree.is_leaf(child)) balls.add(lane, tree.positions()[child]);
-                else balls.add(lane, tree.support_spheres()[child]);
-            });
-        }
-        balls.enclose(slack, std::span(out).first(used));
-    }
-    us = us_since(start);
-    std::vector<DSphere> own;
-    for (const NodeId node : nodes) {
-        const vdtree::Sphere& s = tree.support_spheres()[node];
-        own.push_back({glm::dvec3(s.centre), static_cast<double>(s.radius)});
-    }
-    add("the program's, of children's spheres", us, own,
-        "has the children's spheres and all proxies in it, too, so that tests nest", true);
+    SphereSets sets(*sound, options);
+    if (sets.empty()) return AccuracyPoints();
+    const SphereSets::Made smallest = sets.make([](auto set) { return vdtree::smallest_sphere(set); });
+    std::optional<SphereSets::Made> exact;
+    if (has_exact_spheres()) exact = sets.make([](auto set) { return exact_sphere(set); }, 1);
+    sets.set_smallest(exact ? exact->spheres : smallest.spheres);
+    AccuracyPoints points = {
+        sets.point("around the centroid", sets.make(around_centroid), sets.size()),
+        sets.point("Ritter", sets.make(by_ritter)),
+        sets.point("Welzl, of points", smallest, exact ? "" : "taken as exact, for this build has no CGAL")};
+    if (exact) points.push_back(sets.point("CGAL, exact", *exact));
+    points.push_back(sets.point("the program's, of children's spheres", sets.make_own(),
+                                "has the children's spheres and all proxies in it, too, so that tests nest", true));
     return points;
 }
 
@@ -361,102 +447,55 @@ Result<AccuracyPoints> facing_points(AccuracySubject& subject, const AccuracyBen
     const auto sound = vdtree::SoundTree::of(subject.session.tree());
     if (!sound) return sound.error();
     const vdtree::SoundTree& tree = *sound;
-    constexpr Index most_leaves = 64; // larger nodes are silhouettes from nearly everywhere
-    const std::vector<NodeId> nodes = some_nodes(tree, options.nodes, [&](NodeId node) {
-        const bool moves = tree.support_spheres()[node].radius > 0; // else the fold changes nothing, and none asks
-        return moves && tree.leaf_end()[node] - tree.first_leaf()[node] <= most_leaves;
-    });
-    if (nodes.empty()) return AccuracyPoints();
-    const Rings around(tree);
-    std::vector<Ring> rings;
-    for (const NodeId node : nodes) rings.push_back(around.of(node));
-    // Eyes all around, as far away as the view's.
-    constexpr int eyes = 12;
-    const vdtree::Similarity& placement = subject.session.scene().objects[0].placement;
-    std::vector<std::vector<Sight>> sights(nodes.size());
-    for (int i = 0; i < eyes; ++i) {
-        vdtree::View view = vdtree::orbited(subject.view, 360.0 * i / eyes);
-        view.eye.y += (i % 3 - 1) * 0.4 * glm::distance(view.eye, view.target); // from above, and from below
-        const glm::dvec3 eye = vdtree::eye_in_tree(tree, view, placement);
-        for (std::size_t k = 0; k < nodes.size(); ++k) sights[k].emplace_back(eye, rings[k].sphere);
-    }
-    const double tests = static_cast<double>(eyes) * static_cast<double>(nodes.size());
-    std::vector<std::vector<Facing>> truth(nodes.size());
-    std::size_t one_sided = 0;
-    for (std::size_t k = 0; k < nodes.size(); ++k)
-        for (const Sight& sight : sights[k]) {
-            truth[k].push_back(facing_exactly(rings[k], sight));
-            one_sided += truth[k].back() != Facing::mixed;
-        }
+    const FacingTests tests(subject, tree, options);
+    const std::vector<Ring>& rings = tests.rings;
+    if (rings.empty()) return AccuracyPoints();
     AccuracyPoints points;
-    const auto add = [&](const std::string& name, double bytes,
-                         const std::function<Facing(std::size_t, const Sight&)>& test, const std::string& note,
-                         bool is_default) {
-        std::size_t false_silhouettes = 0, misses = 0;
-        std::vector<double> times;
-        for (int repeat = 0; repeat < std::max(1, options.repeats / 3); ++repeat) {
-            false_silhouettes = misses = 0;
-            const auto start = BenchClock::now();
-            for (std::size_t k = 0; k < nodes.size(); ++k)
-                for (std::size_t i = 0; i < sights[k].size(); ++i) {
-                    const Facing found = test(k, sights[k][i]);
-                    false_silhouettes += found == Facing::mixed && truth[k][i] != Facing::mixed;
-                    misses += found != Facing::mixed && found != truth[k][i];
-                }
-            times.push_back(1e9 * seconds_since(start) / tests);
-        }
-        points.push_back({.name = name,
-                          .values = {median(std::move(times)),
-                                     static_cast<double>(false_silhouettes) /
-                                         static_cast<double>(std::max<std::size_t>(one_sided, 1)),
-                                     static_cast<double>(misses), bytes},
-                          .note = note,
-                          .is_default = is_default});
-    };
     for (const int side : {2, 4, 8, 12, 16}) {
         const MaskTwin twin(side);
         std::vector<MaskTwin::Bits> masks;
         for (const Ring& ring : rings) masks.push_back(twin.mask(ring));
-        const std::string name = "mask of 6 x " + std::to_string(side) + " x " + std::to_string(side);
-        add(
-            name, twin.bytes(), [&](std::size_t k, const Sight& s) { return twin.facing_of(masks[k], s); },
-            side == 2 ? std::to_string(nodes.size()) + " nodes from " + std::to_string(eyes) + " eyes" : "", false);
+        points.push_back(tests.point(
+            "mask of 6 x " + std::to_string(side) + " x " + std::to_string(side), twin.bytes(),
+            [&](std::size_t k, const Sight& s) { return twin.facing_of(masks[k], s); },
+            side == 2 ? std::to_string(rings.size()) + " nodes from " + std::to_string(tests.eyes) + " eyes" : ""));
     }
-    std::vector<vdtree::NormalSlabs> slabs(nodes.size());
-    std::vector<vdtree::NormalMask> masks(nodes.size());
+    std::vector<vdtree::NormalSlabs> slabs(rings.size());
+    std::vector<vdtree::NormalMask> masks(rings.size());
     std::vector<Cone> cones;
     double triangles = 0;
-    for (std::size_t k = 0; k < nodes.size(); ++k) {
+    for (std::size_t k = 0; k < rings.size(); ++k) {
         for (const glm::dvec3& n : rings[k].normals) {
             slabs[k].insert(n);
             masks[k].insert(vdtree::normal_cell(n));
         }
         cones.emplace_back(rings[k]);
-        triangles += static_cast<double>(rings[k].normals.size()) / static_cast<double>(nodes.size());
+        triangles += static_cast<double>(rings[k].normals.size()) / static_cast<double>(rings.size());
     }
-    add(
-        "slabs", sizeof(vdtree::NormalSlabs),
-        [&](std::size_t k, const Sight& s) { return facing(slabs[k], s.to_eye, s.distance, s.radius); }, "", false);
-    add(
-        "slabs, then mask of 6 x 8 x 8", sizeof(vdtree::NormalSlabs) + sizeof(vdtree::NormalMask),
+    constexpr double of_slabs = sizeof(vdtree::NormalSlabs), of_both = of_slabs + sizeof(vdtree::NormalMask);
+    points.push_back(tests.point("slabs", of_slabs, [&](std::size_t k, const Sight& s) {
+        return facing(slabs[k], s.to_eye, s.distance, s.radius);
+    }));
+    points.push_back(tests.point(
+        "slabs, then mask of 6 x 8 x 8", of_both,
         [&](std::size_t k, const Sight& s) { return facing(slabs[k], masks[k], s.to_eye, s.distance, s.radius); },
-        "the program's; here one by one, cuts test many at once", true);
-    add(
+        "the program's; here one by one, cuts test many at once", true));
+    points.push_back(tests.point(
         "cone", 4 * sizeof(float), [&](std::size_t k, const Sight& s) { return cones[k].facing_of(s); },
-        "a twin; cones around cones are wider than what they hold", false);
-    add(
+        "a twin; cones around cones are wider than what they hold"));
+    points.push_back(tests.point(
         "each triangle, exact", triangles * 2 * sizeof(glm::vec3),
         [&](std::size_t k, const Sight& s) { return facing_exactly(rings[k], s); },
-        rounded(triangles, 3) + " triangles on the average", false);
-    add(
-        "the tree's own slabs and masks", sizeof(vdtree::NormalSlabs) + sizeof(vdtree::NormalMask),
+        rounded(triangles, 3) + " triangles on the average"));
+    points.push_back(tests.point(
+        "the tree's own slabs and masks", of_both,
         [&](std::size_t k, const Sight& s) {
-            if (tree.bounds()[nodes[k]].flags & vdtree::irregular_ring) return Facing::mixed;
+            const NodeId node = tests.nodes[k];
+            if (tree.bounds()[node].flags & vdtree::irregular_ring) return Facing::mixed;
             return facing(
-                tree.bounds()[nodes[k]].slabs, [&] { return tree.mask(nodes[k]); }, s.to_eye, s.distance, s.radius);
+                tree.bounds()[node].slabs, [&] { return tree.mask(node); }, s.to_eye, s.distance, s.radius);
         },
-        "of more triangles: one more ring, and what folds nearby make of them; borders are outlines from everywhere",
-        false);
+        "of more triangles: one more ring, and what folds nearby make of them; borders are outlines from everywhere"));
     return points;
 }
 

@@ -92,87 +92,108 @@ Result<double> follow_us(const vdtree::VertexTree& tree, const vdtree::DistanceC
     return median(std::move(times));
 }
 
+// Frames of an eye that stands still for a while, and then goes around.
+struct CutFrames {
+    const vdtree::View& first;
+    int count;
+
+    vdtree::View view(int frame) const {
+        return vdtree::orbited(first, cut_degrees_a_frame * std::max(frame - settling_frames, 0));
+    }
+};
+
+// The time of a frame, and how far its triangles are from those of an exact cut from scratch.
+Result<AccuracyPoint> kept_point(session::Session& session, const CutFrames& frames, const std::string& name,
+                                 const session::Request& request, bool is_from_scratch) {
+    const Pinned pinned;
+    session::Request exact = request;
+    exact.hysteresis = 1;
+    exact.milliseconds.reset();
+    session::Follower follower(session);
+    std::vector<double> times;
+    double error = 0;
+    for (int i = is_from_scratch ? settling_frames : 0; i <= frames.count; ++i) {
+        const vdtree::View now = frames.view(i);
+        const auto start = BenchClock::now();
+        double triangles = 0;
+        if (is_from_scratch) {
+            const auto made = session.simplify(now, request);
+            if (!made) return made.error();
+            triangles = made->stats.triangles;
+        } else {
+            const auto made = follower.follow(now, request);
+            if (!made) return made.error();
+            triangles = made->stats.triangles;
+        }
+        if (i <= settling_frames) continue;
+        times.push_back(1e6 * seconds_since(start));
+        const auto truth = session.simplify(now, exact);
+        if (!truth) return truth.error();
+        error = std::max(error, std::abs(triangles / std::max<double>(1, truth->stats.triangles) - 1));
+    }
+    return AccuracyPoint{.name = name, .values = {median(std::move(times)), error}};
+}
+
+// What threads make of several objects, without the session around them.
+Result<void> add_threads(session::Session& session, const CutFrames& frames, AccuracyPoints& points) {
+    std::uint64_t triangles = 0;
+    for (const int threads : {1, 2}) {
+        ThreadedCuts cuts(session, threads);
+        std::vector<double> times;
+        for (int i = settling_frames; i <= frames.count; ++i) {
+            const auto us = cuts.follow(frames.view(i));
+            if (!us) return us.error();
+            if (i > settling_frames) times.push_back(*us);
+        }
+        if (threads == 1) triangles = cuts.triangles();
+        const double off = std::abs(static_cast<double>(cuts.triangles()) / static_cast<double>(triangles) - 1);
+        points.push_back(
+            {.name = threads == 1 ? "cuts alone, one thread" : "cuts alone, two threads",
+             .values = {median(std::move(times)), off},
+             .note = threads == 1 ? "object by object, without what the session does around them" : "a twin"});
+    }
+    return {};
+}
+
 } // namespace
 
 Result<AccuracyPoints> cut_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
+    struct Kept {
+        std::string name;
+        session::Request request;
+        bool is_from_scratch = false;
+    };
     session::Session& session = subject.session;
+    const bool is_one = session.scene().objects.size() == 1;
     const session::Request imperceptible = picture_request();
-    session::Request budget = imperceptible;
     const auto first = session.simplify(subject.view, imperceptible);
     if (!first) return first.error();
-    budget.goal = session::Goal::budget(std::max<vdtree::Index>(first->stats.triangles / 2, 1));
-    AccuracyPoints points;
-    const auto view_of = [&](int frame) {
-        return vdtree::orbited(subject.view, cut_degrees_a_frame * std::max(frame - settling_frames, 0));
-    };
-    const int frames = settling_frames + options.repeats;
-    const auto add = [&](const std::string& name, const session::Request& request, bool is_from_scratch,
-                         bool is_default) -> Result<void> {
-        const Pinned pinned;
-        session::Request exact = request;
-        exact.hysteresis = 1;
-        exact.milliseconds.reset();
-        session::Follower follower(session);
-        std::vector<double> times;
-        double error = 0;
-        for (int i = is_from_scratch ? settling_frames : 0; i <= frames; ++i) {
-            const vdtree::View now = view_of(i);
-            const auto start = BenchClock::now();
-            double triangles = 0;
-            if (is_from_scratch) {
-                const auto made = session.simplify(now, request);
-                if (!made) return made.error();
-                triangles = made->stats.triangles;
-            } else {
-                const auto made = follower.follow(now, request);
-                if (!made) return made.error();
-                triangles = made->stats.triangles;
-            }
-            if (i <= settling_frames) continue;
-            times.push_back(1e6 * seconds_since(start));
-            const auto truth = session.simplify(now, exact);
-            if (!truth) return truth.error();
-            error = std::max(error, std::abs(triangles / std::max<double>(1, truth->stats.triangles) - 1));
-        }
-        points.push_back({.name = name, .values = {median(std::move(times)), error}, .is_default = is_default});
-        return {};
-    };
-    if (auto ok = add("imperceptible, from scratch", imperceptible, true, false); !ok) return ok.error();
-    if (auto ok = add("imperceptible, followed", imperceptible, false, true); !ok) return ok.error();
+    std::vector<Kept> all = {{"imperceptible, from scratch", imperceptible, true},
+                             {"imperceptible, followed", imperceptible}};
     for (const double milliseconds : {0.05, 0.2, 1.0}) {
-        session::Request limited = imperceptible;
-        limited.milliseconds = milliseconds;
-        if (auto ok = add("imperceptible, followed, " + shortest(milliseconds) + " ms at most", limited, false, false);
-            !ok)
-            return ok.error();
-    }
-    if (session.scene().objects.size() > 1) {
-        std::uint64_t triangles = 0;
-        for (const int threads : {1, 2}) {
-            ThreadedCuts cuts(session, threads);
-            std::vector<double> times;
-            for (int i = settling_frames; i <= frames; ++i) {
-                const auto us = cuts.follow(view_of(i));
-                if (!us) return us.error();
-                if (i > settling_frames) times.push_back(*us);
-            }
-            if (threads == 1) triangles = cuts.triangles();
-            const double off = std::abs(static_cast<double>(cuts.triangles()) / static_cast<double>(triangles) - 1);
-            points.push_back(
-                {.name = threads == 1 ? "cuts alone, one thread" : "cuts alone, two threads",
-                 .values = {median(std::move(times)), off},
-                 .note = threads == 1 ? "object by object, without what the session does around them" : "a twin"});
-        }
-        subject.left_out.push_back("budgets with hysteresis, for it has several objects.");
-        return points;
+        all.push_back({"imperceptible, followed, " + shortest(milliseconds) + " ms at most", imperceptible});
+        all.back().request.milliseconds = milliseconds;
     }
     for (const double hysteresis : {1.0, 1.02, 1.1, 1.5, 2.0}) {
-        session::Request within = budget;
-        within.hysteresis = static_cast<float>(hysteresis);
-        const bool is_default = within.hysteresis == session::Request().hysteresis;
-        const std::string name = hysteresis == 1 ? "budget, exact" : "budget, hysteresis " + shortest(hysteresis);
-        if (auto ok = add(name, within, false, is_default); !ok) return ok.error();
+        if (!is_one) break;
+        all.push_back(
+            {hysteresis == 1 ? "budget, exact" : "budget, hysteresis " + shortest(hysteresis), imperceptible});
+        all.back().request.goal = session::Goal::budget(std::max<vdtree::Index>(first->stats.triangles / 2, 1));
+        all.back().request.hysteresis = static_cast<float>(hysteresis);
     }
+    const CutFrames frames{subject.view, settling_frames + options.repeats};
+    AccuracyPoints points;
+    for (const Kept& kept : all) {
+        auto point = kept_point(session, frames, kept.name, kept.request, kept.is_from_scratch);
+        if (!point) return point.error();
+        point->is_default =
+            kept.name == "imperceptible, followed" || (kept.request.goal.kind == session::Goal::Kind::budget &&
+                                                       kept.request.hysteresis == session::Request().hysteresis);
+        points.push_back(std::move(*point));
+    }
+    if (is_one) return points;
+    if (auto added = add_threads(session, frames, points); !added) return added.error();
+    subject.left_out.push_back("budgets with hysteresis, for it has several objects.");
     return points;
 }
 
@@ -235,32 +256,61 @@ Result<AccuracyPoints> node_test_points(AccuracySubject& subject, const Accuracy
     return points;
 }
 
+namespace {
+
+constexpr double millionths = 1e6;
+
+vdtree::BuildOptions as_built(const vdtree::VertexTree& tree, vdtree::ClustererKind kind) {
+    vdtree::BuildOptions how;
+    how.clusterer = kind;
+    how.light = tree.light();
+    how.prelit = tree.is_prelit();
+    return how;
+}
+
+Result<session::Session> session_of(const vdtree::VertexTree& tree, const AccuracySubject& subject) {
+    return session::Session::create(session::Scene::of(tree.share()), subject.session.observer());
+}
+
+Result<AccuracyPoint> peer_point(const AccuracySubject& subject, const vdtree::Mesh& mesh, vdtree::Index wanted,
+                                 const session::PictureJudge& judge) {
+    const auto start = BenchClock::now();
+    const vdtree::Mesh simple = simplified_by_meshoptimizer(mesh, wanted);
+    const double seconds = seconds_since(start);
+    const auto tree =
+        vdtree::build_tree(simple.view(), as_built(subject.session.tree(), vdtree::ClustererKind::quadric));
+    if (!tree) return tree.error();
+    const auto session = session_of(*tree, subject);
+    if (!session) return session.error();
+    auto renderer = session::SceneRenderer::create(subject.context, *session);
+    if (!renderer) return renderer.error();
+    const auto frame =
+        renderer->draw(session::drawn_cuts(session::whole_cuts(*session)), subject.view, judge.drawing());
+    if (!frame) return frame.error();
+    const auto seen = judge.judge(*frame);
+    if (!seen) return seen.error();
+    const auto triangles = static_cast<double>(simple.triangles.size());
+    constexpr double of_vertex = 2 * sizeof(glm::vec3);
+    return AccuracyPoint{
+        .name = "meshoptimizer",
+        .values = {seconds, millionths * mean_surface_distance(mesh, simple), seen->v,
+                   sizeof(vdtree::Triangle) + of_vertex * static_cast<double>(simple.positions.size()) / triangles},
+        .note = grouped(simple.triangles.size()) + " triangles, one mesh for all views"};
+}
+
+} // namespace
+
 Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    const vdtree::VertexTree& own = subject.session.tree();
-    vdtree::Cut full(own);
-    full.unfold_all();
-    const vdtree::Mesh mesh = vdtree::extract_mesh(full);
+    const vdtree::Mesh mesh = whole_mesh(subject.session.tree());
     constexpr std::size_t one_in = 10; // triangles that stay
     const auto wanted = static_cast<vdtree::Index>(std::max<std::size_t>(mesh.triangles.size() / one_in, 4));
     AccuracyPoints points;
-    const auto session_of = [&](const vdtree::VertexTree& tree) {
-        return session::Session::create(session::Scene::of(tree.share()), subject.session.observer());
-    };
-    const auto build_with = [&](const vdtree::BuildOptions& how, double& seconds) {
-        const auto start = BenchClock::now();
-        auto tree = vdtree::build_tree(mesh.view(), how);
-        seconds = seconds_since(start);
-        return tree;
-    };
-    constexpr double millionths = 1e6;
     for (const auto& [kind, name] :
          {std::pair{vdtree::ClustererKind::quadric, "quadric"}, {vdtree::ClustererKind::octree, "octree"}}) {
-        vdtree::BuildOptions how;
-        how.clusterer = kind;
-        how.light = own.light();
-        how.prelit = own.is_prelit();
-        double seconds = 0;
-        const auto tree = build_with(how, seconds);
+        vdtree::BuildOptions how = as_built(subject.session.tree(), kind);
+        auto start = BenchClock::now();
+        const auto tree = vdtree::build_tree(mesh.view(), how);
+        double seconds = seconds_since(start);
         if (!tree) return tree.error();
         const auto extent = vdtree::extent_criterion(*tree, subject.view, 1);
         if (!extent) return extent.error();
@@ -269,11 +319,11 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
         follow.triangle_budget = wanted;
         if (auto made = cut.follow(*extent, {.eye = vdtree::eye_in_tree(*tree, subject.view, {})}, follow); !made)
             return made.error();
-        auto session = session_of(*tree);
+        auto session = session_of(*tree, subject);
         if (!session) return session.error();
-        auto pictures = session::PictureJudge::create(subject.context, *session, subject.view, options.samples);
-        if (!pictures) return pictures.error();
-        const auto verdict = pictures->judge(std::span(&cut, 1));
+        auto judge = session::PictureJudge::create(subject.context, *session, subject.view, options.samples);
+        if (!judge) return judge.error();
+        const auto verdict = judge->judge(std::span(&cut, 1));
         if (!verdict) return verdict.error();
         const auto frame_us = follow_us(*tree, *extent, subject.view, options.repeats);
         if (!frame_us) return frame_us.error();
@@ -283,36 +333,18 @@ Result<AccuracyPoints> tree_points(AccuracySubject& subject, const AccuracyBench
                           .values = {seconds, distance, verdict->v, bytes, *frame_us},
                           .note = grouped(cut.triangle_count()) + " triangles, by extent",
                           .is_default = kind == vdtree::BuildOptions().clusterer});
-        for (const int threads : {1, 2}) {
-            how.threads = threads;
-            if (const auto again = build_with(how, seconds); !again) return again.error();
-            points.push_back({.name = std::string(name) + (threads == 1 ? ", one thread" : ", two threads"),
+        for (how.threads = 1; how.threads <= 2; ++how.threads) {
+            start = BenchClock::now();
+            if (const auto again = vdtree::build_tree(mesh.view(), how); !again) return again.error();
+            seconds = seconds_since(start);
+            points.push_back({.name = std::string(name) + (how.threads == 1 ? ", one thread" : ", two threads"),
                               .values = {seconds, distance, verdict->v, bytes, *frame_us},
                               .note = "the same tree"});
         }
         if (kind != vdtree::ClustererKind::quadric || !has_meshoptimizer()) continue;
-        const auto start = BenchClock::now();
-        const vdtree::Mesh simple = simplified_by_meshoptimizer(mesh, cut.triangle_count());
-        seconds = seconds_since(start);
-        how.threads = 0;
-        const auto drawn = vdtree::build_tree(simple.view(), how);
-        if (!drawn) return drawn.error();
-        auto other = session_of(*drawn);
-        if (!other) return other.error();
-        auto renderer = session::SceneRenderer::create(subject.context, *other);
-        if (!renderer) return renderer.error();
-        const auto frame =
-            renderer->draw(session::drawn_cuts(session::whole_cuts(*other)), subject.view, pictures->drawing());
-        if (!frame) return frame.error();
-        const auto seen = pictures->judge(*frame);
-        if (!seen) return seen.error();
-        points.push_back(
-            {.name = "meshoptimizer",
-             .values = {seconds, millionths * mean_surface_distance(mesh, simple), seen->v,
-                        static_cast<double>(simple.triangles.size() * sizeof(vdtree::Triangle) +
-                                            simple.positions.size() * (sizeof(glm::vec3) + sizeof(glm::vec3))) /
-                            static_cast<double>(simple.triangles.size())},
-             .note = grouped(simple.triangles.size()) + " triangles, one mesh for all views"});
+        auto peer = peer_point(subject, mesh, cut.triangle_count(), *judge);
+        if (!peer) return peer.error();
+        points.push_back(std::move(*peer));
     }
     return points;
 }

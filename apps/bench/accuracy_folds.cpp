@@ -216,33 +216,10 @@ Result<PeerScene> peer_scene(const AccuracySubject& subject, const std::vector<v
     return peer;
 }
 
-} // namespace
-
-Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    session::TradeoffOptions tradeoff;
-    tradeoff.seconds = options.seconds;
-    tradeoff.samples = tradeoff.least_samples = options.samples; // what is seen must not depend on what else runs
-    const auto measured = session::measure_tradeoff(subject.session, subject.context, subject.view, tradeoff);
-    if (!measured) return measured.error();
-    for (const std::string& name : measured->left_out) { // a name, or a name and why
-        const bool is_for_time = name.find(": ") == std::string::npos;
-        subject.left_out.push_back(is_for_time ? name + ": no time was left (--seconds)." : name);
-    }
-    const TreeBytes bytes = bytes_a_triangle(subject.session);
-    AccuracyPoints points;
-    for (const session::TradeoffPoint& p : measured->points) {
-        const bool is_full = p.request.goal.kind == session::Goal::Kind::full;
-        const bool is_error = !p.request.fold_test && p.request.goal.kind != session::Goal::Kind::pixels && !is_full;
-        points.push_back(
-            {.name = p.name,
-             .values = {p.draw_ms + (std::isnan(p.follow_ms) ? 0 : p.follow_ms), p.v, static_cast<double>(p.triangles),
-                        static_cast<double>(p.visible_pixels), static_cast<double>(p.second_visible_pixels), 1 - p.ssim,
-                        1e3 * p.shift, is_full ? 0 : subject.build_s + (is_error ? subject.measure_s : 0),
-                        is_error ? bytes.measured : bytes.plain},
-             .note = p.is_of_view ? "this view alone" : "",
-             .is_default = p.name == "imperceptible"});
-    }
-    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, measured->samples);
+// Masked cuts, levels, and meshoptimizer's, beside measure_tradeoff()'s own.
+Result<void> add_others(AccuracySubject& subject, const AccuracyBenchOptions& options, int samples,
+                        const TreeBytes& bytes, AccuracyPoints& points) {
+    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, samples);
     if (!judge) return judge.error();
     Others others(subject, options, std::move(*judge));
     const auto add = [&](Result<AccuracyPoint> point) -> Result<void> {
@@ -262,7 +239,7 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
         if (auto ok = add(others.point("imperceptible, masked, by this picture", masked->cuts, prepared_s,
                                        bytes.measured, "this view alone"));
             !ok)
-            return ok.error();
+            return ok;
     }
     const auto levels = Levels::create(subject);
     if (!levels) return levels.error();
@@ -270,20 +247,47 @@ Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBench
     if (auto ok = add(others.point("discrete levels, where nobody sees them", levels->cuts(levels->levels(1)),
                                    prepared_s + levels->seconds(), levels->bytes(), "without following"));
         !ok)
-        return ok.error();
+        return ok;
     if (auto ok = add(others.point("discrete levels, as many triangles", levels->cuts(levels->levels_of(count)),
                                    prepared_s + levels->seconds(), levels->bytes(), "without following"));
         !ok)
-        return ok.error();
-    if (!has_meshoptimizer()) return points;
+        return ok;
+    if (!has_meshoptimizer()) return {};
     const auto peer = peer_scene(subject, imperceptible->cuts);
     if (!peer) return peer.error();
     auto renderer = session::SceneRenderer::create(subject.context, peer->session);
     if (!renderer) return renderer.error();
-    if (auto ok = add(others.point("meshoptimizer, as many triangles", *renderer, peer->cuts, peer->seconds,
-                                   peer->bytes, "one mesh for all views"));
-        !ok)
-        return ok.error();
+    return add(others.point("meshoptimizer, as many triangles", *renderer, peer->cuts, peer->seconds, peer->bytes,
+                            "one mesh for all views"));
+}
+
+} // namespace
+
+Result<AccuracyPoints> fold_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
+    session::TradeoffOptions tradeoff;
+    tradeoff.seconds = options.seconds;
+    tradeoff.samples = tradeoff.least_samples = options.samples; // what is seen must not depend on what else runs
+    const auto measured = session::measure_tradeoff(subject.session, subject.context, subject.view, tradeoff);
+    if (!measured) return measured.error();
+    for (const std::string& name : measured->left_out) { // a name, or a name and why
+        const bool is_for_time = name.find(": ") == std::string::npos;
+        subject.left_out.push_back(is_for_time ? name + ": no time was left (--seconds)." : name);
+    }
+    const TreeBytes bytes = bytes_a_triangle(subject.session);
+    AccuracyPoints points;
+    for (const session::TradeoffPoint& p : measured->points) {
+        const bool is_full = p.request.goal.kind == session::Goal::Kind::full;
+        const bool is_error = !p.request.fold_test && p.request.goal.kind != session::Goal::Kind::pixels && !is_full;
+        points.push_back({.name = p.name,
+                          .values = {p.draw_ms.median + (std::isnan(p.follow_ms.median) ? 0 : p.follow_ms.median), p.v,
+                                     static_cast<double>(p.triangles), static_cast<double>(p.visible_pixels),
+                                     static_cast<double>(p.second_visible_pixels), 1 - p.ssim, 1e3 * p.shift,
+                                     is_full ? 0 : subject.build_s + (is_error ? subject.measure_s : 0),
+                                     is_error ? bytes.measured : bytes.plain},
+                          .note = p.is_of_view ? "this view alone" : "",
+                          .is_default = p.name == "imperceptible"});
+    }
+    if (auto added = add_others(subject, options, measured->samples, bytes, points); !added) return added.error();
     return points;
 }
 

@@ -24,10 +24,34 @@ vdtree::View view_on_walk(const vdtree::View& first, int frame) {
     return view;
 }
 
+struct LevelVariant {
+    std::string name;
+    session::LevelControlOptions how = {};
+};
+
+// The program's own first, and one thing changed in each of the others.
+std::vector<LevelVariant> level_variants() {
+    const session::LevelControlOptions usual;
+    return {{"modern, " + std::to_string(usual.layers) + " layers, whole maps, 32 bits, tested every " +
+             std::to_string(usual.frames_a_layer) + " frames"},
+            {"rpg99", {.maps = session::MapRecipe::rpg99}},
+            {"1 layer", {.layers = 1}},
+            {"2 layers", {.layers = 2}},
+            {"3 layers", {.layers = 3}},
+            {"8 layers", {.layers = 8}},
+            {"maps of half the resolution", {.map_block = 2}},
+            {"maps of a quarter", {.map_block = 4}},
+            {"16 bits", {.half_floats = true}},
+            {"tested every frame", {.frames_a_layer = 1}},
+            {"tested every 2 frames", {.frames_a_layer = 2}},
+            {"tested every 8 frames", {.frames_a_layer = 8}},
+            {"by distance", {.method = session::LevelMethod::distance}},
+            {"by area", {.method = session::LevelMethod::area}}};
+}
+
 } // namespace
 
 Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    using session::LevelControlOptions;
     constexpr int frames = 12;
     // Each setting is drawn until nothing changes any more, and then walked with: in half of the window.
     vdtree::View first = subject.view;
@@ -36,11 +60,11 @@ Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenc
     auto judge = session::PictureJudge::create(subject.context, subject.session, last, options.samples);
     if (!judge) return judge.error();
     AccuracyPoints points;
-    const auto add = [&](const std::string& name, const LevelControlOptions& how, bool is_default) -> Result<void> {
-        auto control = session::LevelControl::create(subject.context, subject.session, first, how);
+    for (const LevelVariant& variant : level_variants()) {
+        auto control = session::LevelControl::create(subject.context, subject.session, first, variant.how);
         if (!control) return control.error();
         if (const auto settled = control->settle(first); !settled) return settled.error();
-        std::vector<double> times;
+        double ms = 0; // a frame on the average: not all frames test
         Result<session::LevelFrame> frame = session::LevelFrame();
         std::uint64_t bytes = 0;
         for (int i = 1; i <= frames; ++i) {
@@ -48,53 +72,16 @@ Result<AccuracyPoints> level_points(AccuracySubject& subject, const AccuracyBenc
             frame = control->draw(view_on_walk(first, i));
             if (!frame) return frame.error();
             if (const auto counted = control->wait(); !counted) return counted.error();
-            times.push_back(1e3 * seconds_since(start));
+            ms += 1e3 * seconds_since(start) / frames;
             bytes = std::max(bytes, frame->texture_bytes);
         }
         const auto verdict = judge->judge(level_cuts(subject.session, *control, *frame));
         if (!verdict) return verdict.error();
-        double sum = 0; // a frame on the average: not all frames test
-        for (const double ms : times) sum += ms / frames;
-        points.push_back({.name = name,
-                          .values = {sum, verdict->v, static_cast<double>(frame->triangles),
+        points.push_back({.name = variant.name,
+                          .values = {ms, verdict->v, static_cast<double>(frame->triangles),
                                      static_cast<double>(verdict->visible), static_cast<double>(bytes) / 1e6},
-                          .is_default = is_default});
-        return {};
-    };
-    const LevelControlOptions usual;
-    const std::string every = "tested every " + std::to_string(usual.frames_a_layer) + " frames";
-    if (auto ok =
-            add("modern, " + std::to_string(usual.layers) + " layers, whole maps, 32 bits, " + every, usual, true);
-        !ok)
-        return ok.error();
-    const auto vary = [&](const std::string& name, auto&& change) {
-        LevelControlOptions how;
-        change(how);
-        return add(name, how, false);
-    };
-    if (auto ok = vary("rpg99", [](LevelControlOptions& o) { o.maps = session::MapRecipe::rpg99; }); !ok)
-        return ok.error();
-    for (const int layers : {1, 2, 3, 8})
-        if (auto ok = vary(std::to_string(layers) + (layers == 1 ? " layer" : " layers"),
-                           [&](LevelControlOptions& o) { o.layers = layers; });
-            !ok)
-            return ok.error();
-    for (const int block : {2, 4})
-        if (auto ok = vary(block == 2 ? "maps of half the resolution" : "maps of a quarter",
-                           [&](LevelControlOptions& o) { o.map_block = block; });
-            !ok)
-            return ok.error();
-    if (auto ok = vary("16 bits", [](LevelControlOptions& o) { o.half_floats = true; }); !ok) return ok.error();
-    for (const int every_frames : {1, 2, 8})
-        if (auto ok = vary(every_frames == 1 ? "tested every frame"
-                                             : "tested every " + std::to_string(every_frames) + " frames",
-                           [&](LevelControlOptions& o) { o.frames_a_layer = every_frames; });
-            !ok)
-            return ok.error();
-    if (auto ok = vary("by distance", [](LevelControlOptions& o) { o.method = session::LevelMethod::distance; }); !ok)
-        return ok.error();
-    if (auto ok = vary("by area", [](LevelControlOptions& o) { o.method = session::LevelMethod::area; }); !ok)
-        return ok.error();
+                          .is_default = points.empty()});
+    }
     return points;
 }
 

@@ -39,6 +39,33 @@ Result<Judged> judged(session::Session& session, session::SceneRenderer& rendere
     return Judged{static_cast<double>(made->stats.triangles), *verdict};
 }
 
+// One mesh, from its view and from farther away.
+struct Judges {
+    session::PictureJudge near, far;
+    vdtree::View far_view;
+};
+
+// `measure`: what makes the tree.
+Result<AccuracyPoint> point(const AccuracySubject& subject, const Judges& judges, const std::string& name,
+                            const std::function<Result<vdtree::VertexTree>()>& measure, const std::string& note = {}) {
+    const auto start = BenchClock::now();
+    auto measured = measure();
+    if (!measured) return measured.error();
+    const double seconds = seconds_since(start);
+    auto session = session::Session::create(session::Scene::of(std::move(*measured)), subject.session.observer());
+    if (!session) return session.error();
+    auto renderer = session::SceneRenderer::create(subject.context, *session);
+    if (!renderer) return renderer.error();
+    const auto near = judged(*session, *renderer, subject.view, judges.near);
+    if (!near) return near.error();
+    const auto far = judged(*session, *renderer, judges.far_view, judges.far);
+    if (!far) return far.error();
+    return AccuracyPoint{.name = name,
+                         .values = {seconds, near->verdict.v, near->triangles,
+                                    static_cast<double>(near->verdict.visible), far->triangles, far->verdict.v},
+                         .note = note};
+}
+
 } // namespace
 
 Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
@@ -54,33 +81,11 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
     constexpr double times_as_far = 8;
     vdtree::View far = subject.view;
     far.eye = far.target + times_as_far * (far.eye - far.target);
-    const auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
+    auto judge = session::PictureJudge::create(subject.context, subject.session, subject.view, options.samples);
     if (!judge) return judge.error();
-    const auto judge_far = session::PictureJudge::create(subject.context, subject.session, far, options.samples);
+    auto judge_far = session::PictureJudge::create(subject.context, subject.session, far, options.samples);
     if (!judge_far) return judge_far.error();
-    AccuracyPoints points;
-    const auto add = [&](const std::string& name, const std::function<Result<vdtree::VertexTree>()>& measure,
-                         const std::string& note, bool is_default) -> Result<void> {
-        const auto start = BenchClock::now();
-        auto measured = measure();
-        if (!measured) return measured.error();
-        const double seconds = seconds_since(start);
-        auto session = session::Session::create(session::Scene::of(std::move(*measured)), subject.session.observer());
-        if (!session) return session.error();
-        auto renderer = session::SceneRenderer::create(subject.context, *session);
-        if (!renderer) return renderer.error();
-        const auto near = judged(*session, *renderer, subject.view, *judge);
-        if (!near) return near.error();
-        const auto from_far = judged(*session, *renderer, far, *judge_far);
-        if (!from_far) return from_far.error();
-        points.push_back(
-            {.name = name,
-             .values = {seconds, near->verdict.v, near->triangles, static_cast<double>(near->verdict.visible),
-                        from_far->triangles, from_far->verdict.v},
-             .note = note,
-             .is_default = is_default});
-        return {};
-    };
+    const Judges judges{std::move(*judge), std::move(*judge_far), far};
     // Without what is measured of it, which is of the light that was conserved.
     vdtree::BuildOptions build;
     build.light = tree.light();
@@ -90,30 +95,26 @@ Result<AccuracyPoints> measurement_points(AccuracySubject& subject, const Accura
     const auto plain = vdtree::build_tree(vdtree::extract_mesh(full).view(), build);
     if (!plain) return plain.error();
     std::optional<vdtree::VertexTree> usual;
-    if (auto ok = add(
-            "the program's, all cores",
-            [&]() -> Result<vdtree::VertexTree> {
-                auto made = session::measured(*plain);
-                if (made) usual = made->share();
-                return made;
-            },
-            "", true);
-        !ok)
-        return ok.error();
-    if (auto ok = add(
-            "one thread", [&] { return session::measured(*plain, 1); }, "the same numbers", false);
-        !ok)
-        return ok.error();
-    if (auto ok = add(
-            "without conserving light", [&] { return perception::measure_folds(*plain); },
-            "proxies keep the luminance that they were built with", false);
-        !ok)
-        return ok.error();
-    if (auto ok = add(
-            "without stages", [&] { return without_stages(*usual); },
-            "what the pictures of the whole mesh add; its time is not told apart", false);
-        !ok)
-        return ok.error();
+    const auto measure_usual = [&]() -> Result<vdtree::VertexTree> {
+        auto made = session::measured(*plain);
+        if (made) usual = made->share();
+        return made;
+    };
+    AccuracyPoints points;
+    for (auto made :
+         {point(subject, judges, "the program's, all cores", measure_usual),
+          point(
+              subject, judges, "one thread", [&] { return session::measured(*plain, 1); }, "the same numbers"),
+          point(
+              subject, judges, "without conserving light", [&] { return perception::measure_folds(*plain); },
+              "proxies keep the luminance that they were built with"),
+          point(
+              subject, judges, "without stages", [&] { return usual ? without_stages(*usual) : measure_usual(); },
+              "what the pictures of the whole mesh add; its time is not told apart")}) {
+        if (!made) return made.error();
+        points.push_back(std::move(*made));
+    }
+    points.front().is_default = true;
     points.back().values[0] = points.front().values[0];
     return points;
 }

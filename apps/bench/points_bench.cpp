@@ -103,16 +103,16 @@ private:
     void add(const std::string& request, const session::TradeoffPoint& point, const session::Report& mesh) {
         const double from = mesh.imperceptible_from_m;
         table_.rows.push_back({"`" + request + "`", grouped(mesh.stats.triangles), grouped(point.triangles),
-                               rounded(mesh.adapt_ms, 2), rounded(point.follow_ms, 2), grouped(point.visible_pixels),
-                               rounded(point.v, 3), rounded(point.second_v, 3),
+                               rounded(mesh.adapt_ms, 2), rounded(point.follow_ms.median, 2),
+                               grouped(point.visible_pixels), rounded(point.v, 3), rounded(point.second_v, 3),
                                std::isnan(from) ? "" : rounded(from, 3)});
         points_.push_back({{"model", model_},
                            {"request", request},
                            {"triangles", mesh.stats.triangles},
                            {"picture_triangles", point.triangles},
                            {"adapt_ms", mesh.adapt_ms},
-                           {"follow_ms", number_or_null(point.follow_ms)},
-                           {"draw_ms", point.draw_ms},
+                           {"follow_ms", number_or_null(point.follow_ms.median)},
+                           {"draw_ms", point.draw_ms.median},
                            {"visible_pixels", point.visible_pixels},
                            {"v", point.v},
                            {"second_visible_pixels", point.second_visible_pixels},

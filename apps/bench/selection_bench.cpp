@@ -210,95 +210,105 @@ public:
         : context_(context), scene_(scene), selections_(selections), options_(options) {}
 
     Result<std::vector<MethodFigures>> run() {
-        const auto& triangles = scene_.pictures->triangles();
-        std::vector<MethodFigures> methods;
-        using Choose = std::function<Result<std::vector<int>>(const vdtree::View&)>;
-        std::vector<Choose> ways;
-        std::vector<std::unique_ptr<SelectionFollower>> followers;
-        const auto follow = [&](Way way, const std::string& name, const session::Selections& selections,
-                                session::SelectionBlend blend) -> Result<void> {
-            auto follower = SelectionFollower::create(selections, scene_.session->scene(), triangles,
-                                                      {.budget = options_.budget, .blend = blend});
-            if (!follower) return follower.error();
-            followers.push_back(std::make_unique<SelectionFollower>(std::move(*follower)));
-            methods.push_back({way, name});
-            ways.push_back([&own = *followers.back()](const vdtree::View& view) -> Result<std::vector<int>> {
-                auto chosen = own.choose(view);
-                if (!chosen) return chosen.error();
-                return std::move(chosen->levels);
-            });
-            return {};
-        };
-        for (const session::Selections& selections : selections_) {
-            const bool is_first = &selections == &selections_.front();
-            if (auto ok =
-                    follow(is_first ? Way::selected : Way::selected_otherwise,
-                           "selected, by " + name_of(selections.quality), selections, session::SelectionBlend::costs);
-                !ok)
-                return ok.error();
-        }
-        if (auto ok = follow(Way::nearest, "selected, combined as in the thesis", selections_.front(),
-                             session::SelectionBlend::nearest);
-            !ok)
-            return ok.error();
-        const auto switching = [&](Way way, const std::string& name, Choose choose) {
-            methods.push_back({way, name});
-            ways.push_back(std::move(choose));
-        };
-        switching(Way::thresholds, "by area, the thesis's thresholds",
-                  [&](const vdtree::View& v) { return scene_.switched(v, false, 1); });
-        switching(Way::area, "by area, within the budget",
-                  [&](const vdtree::View& v) { return scene_.switched_within(v, false, options_.budget); });
-        switching(Way::distance, "by distance, within the budget",
-                  [&](const vdtree::View& v) { return scene_.switched_within(v, true, options_.budget); });
-        methods.push_back({Way::tree, "the tree's budget"});
-        if (options_.has_masked_tree) methods.push_back({Way::masked_tree, "the tree's budget, masked"});
-        std::vector<std::vector<int>> last(ways.size());
+        if (auto added = add_methods(); !added) return added.error();
         auto renderer = session::SceneRenderer::create(context_, *scene_.session);
         if (!renderer) return renderer.error();
         const auto views = flight(selections_.front(), options_);
         for (std::size_t number = 0; number < views.size(); ++number) {
-            const vdtree::View& view = views[number];
             const bool is_judged = number % static_cast<std::size_t>(options_.judged_every) == 0;
             if (is_judged)
-                if (auto begun = begin(view); !begun) return begun.error();
-            for (std::size_t w = 0; w < ways.size(); ++w) {
-                const auto levels = ways[w](view);
-                if (!levels) return levels.error();
-                MethodFigures& method = methods[w];
-                const std::uint64_t triangles_now = scene_.triangles(*levels);
-                std::uint64_t changes = 0;
-                for (std::size_t i = 0; i < last[w].size(); ++i)
-                    changes += last[w][i] >= 0 && (*levels)[i] >= 0 && last[w][i] != (*levels)[i];
-                last[w] = *levels;
-                ++method.count;
-                method.triangles += static_cast<double>(triangles_now);
-                method.changes += static_cast<double>(changes);
-                method.most_triangles = std::max(method.most_triangles, triangles_now);
-                method.most_changes = std::max(method.most_changes, changes);
+                if (auto begun = begin(views[number]); !begun) return begun.error();
+            for (std::size_t m = 0; m < methods_.size(); ++m) {
+                const bool has_levels = m < ways_.size();
+                if (!has_levels && !is_judged) continue;
+                auto judged =
+                    has_levels ? step(m, views[number], is_judged) : step_tree(methods_[m], *renderer, views[number]);
+                if (!judged) return judged.error();
                 if (!is_judged) continue;
-                const auto frame = scene_.pictures->draw_frame(view, *levels, options_.samples);
-                if (!frame) return frame.error();
-                auto figures = judge(*frame);
-                if (!figures) return figures.error();
-                figures->number = static_cast<int>(number);
-                figures->triangles = triangles_now;
-                method.frames.push_back(*figures);
-            }
-            for (std::size_t m = ways.size(); is_judged && m < methods.size(); ++m) {
-                auto figures = of_tree(*renderer, view, methods[m].way == Way::masked_tree);
-                if (!figures) return figures.error();
-                figures->number = static_cast<int>(number);
-                methods[m].frames.push_back(*figures);
-                ++methods[m].count;
-                methods[m].triangles += static_cast<double>(figures->triangles);
-                methods[m].most_triangles = std::max(methods[m].most_triangles, figures->triangles);
+                judged->number = static_cast<int>(number);
+                methods_[m].frames.push_back(*judged);
             }
         }
-        return methods;
+        return std::move(methods_);
     }
 
 private:
+    // Those with levels first, each with its way.
+    Result<void> add_methods() {
+        using session::SelectionBlend;
+        for (const session::Selections& selections : selections_) {
+            const Way way = &selections == &selections_.front() ? Way::selected : Way::selected_otherwise;
+            const std::string name = "selected, by " + name_of(selections.quality);
+            if (auto ok = add_selected(way, name, selections, SelectionBlend::costs); !ok) return ok;
+        }
+        if (auto ok = add_selected(Way::nearest, "selected, combined as in the thesis", selections_.front(),
+                                   SelectionBlend::nearest);
+            !ok)
+            return ok;
+        add(Way::thresholds, "by area, the thesis's thresholds",
+            [&](const vdtree::View& v) { return scene_.switched(v, false, 1); });
+        add(Way::area, "by area, within the budget",
+            [&](const vdtree::View& v) { return scene_.switched_within(v, false, options_.budget); });
+        add(Way::distance, "by distance, within the budget",
+            [&](const vdtree::View& v) { return scene_.switched_within(v, true, options_.budget); });
+        methods_.push_back({Way::tree, "the tree's budget"});
+        if (options_.has_masked_tree) methods_.push_back({Way::masked_tree, "the tree's budget, masked"});
+        last_.resize(ways_.size());
+        return {};
+    }
+
+    using Choose = std::function<Result<std::vector<int>>(const vdtree::View&)>;
+    void add(Way way, const std::string& name, Choose choose) {
+        methods_.push_back({way, name});
+        ways_.push_back(std::move(choose));
+    }
+    Result<void> add_selected(Way way, const std::string& name, const session::Selections& selections,
+                              session::SelectionBlend blend) {
+        auto follower = SelectionFollower::create(selections, scene_.session->scene(), scene_.pictures->triangles(),
+                                                  {.budget = options_.budget, .blend = blend});
+        if (!follower) return follower.error();
+        followers_.push_back(std::make_unique<SelectionFollower>(std::move(*follower)));
+        add(way, name, [&own = *followers_.back()](const vdtree::View& view) -> Result<std::vector<int>> {
+            auto chosen = own.choose(view);
+            if (!chosen) return chosen.error();
+            return std::move(chosen->levels);
+        });
+        return {};
+    }
+
+    // A frame of a method with levels; judged if that is asked for.
+    Result<FrameFigures> step(std::size_t m, const vdtree::View& view, bool is_judged) {
+        const auto levels = ways_[m](view);
+        if (!levels) return levels.error();
+        MethodFigures& method = methods_[m];
+        const std::uint64_t triangles = scene_.triangles(*levels);
+        std::uint64_t changes = 0;
+        for (std::size_t i = 0; i < last_[m].size(); ++i)
+            changes += last_[m][i] >= 0 && (*levels)[i] >= 0 && last_[m][i] != (*levels)[i];
+        last_[m] = *levels;
+        count(method, triangles);
+        method.changes += static_cast<double>(changes);
+        method.most_changes = std::max(method.most_changes, changes);
+        if (!is_judged) return FrameFigures{};
+        const auto frame = scene_.pictures->draw_frame(view, *levels, options_.samples);
+        if (!frame) return frame.error();
+        auto figures = judge(*frame);
+        if (figures) figures->triangles = triangles;
+        return figures;
+    }
+
+    Result<FrameFigures> step_tree(MethodFigures& method, session::SceneRenderer& renderer, const vdtree::View& view) {
+        auto figures = of_tree(renderer, view, method.way == Way::masked_tree);
+        if (figures) count(method, figures->triangles);
+        return figures;
+    }
+
+    static void count(MethodFigures& method, std::uint64_t triangles) {
+        ++method.count;
+        method.triangles += static_cast<double>(triangles);
+        method.most_triangles = std::max(method.most_triangles, triangles);
+    }
+
     Result<void> begin(const vdtree::View& view) {
         std::vector<int> full;
         for (const session::WorldSphere& sphere : scene_.spheres)
@@ -345,6 +355,10 @@ private:
     const SelectionBenchOptions& options_;
     perception::Image codes_;
     std::unique_ptr<perception::Judge> judge_;
+    std::vector<MethodFigures> methods_;
+    std::vector<Choose> ways_; // of the first methods
+    std::vector<std::unique_ptr<SelectionFollower>> followers_;
+    std::vector<std::vector<int>> last_; // levels of the frame before, by way
 };
 
 // ---- how far the search is from the best --------------------------------------------------------------------------------
@@ -500,6 +514,140 @@ Result<BenchTable> growth(const render::Context& context, const Scene& scene, co
     return table;
 }
 
+// Scene by scene.
+class SelectionBench {
+public:
+    SelectionBench(const render::Context& context, const MadeScenes& made, const SelectionBenchOptions& options)
+        : context_(context), made_(made), options_(options) {
+        result_.json["scenes"] = Json::array();
+        before_.title = "Before the flight";
+        before_.rows = {{"scene", "by", "objects", "triangles", "cameras", "s", "of it levels", "drawing",
+                         "reading back", "searching, all threads", "drawings", "evaluations", "the thesis"}};
+        means_.title = "Means, beside the thesis's (1920 x 1080 pixels, its own judge and meshes)";
+        means_.rows = {{"scene", "SSIM, by area: thesis", "its selection", "here, thresholds", "within the budget",
+                        "selected", "tree", "visible pixels, by area: thesis", "its selection", "here, thresholds",
+                        "within the budget", "selected", "tree"}};
+        correlations_.title = "Correlation of SSIM and visible pixels, levels selected";
+        correlations_.rows = {{"scene", "Pearson's", "the thesis"}};
+        gaps_.title = "What the search loses, against the best of all choices";
+        gaps_.rows = {{"scene", "cameras", "times the best"}};
+    }
+
+    // `selected`: levels that are given for it; empty: they are searched.
+    Result<void> add(const std::string& file, const std::string& selected) {
+        std::vector<session::Selections> selections;
+        if (!selected.empty())
+            if (auto read = read_into(selections, selected); !read) return read;
+        auto scene = Scene::create(context_, file,
+                                   selected.empty() ? session::default_selected_levels : selections.front().levels);
+        if (!scene) return scene.error();
+        Json json = {{"scene", scene->name}};
+        if (selected.empty())
+            if (auto searched = search(*scene, selections, json); !searched) return searched;
+        if (result_.tables.empty() && selected.empty() && options_.measures_growth) {
+            auto table = growth(context_, *scene, file, selections.front(), options_, made_.file("growth.sel"));
+            if (!table) return table.error();
+            grown_ = std::move(*table);
+        }
+        const auto methods = Flight(context_, *scene, selections, options_).run();
+        if (!methods) return methods.error();
+        result_.tables.push_back(table_of(scene->name, *methods));
+        for (const MethodFigures& m : *methods)
+            for (const FrameFigures& f : m.frames)
+                result_.frames.push_back({scene->name, m.name, f.number, f.triangles, f.ssim, f.visible});
+        json["methods"] = to_json(*methods);
+        add_means(scene->name, *methods);
+        if (auto added = add_gap(*scene, selections.front(), json); !added) return added;
+        if (!options_.plots.empty())
+            if (auto written = write_plots(options_.plots, scene->name, *methods); !written) return written;
+        result_.json["scenes"].push_back(std::move(json));
+        return {};
+    }
+
+    SelectionBenchResult take() {
+        result_.tables.push_back(std::move(means_));
+        result_.tables.push_back(std::move(correlations_));
+        for (BenchTable* const table : {&gaps_, &before_})
+            if (table->rows.size() > 1) result_.tables.push_back(std::move(*table));
+        if (grown_) {
+            result_.json["growth"] = grown_->rows;
+            result_.tables.push_back(std::move(*grown_));
+        }
+        return std::move(result_);
+    }
+
+private:
+    static Result<void> read_into(std::vector<session::Selections>& selections, const std::string& file) {
+        auto read = session::read_selections(file);
+        if (!read) return read.error();
+        selections.push_back(std::move(*read));
+        return {};
+    }
+
+    Result<void> search(Scene& scene, std::vector<session::Selections>& selections, Json& json) {
+        const Thesis* const there = thesis_of(scene.name);
+        const std::string file = made_.file(scene.name + ".sel");
+        for (const session::SelectionQuality quality : options_.qualities) {
+            const auto done = session::precompute_selections(context_, *scene.session, file,
+                                                             {.budget = options_.budget,
+                                                              .quality = quality,
+                                                              .window_px = options_.window_px,
+                                                              .spacing = options_.spacing});
+            if (!done) return done.error();
+            before_.rows.push_back(
+                {scene.name, name_of(quality), grouped(scene.spheres.size()), grouped(scene.session->triangle_count()),
+                 grouped(done->cameras), rounded(done->seconds, 3), rounded(done->load_seconds, 3),
+                 rounded(done->draw_seconds, 3), rounded(done->read_seconds, 3), rounded(done->search_seconds, 3),
+                 grouped(done->drawings), grouped(done->evaluations),
+                 there ? std::to_string(there->cameras) + " cameras in " + there->precompute : ""});
+            json["precompute"].push_back({{"quality", name_of(quality)},
+                                          {"cameras", done->cameras},
+                                          {"seconds", done->seconds},
+                                          {"load_seconds", done->load_seconds},
+                                          {"draw_seconds", done->draw_seconds},
+                                          {"read_seconds", done->read_seconds},
+                                          {"search_seconds", done->search_seconds}});
+            if (auto read = read_into(selections, file); !read) return read;
+        }
+        return {};
+    }
+
+    void add_means(const std::string& scene, const std::vector<MethodFigures>& methods) {
+        const Thesis* const there = thesis_of(scene);
+        std::vector<std::string> row = {scene};
+        for (const bool is_ssim : {true, false}) {
+            const auto text = [&](double v) {
+                return is_ssim ? rounded(v, 6) : grouped(static_cast<std::uint64_t>(std::llround(v)));
+            };
+            row.push_back(there ? text(is_ssim ? there->ssim_by_area : there->pixels_by_area) : "");
+            row.push_back(there ? text(is_ssim ? there->ssim_selected : there->pixels_selected) : "");
+            for (const Way way : {Way::thresholds, Way::area, Way::selected, Way::tree}) {
+                const MethodFigures& m = figures_of(methods, way);
+                row.push_back(text(is_ssim ? m.mean_ssim() : m.mean_visible()));
+            }
+        }
+        means_.rows.push_back(std::move(row));
+        correlations_.rows.push_back(
+            {scene, rounded(correlation(methods.front()), 3), there ? rounded(there->correlation, 3) : ""});
+    }
+
+    Result<void> add_gap(Scene& scene, const session::Selections& selections, Json& json) {
+        const auto gap = gap_of(scene, selections, options_.gap_cameras);
+        if (!gap) return gap.error();
+        if (gap->cameras == 0 || !(gap->best > 0)) return {};
+        gaps_.rows.push_back({scene.name, std::to_string(gap->cameras), rounded(gap->greedy / gap->best, 3)});
+        json["gap"] = {{"cameras", gap->cameras}, {"greedy", gap->greedy}, {"best", gap->best}};
+        return {};
+    }
+
+    const render::Context& context_;
+    const MadeScenes& made_;
+    const SelectionBenchOptions& options_;
+    SelectionBenchResult result_;
+    BenchTable before_, means_, correlations_, gaps_;
+    std::optional<BenchTable> grown_;
+};
+
 } // namespace
 
 Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& options) {
@@ -515,106 +663,11 @@ Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& option
     if (auto folder = made.make_folder(); !folder) return folder.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
-    SelectionBenchResult result;
-    result.json["scenes"] = Json::array();
-    BenchTable before, means, correlations, gaps;
-    before.title = "Before the flight";
-    before.rows.push_back({"scene", "by", "objects", "triangles", "cameras", "s", "of it levels", "drawing",
-                           "reading back", "searching, all threads", "drawings", "evaluations", "the thesis"});
-    means.title = "Means, beside the thesis's (1920 x 1080 pixels, its own judge and meshes)";
-    means.rows.push_back({"scene", "SSIM, by area: thesis", "its selection", "here, thresholds", "within the budget",
-                          "selected", "tree", "visible pixels, by area: thesis", "its selection", "here, thresholds",
-                          "within the budget", "selected", "tree"});
-    correlations.title = "Correlation of SSIM and visible pixels, levels selected";
-    correlations.rows.push_back({"scene", "Pearson's", "the thesis"});
-    gaps.title = "What the search loses, against the best of all choices";
-    gaps.rows.push_back({"scene", "cameras", "times the best"});
-    std::optional<BenchTable> grown;
-    for (std::size_t i = 0; i < files.size(); ++i) {
-        const bool are_given = !options.selections.empty();
-        std::vector<session::Selections> selections;
-        if (are_given) {
-            auto read = session::read_selections(options.selections[i]);
-            if (!read) return read.error();
-            selections.push_back(std::move(*read));
-        }
-        auto scene =
-            Scene::create(*context, files[i], are_given ? selections.front().levels : session::default_selected_levels);
-        if (!scene) return scene.error();
-        const Thesis* const there = thesis_of(scene->name);
-        Json json = {{"scene", scene->name}};
-        for (const session::SelectionQuality quality : options.qualities) {
-            if (are_given) break;
-            const std::string file = made.file(scene->name + ".sel");
-            const auto done = session::precompute_selections(*context, *scene->session, file,
-                                                             {.budget = options.budget,
-                                                              .quality = quality,
-                                                              .window_px = options.window_px,
-                                                              .spacing = options.spacing});
-            if (!done) return done.error();
-            before.rows.push_back(
-                {scene->name, name_of(quality), grouped(scene->spheres.size()),
-                 grouped(scene->session->triangle_count()), grouped(done->cameras), rounded(done->seconds, 3),
-                 rounded(done->load_seconds, 3), rounded(done->draw_seconds, 3), rounded(done->read_seconds, 3),
-                 rounded(done->search_seconds, 3), grouped(done->drawings), grouped(done->evaluations),
-                 there ? std::to_string(there->cameras) + " cameras in " + there->precompute : ""});
-            json["precompute"].push_back({{"quality", name_of(quality)},
-                                          {"cameras", done->cameras},
-                                          {"seconds", done->seconds},
-                                          {"load_seconds", done->load_seconds},
-                                          {"draw_seconds", done->draw_seconds},
-                                          {"read_seconds", done->read_seconds},
-                                          {"search_seconds", done->search_seconds}});
-            auto read = session::read_selections(file);
-            if (!read) return read.error();
-            selections.push_back(std::move(*read));
-        }
-        if (i == 0 && !are_given && options.measures_growth) {
-            auto table = growth(*context, *scene, files[i], selections.front(), options, made.file("growth.sel"));
-            if (!table) return table.error();
-            grown = std::move(*table);
-        }
-        const auto methods = Flight(*context, *scene, selections, options).run();
-        if (!methods) return methods.error();
-        result.tables.push_back(table_of(scene->name, *methods));
-        for (const MethodFigures& m : *methods)
-            for (const FrameFigures& f : m.frames)
-                result.frames.push_back({scene->name, m.name, f.number, f.triangles, f.ssim, f.visible});
-        json["methods"] = to_json(*methods);
-        std::vector<std::string> row = {scene->name};
-        for (const bool is_ssim : {true, false}) {
-            const auto text = [&](double v) {
-                return is_ssim ? rounded(v, 6) : grouped(static_cast<std::uint64_t>(std::llround(v)));
-            };
-            row.push_back(there ? text(is_ssim ? there->ssim_by_area : there->pixels_by_area) : "");
-            row.push_back(there ? text(is_ssim ? there->ssim_selected : there->pixels_selected) : "");
-            for (const Way way : {Way::thresholds, Way::area, Way::selected, Way::tree}) {
-                const MethodFigures& m = figures_of(*methods, way);
-                row.push_back(text(is_ssim ? m.mean_ssim() : m.mean_visible()));
-            }
-        }
-        means.rows.push_back(std::move(row));
-        correlations.rows.push_back(
-            {scene->name, rounded(correlation(methods->front()), 3), there ? rounded(there->correlation, 3) : ""});
-        const auto gap = gap_of(*scene, selections.front(), options.gap_cameras);
-        if (!gap) return gap.error();
-        if (gap->cameras > 0 && gap->best > 0) {
-            gaps.rows.push_back({scene->name, std::to_string(gap->cameras), rounded(gap->greedy / gap->best, 3)});
-            json["gap"] = {{"cameras", gap->cameras}, {"greedy", gap->greedy}, {"best", gap->best}};
-        }
-        if (!options.plots.empty())
-            if (auto written = write_plots(options.plots, scene->name, *methods); !written) return written.error();
-        result.json["scenes"].push_back(std::move(json));
-    }
-    result.tables.push_back(std::move(means));
-    result.tables.push_back(std::move(correlations));
-    for (BenchTable* const table : {&gaps, &before})
-        if (table->rows.size() > 1) result.tables.push_back(std::move(*table));
-    if (grown) {
-        result.json["growth"] = grown->rows;
-        result.tables.push_back(std::move(*grown));
-    }
-    return result;
+    SelectionBench bench(*context, made, options);
+    for (std::size_t i = 0; i < files.size(); ++i)
+        if (auto added = bench.add(files[i], options.selections.empty() ? "" : options.selections[i]); !added)
+            return added.error();
+    return bench.take();
 }
 
 std::string to_csv(const std::vector<SelectionFrame>& frames) {
