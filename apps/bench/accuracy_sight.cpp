@@ -286,72 +286,82 @@ double median_ratio(const perception::Image& map, const perception::Image& other
     return quantile(std::move(ratios), 0.5);
 }
 
-} // namespace
+// Sensitivities to random stimuli: each way's time and error.
+class CsfLookups {
+public:
+    explicit CsfLookups(int repeats) : stimuli_(random_stimuli(count)), repeats_(repeats), truth_(count) {}
 
-Result<AccuracyPoints> csf_points(const AccuracyBenchOptions& options) {
-    constexpr std::size_t count = 100'000;
-    const Stimuli stimuli = random_stimuli(count);
-    std::vector<double> truth(count), found(count);
-    const auto timed = [&](const std::function<double(double, double, double)>& look_up, std::vector<double>& into) {
-        std::vector<double> times;
-        for (int i = 0; i < std::max(1, options.repeats / 3); ++i) {
+    // The first is the truth that the others are held against.
+    template <class LookUp>
+    void add(const std::string& name, LookUp&& look_up, double bytes = 0, const std::string& note = {},
+             bool is_default = false) {
+        std::vector<double> found(count), times, errors;
+        for (int i = 0; i < repeats_; ++i) {
             const auto start = BenchClock::now();
             for (std::size_t k = 0; k < count; ++k)
-                into[k] = look_up(stimuli.cpd[k], stimuli.degrees[k], stimuli.cdm2[k]);
+                found[k] = look_up(stimuli_.cpd[k], stimuli_.degrees[k], stimuli_.cdm2[k]);
             times.push_back(1e9 * seconds_since(start) / count);
         }
-        return median(std::move(times));
-    };
-    AccuracyPoints points;
-    const auto add = [&](const std::string& name, double ns, double bytes, const std::string& note, bool is_default) {
-        std::vector<double> errors;
+        if (points.empty()) truth_ = found;
         for (std::size_t k = 0; k < count; ++k)
-            if (truth[k] > 1) errors.push_back(std::abs(found[k] / truth[k] - 1));
-        points.push_back({.subject = "castleCSF",
-                          .name = name,
-                          .values = {ns, *std::ranges::max_element(errors), quantile(errors, 0.95), bytes},
-                          .note = note,
-                          .is_default = is_default});
-    };
-    const double closed = timed(
-        [](double f, double e, double l) {
-            return perception::sensitivity(perception::CsfModel::castle,
-                                           perception::stimulus_of({}, CyclesPerDegree(f), Degrees(e), Luminance(l)));
-        },
-        truth);
-    found = truth;
-    add("closed form, double", closed, 0, "", false);
-    add("closed form, float",
-        timed(
-            [](double f, double e, double l) {
-                return static_cast<double>(
-                    castle_twin(static_cast<float>(f), static_cast<float>(e), static_cast<float>(l)));
-            },
-            found),
-        0, "a twin, for static gratings alone", false);
-    const auto add_table = [&](const std::string& name, const perception::CsfTable& table, bool is_default) {
-        const double ns =
-            timed([&](double f, double e,
-                      double l) { return table.sensitivity(CyclesPerDegree(f), Degrees(e), Luminance(l)); },
-                  found);
+            if (truth_[k] > 1) errors.push_back(std::abs(found[k] / truth_[k] - 1));
+        points.push_back(
+            {.subject = "castleCSF",
+             .name = name,
+             .values = {median(std::move(times)), *std::ranges::max_element(errors), quantile(errors, 0.95), bytes},
+             .note = note,
+             .is_default = is_default});
+    }
+    void add(const std::string& name, const perception::CsfTable& table, bool is_default = false) {
         const perception::CsfSamples& s = table.samples();
-        add(name, ns, static_cast<double>(sizeof(double) * s.sensitivity.size()),
+        add(
+            name,
+            [&](double f, double e, double l) {
+                return table.sensitivity(CyclesPerDegree(f), Degrees(e), Luminance(l));
+            },
+            static_cast<double>(sizeof(double) * s.sensitivity.size()),
             std::to_string(s.frequency_cpd.size()) + " x " + std::to_string(s.eccentricity_deg.size()) + " x " +
                 std::to_string(s.luminance_cdm2.size()) + " samples",
             is_default);
-    };
+    }
+
+    AccuracyPoints points;
+
+private:
+    static constexpr std::size_t count = 100'000;
+    Stimuli stimuli_;
+    int repeats_;
+    std::vector<double> truth_;
+};
+
+} // namespace
+
+Result<AccuracyPoints> csf_points(const AccuracyBenchOptions& options) {
+    CsfLookups lookups(std::max(1, options.repeats / 3));
+    lookups.add("closed form, double", [](double f, double e, double l) {
+        return perception::sensitivity(perception::CsfModel::castle,
+                                       perception::stimulus_of({}, CyclesPerDegree(f), Degrees(e), Luminance(l)));
+    });
+    lookups.add(
+        "closed form, float",
+        [](double f, double e, double l) {
+            return static_cast<double>(
+                castle_twin(static_cast<float>(f), static_cast<float>(e), static_cast<float>(l)));
+        },
+        0, "a twin, for static gratings alone");
     for (const int samples : {16, 32, 64}) {
         perception::CsfSamples s = samples_of(samples);
         const CubicTable cubic(s);
         const auto table = perception::CsfTable::create(std::move(s));
         if (!table) return table.error();
-        add_table("table, " + std::to_string(samples) + " an axis, linear", *table, false);
-        const double ns = timed([&](double f, double e, double l) { return cubic.sensitivity(f, e, l); }, found);
-        add("table, " + std::to_string(samples) + " an axis, cubic", ns, static_cast<double>(cubic.bytes()), "a twin",
-            false);
+        const std::string name = "table, " + std::to_string(samples) + " an axis, ";
+        lookups.add(name + "linear", *table);
+        lookups.add(
+            name + "cubic", [&](double f, double e, double l) { return cubic.sensitivity(f, e, l); },
+            static_cast<double>(cubic.bytes()), "a twin");
     }
-    add_table("the program's table", perception::CsfTable::standard(), true);
-    return points;
+    lookups.add("the program's table", perception::CsfTable::standard(), true);
+    return std::move(lookups.points);
 }
 
 Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
