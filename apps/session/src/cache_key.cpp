@@ -230,6 +230,8 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
 }
 
 std::vector<fs::path> files_named_by(const fs::path& mesh) {
+    for (const char* ending : {".ply", ".stl", ".off", ".vtp"}) // large, and they name no files
+        if (mesh.extension() == ending) return {};
     const auto bytes = read_regular_file(mesh);
     if (!bytes) return {};
     const Names names = names_in(mesh, *bytes);
