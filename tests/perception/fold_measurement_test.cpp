@@ -252,7 +252,7 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
 }
 
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
-    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.02));
     const auto one = measure_folds(tree, 1), four = measure_folds(tree, 4);
     ASSERT_TRUE(one && four);
     EXPECT_EQ(errors_of(*one), errors_of(*four));

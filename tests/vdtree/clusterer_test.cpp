@@ -231,7 +231,7 @@ TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
         const Mesh mesh = hard.make();
         const ClusteringTask task(mesh);
         const Clustering alone = clustered(task, ClustererKind::quadric);
-        for (const int members : {1, 2, 3, 5, 40}) {
+        for (const int members : {1, 3, 40}) {
             Mailboxes mail;
             std::vector<std::thread> others;
             for (int rank = 1; rank < members; ++rank)
@@ -262,7 +262,7 @@ TEST(SurfaceAnalysis, IsTheSameWithATeamOfAnySize) {
             EXPECT_EQ(surface->areas, alone.areas);
             EXPECT_EQ(surface->normals, alone.normals);
         };
-        for (const int members : {1, 2, 5}) {
+        for (const int members : {1, 3}) {
             Mailboxes mail;
             std::vector<std::thread> others;
             const auto analyse = [&](int rank) {
