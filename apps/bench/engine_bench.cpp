@@ -22,7 +22,7 @@
 
 #include "bench_tools.h"
 #include "child_process.h"
-#include "model_file.h"
+#include "load_model.h"
 #include "progress_bar.h"
 #include "terminal.h"
 

@@ -1,4 +1,4 @@
-// Scenes of `unseen scene make`, for benchmarks.
+// Scenes of `unseen make scene`, for benchmarks.
 #pragma once
 
 #include <cstdint>

@@ -421,7 +421,7 @@ Command scenes_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand(
         "scenes", "What masking and occlusion save in scenes, and what discrete levels of detail make of the same");
     verb->add_option("SCENE", a->options.scenes,
-                     "Scenes with cameras (default: museum, treasure, house and forest of 'unseen scene make')")
+                     "Scenes with cameras (default: museum, treasure, house and forest of 'unseen make scene')")
         ->type_name("SCENE.glb");
     verb->add_option("--triangles", a->options.triangles, "Of each of the default scenes, about (default: 500000)")
         ->type_name("N")
@@ -474,7 +474,7 @@ Command selection_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand(
         "selection", "What a flight shows of levels selected beforehand, of switching by area and distance, and of the "
                      "tree's budget");
-    verb->add_option("SCENE", o.scenes, "Scenes (default: spheres, bunnies and models of 'unseen scene make')")
+    verb->add_option("SCENE", o.scenes, "Scenes (default: spheres, bunnies and models of 'unseen make scene')")
         ->type_name("SCENE.glb");
     CLI::Option* selections =
         verb->add_option("--selection", o.selections, "Of each scene, in their order (default: made here)")
@@ -576,7 +576,7 @@ Command accuracy_command(CLI::App& app) {
             "Meshes, trees and scenes (default: the meshes that are installed, and the scenes of 'unseen scene "
             "make')")
         ->type_name("MODEL");
-    verb->add_flag("--scenes", a->options.has_scenes, "Besides MODEL, the scenes of 'unseen scene make'");
+    verb->add_flag("--scenes", a->options.has_scenes, "Besides MODEL, the scenes of 'unseen make scene'");
     verb->add_option("--csv", a->csv, "One line a point")->type_name("FILE.csv");
     verb->add_option("--html", a->html, "A page with plots, for browsers; it needs no other file")
         ->type_name("FILE.html");

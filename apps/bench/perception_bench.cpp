@@ -17,7 +17,7 @@
 
 #include "bench_tools.h"
 #include "judged_model.h"
-#include "model_file.h"
+#include "load_model.h"
 #include "progress_bar.h"
 #include "terminal.h"
 

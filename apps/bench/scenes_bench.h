@@ -10,7 +10,7 @@
 namespace unseen::app {
 
 struct ScenesBenchOptions {
-    std::vector<std::string> scenes; // glTF files; empty: the four of `unseen scene make`, of about `triangles` each
+    std::vector<std::string> scenes; // glTF files; empty: the four of `unseen make scene`, of about `triangles` each
     std::uint64_t triangles = 500'000;
     int window_px = 512;
     int samples = 64;        // a pixel of what is judged

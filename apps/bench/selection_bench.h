@@ -13,7 +13,7 @@
 namespace unseen::app {
 
 struct SelectionBenchOptions {
-    std::vector<std::string> scenes;     // glTF files; empty: spheres, bunnies and models of `unseen scene make`
+    std::vector<std::string> scenes;     // glTF files; empty: spheres, bunnies and models of `unseen make scene`
     std::vector<std::string> selections; // by scene; empty: made anew
     std::vector<std::string> statues;    // of the scenes that are made
     std::uint64_t scene_triangles = 0;   // of each of them; 0: as the kind has them

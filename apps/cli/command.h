@@ -2,10 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include <unseen/vdtree/result.h>
+
+#include "rules.h"
 
 namespace unseen::app {
 
@@ -18,6 +21,7 @@ inline constexpr int exit_usage = 2;
 struct Command {
     CLI::App* parser = nullptr; // of the App given, which keeps it
     std::function<Result<int>()> run;
+    std::vector<Rule> rules = {}; // which options go together
 };
 
 } // namespace unseen::app

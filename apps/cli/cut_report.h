@@ -26,10 +26,10 @@ std::string visibility_text(const session::Report& report, const session::Observ
 // What stands behind it: counts, times and effects.
 void print_details(const session::Report& report, double draw_ms);
 
-// Of what a file became: "as" (model or scene), "tree" (where the first is from), and of scenes "objects" with name,
+// Adds what a file became: "as" (model or scene), "tree" (where the first is from), and for a scene "objects" with name,
 // triangles of the tree and of the cut, and "backdrop_triangles". `cuts`: by object.
 void add_scene(Json& json, const session::Session& session, std::span<const vdtree::Cut> cuts);
-// Of a scene: "a scene of 3 objects, with 2 parts of background"; of a model nothing.
+// For a scene "a scene of 3 objects, before 2 parts of background"; for a model nothing.
 void print_scene(const session::Session& session);
 
 Json to_json(std::span<const session::Effect> effects);

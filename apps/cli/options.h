@@ -1,4 +1,4 @@
-// The options that several verbs share: where from, on what display, and what.
+// The options that several verbs share, and what they say.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,8 @@
 #include <unseen/session/model_file.h>
 #include <unseen/session/request.h>
 
+#include "rules.h"
+
 namespace unseen::app {
 
 using session::FoldTest;
@@ -33,14 +35,15 @@ struct TextureOptions {
     bool is_prelit = false;   // --prelit, of colours as well
 };
 
-// VIEW. What is not given follows from the model and the display, see session/session.h.
+// What is not given follows from the model and the display, see session/session.h.
 struct ViewOptions {
+    std::string setup;                         // the file that these options were read from
     std::optional<glm::dvec3> eye, target, up; // world units
     std::optional<glm::dvec3> direction;       // from the model towards the eye
     std::optional<double> fill;                // share of the window's height
     std::optional<double> fov_degrees;         // vertical
     bool is_orthographic = false;
-    std::optional<double> orthographic_height; // world units; none: as --fill says
+    std::optional<double> orthographic_height; // world units; not given: as --fill says
     int width = 1024, height = 1024;           // pixels
     std::optional<glm::dvec3> light;           // towards it
     std::optional<double> ambient;             // 0..1
@@ -52,10 +55,9 @@ struct ViewOptions {
     TextureOptions texture;
     bool no_cache = false;                       // trees are neither kept nor taken from what was kept
     bool measures = true;                        // what folds change, when a tree is built
-    session::LoadAs as = session::LoadAs::model; // what glTF files become; set by verbs that take scenes
+    session::LoadAs as = session::LoadAs::model; // what glTF files become
 };
 
-// DISPLAY.
 struct DisplayOptions {
     std::string file;
     std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
@@ -65,18 +67,19 @@ struct DisplayOptions {
 
 // A number of triangles, or a share of the model's.
 struct TriangleCount {
+    // "5000", "10k", "1e4", "10,000" or "50%".
+    static std::optional<TriangleCount> of(const std::string& text);
+
     std::uint32_t triangles = 0; // 0: by the share
     double share = 0;            // 0.5: half of them
 
     bool is_given() const { return triangles > 0 || share > 0; }
-    // Of a model with so many; at least one.
+    // For a model with `all` triangles; at least one.
     std::uint32_t of(std::uint64_t all) const;
 };
 
-// WHAT.
-// How it is known what of a picture cannot be seen: by spheres inside solids, or by what the picture shows, too; or, of
-// flights, by that where frames take less time.
-enum class Visibility { spheres, picture };
+// What counts as hidden: what lies behind spheres inside solids, or also what lies behind anything in the picture.
+enum class Hiding { spheres, picture };
 
 struct WhatOptions {
     session::Request request; // of budgets, without the number of triangles
@@ -84,13 +87,12 @@ struct WhatOptions {
 
     // Whether a test may go by what folds change; tolerances in pixels do not.
     bool needs_measurement() const;
-    // For a model with so many triangles.
+    // For a model with that many triangles.
     session::Request request_for(std::uint64_t source_triangles) const;
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> velocity_deg_s; // of everything, on the retina
-    Visibility visibility = Visibility::spheres;
+    Hiding hiding = Hiding::spheres;
     bool masks = false; // the scene masks what folds change
-    int layers = 5;     // of depth, that mask each other
     perception::DegreesPerSecond velocity() const { return perception::DegreesPerSecond(velocity_deg_s.value_or(0)); }
 };
 
@@ -98,40 +100,37 @@ struct WhatOptions {
 using session::GazeOptions;
 using session::GazeSource;
 
-// Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
-// the parse with an error that names the option.
-void add_view_options(CLI::App& verb, ViewOptions& options);
-void add_orthographic_option(CLI::App& verb, ViewOptions& options); // beside them, for verbs that know such views
-// Of those, what does not say where one looks from: of verbs that choose their views.
-void add_surroundings_options(CLI::App& verb, ViewOptions& options);
-// Of verbs that take scenes: the model, TREE.
-void add_model_option(CLI::App& verb, std::string& model);
-// And --as. Files that look like scenes are, from now on.
-void add_as_option(CLI::App& verb, session::LoadAs& as);
-void add_display_options(CLI::App& verb, DisplayOptions& options);
-void add_what_options(CLI::App& verb, WhatOptions& options);
-// Of verbs for one view. Without `adds_layers` the verb has a --layers of its own.
-void add_visibility_option(CLI::App& verb, WhatOptions& options);
-void add_masking_option(CLI::App& verb, WhatOptions& options, bool adds_layers);
-// Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
-void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
-// What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.
-void check_gaze(const WhatOptions& what, const GazeOptions& gaze);
-void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view);
-void add_texture_options(CLI::App& verb, TextureOptions& options);
-void add_skip_bad_option(CLI::App& verb, bool& skips_bad); // part of add_texture_options()
-void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
+// Each adds options to a verb; setup.h has those of the whole program. The structs must outlive the parser. Impossible
+// values end the parse with an error that names the option.
+// The model, for verbs that look at one. `takes_scenes`: only for the help.
+void add_model_option(CLI::App& verb, std::string& model, bool takes_scenes = true);
+// The group WHAT. `rules`: what excludes what, for check_rules().
+void add_what_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
+void add_hiding_option(CLI::App& verb, WhatOptions& options);
+void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
+// Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.
+void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse, std::vector<Rule>& rules);
+void add_gaze_error_option(CLI::App& verb, GazeOptions& options);
+void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds, std::vector<Rule>& rules);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
-// Of `tests`.
+void add_velocity_option(CLI::App& verb, std::optional<double>& degrees_a_second);
+// The default for pictures that are judged.
+inline constexpr int samples_to_judge = 64;
+void add_samples_option(CLI::App& verb, int& samples, const std::string& defaults);
+void add_seed_option(CLI::App& verb, std::uint64_t& seed, const std::string& of);
+// The option takes `tests` alone.
 void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
                           const std::string& text);
 void add_json_option(CLI::App& verb, std::string& file);
 void add_verbose_option(CLI::App& verb, bool& is_verbose);
-// "5000" or "50%".
+// As TriangleCount::of() takes it.
 CLI::Option* add_triangles_option(CLI::App& verb, TriangleCount& count, const std::string& text);
 
+// "a, b or c".
+std::string listed(const std::vector<std::string>& names);
+
 // Validators. All of them refuse NaN and infinities.
-CLI::Validator finite_numbers(int count); // of an option that takes so many
+CLI::Validator finite_numbers(int count); // for an option that takes `count` of them
 CLI::Validator positive();
 CLI::Validator not_negative();
 CLI::Validator within(double low, double high);

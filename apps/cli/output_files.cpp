@@ -84,7 +84,7 @@ Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file)
 }
 
 std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display) {
-    return {model, view.lights, view.texture.file, display.file, display.observer, display.csf};
+    return {model, view.setup, view.lights, view.texture.file, display.file, display.observer, display.csf};
 }
 
 Message with_file_name(const Error& error) {

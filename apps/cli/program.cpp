@@ -4,8 +4,9 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <iterator>
 #include <new>
-#include <span>
 #include <string_view>
 #include <typeinfo>
 
@@ -51,23 +52,56 @@ const CLI::App& last_parsed(const CLI::App& app) {
     return verbs.empty() ? app : last_parsed(*verbs.front());
 }
 
-std::string complaint_about(const std::string& word, const CLI::App& app, const Program& program) {
-    const bool is_option = word.starts_with("-");
-    const bool takes_verbs = !parts_of(app, true).empty();
-    if (!is_option && !takes_verbs) return "'" + word + "' is one word too many.";
-    const auto hint = program.hints.find(word);
-    if (hint != program.hints.end()) return "there is no verb or option '" + word + "': " + hint->second;
-    const std::string near =
-        suggestion(word.substr(0, word.find('=')), is_option ? names_of_options(app) : verb_names(app));
-    return std::string("there is no ") + (is_option ? "option '" : "verb '") + word + "'" + (near.empty() ? "." : near);
+// The verbs that have an option, by their full names: "study make".
+std::vector<std::string> owners_of(const std::string& option, const CLI::App& app, const std::string& name) {
+    std::vector<std::string> owners;
+    if (!name.empty() && app.get_option_no_throw(option)) owners.push_back(name);
+    for (const CLI::App* verb : parts_of(app, true))
+        for (const std::string& owner :
+             owners_of(option, *verb, name.empty() ? verb->get_name() : name + " " + verb->get_name()))
+            owners.push_back(owner);
+    return owners;
 }
 
-// What the parser could not place comes first: it may be why something else is missing.
-std::string complaint(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
+const CLI::App& root_of(const CLI::App& app) { return app.get_parent() ? root_of(*app.get_parent()) : app; }
+
+std::string complaint_about_option(const std::string& word, const CLI::App& app, const Program& program) {
+    const std::string option = word.substr(0, word.find('='));
+    std::vector<std::string> names = names_of_options(app);
+    if (program.setup && *program.setup) std::ranges::copy((*program.setup)->names_in(app), std::back_inserter(names));
+    std::string near = suggestion(option, names);
+    std::vector<std::string> owners = owners_of(option, root_of(app), "");
+    if (near.empty() && !owners.empty()) {
+        constexpr std::size_t enough = 3;
+        owners.resize(std::min(owners.size(), enough));
+        for (std::string& owner : owners) owner = std::string("'") + program.name + " " + owner + "'";
+        near = " here; see " + listed(owners) + ".";
+    }
+    return "there is no option '" + word + "'" + (near.empty() ? "." : near);
+}
+
+std::string complaint_about(const std::string& word, const CLI::App& app, const Program& program) {
+    const bool takes_verbs =
+        !parts_of(app, true).empty() && app.get_options([](auto* option) { return option->get_positional(); }).empty();
+    const auto hint = program.hints.find(word);
+    if (hint != program.hints.end()) return "there is no verb or option '" + word + "': " + hint->second;
+    if (word.starts_with("-")) return complaint_about_option(word, app, program);
+    if (!takes_verbs) return "'" + word + "' is one word too many.";
+    std::string near = suggestion(word, verb_names(app));
+    std::error_code unknown;
+    if (program.verb_for_files && (word.find('.') != word.npos || std::filesystem::exists(word, unknown)))
+        near = std::string(": did you mean '") + program.name + " " + program.verb_for_files + " " + word + "'?";
+    return "there is no verb '" + word + "'" + (near.empty() ? "." : near);
+}
+
+// What the parser could not place comes first: it may be why something else is missing. With options of the whole
+// program, what a verb does not know ends up at the program.
+std::string complaint(const CLI::App& root, const Program& program, const CLI::ParseError& error) {
+    const CLI::App& app = last_parsed(root);
     const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
     if (!is_missing && error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError)) return error.what();
     const bool takes_verbs = !parts_of(app, true).empty();
-    const auto unknown = app.remaining();
+    const auto unknown = root.remaining(true);
     const auto option = std::find_if(unknown.begin(), unknown.end(), [](auto& word) { return word.starts_with("-"); });
     if (!unknown.empty())
         return complaint_about(takes_verbs || option == unknown.end() ? unknown.front() : *option, app, program);
@@ -94,7 +128,7 @@ int finish(int status) {
 int report_usage(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) // --help, --version
         return finish(app.exit(error));
-    print_error(complaint(last_parsed(app), program, error));
+    print_error(complaint(app, program, error));
     std::string verb;
     for (auto verbs = app.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands())
         verb += " " + verbs.front()->get_name();
@@ -102,11 +136,37 @@ int report_usage(const CLI::App& app, const Program& program, const CLI::ParseEr
     return exit_usage;
 }
 
-// `help VERB ...`, which people type, too.
-int help(const CLI::App& app, const Program& program, std::span<char* const> words) {
+// Every option that is no silent alias, a line each: "render --show"; of the setup, where it acts, "render --eye setup".
+void print_options(const CLI::App& app, const std::string& verb, const Setup* setup) {
+    const auto is_shown = [&](const CLI::Option* option) {
+        return option->nonpositional() && !option->get_group().empty() && option != app.get_help_ptr();
+    };
+    if (!verb.empty())
+        for (const CLI::Option* option : app.get_options(is_shown))
+            std::printf("%s %s\n", verb.c_str(), option->get_name().c_str());
+    if (setup)
+        for (const std::string& name : setup->names_in(app)) std::printf("%s %s setup\n", verb.c_str(), name.c_str());
+    for (const CLI::App* part : parts_of(app, false)) print_options(*part, verb, nullptr);
+    for (const CLI::App* part : parts_of(app, true))
+        print_options(*part, verb.empty() ? part->get_name() : verb + "-" + part->get_name(), setup);
+}
+
+// `help VERB ...`, which people type, too; `help setup`; and for scripts `help --options`.
+int help(const CLI::App& app, const Program& program, const std::vector<std::string>& words) {
+    const bool has_setup = program.setup && *program.setup;
+    if (words == std::vector<std::string>{"--options"}) {
+        print_options(app, "", has_setup ? &**program.setup : nullptr);
+        if (has_setup)
+            for (const std::string& name : (*program.setup)->names()) std::printf("setup %s\n", name.c_str());
+        return finish(exit_done);
+    }
+    if (has_setup && words == std::vector<std::string>{"setup"}) {
+        std::fputs((*program.setup)->help().c_str(), stdout);
+        return finish(exit_done);
+    }
     const CLI::App* verb = &app;
     std::string parents;
-    for (const std::string word : words) {
+    for (const std::string& word : words) {
         const Apps verbs = parts_of(*verb, true);
         const auto next = std::find_if(verbs.begin(), verbs.end(), [&](auto* v) { return v->get_name() == word; });
         if (next == verbs.end()) {
@@ -118,6 +178,22 @@ int help(const CLI::App& app, const Program& program, std::span<char* const> wor
     }
     std::fputs(verb->help(parents).c_str(), stdout);
     return finish(exit_done);
+}
+
+// What of the setup acts in a verb goes before its examples.
+void add_setup_to_help(CLI::App& app, const Setup& setup) {
+    for (CLI::App* verb : app.get_subcommands([](const CLI::App* part) { return !part->get_name().empty(); })) {
+        const std::string summary = setup.summary_of(*verb);
+        if (!summary.empty()) verb->footer(summary + "\n" + verb->get_footer());
+        add_setup_to_help(*verb, setup);
+    }
+}
+
+void check(const CLI::App& app, const Program& program, const std::vector<Command>& commands) {
+    const CLI::App& verb = last_parsed(app);
+    if (program.setup && *program.setup) (*program.setup)->check(verb);
+    for (const Command& command : commands)
+        if (command.parser->parsed()) check_rules(verb, command.rules);
 }
 
 int run(const std::vector<Command>& commands) {
@@ -133,12 +209,12 @@ int run(const std::vector<Command>& commands) {
 }
 
 // A variable of a shell that is not set must not look like an option that is not given.
-void refuse_empty_values(std::span<char* const> words) {
-    for (std::size_t i = 1; i < words.size(); ++i) {
+void refuse_empty_values(const std::vector<std::string>& words) {
+    for (std::size_t i = 0; i < words.size(); ++i) {
         const std::string_view word = words[i];
         const bool is_assigned = word.starts_with("--") && word.ends_with("=");
         if (!word.empty() && !is_assigned) continue;
-        const std::string_view option = is_assigned ? word.substr(0, word.size() - 1) : words[i - 1];
+        const std::string_view option = is_assigned ? word.substr(0, word.size() - 1) : words[i == 0 ? 0 : i - 1];
         throw CLI::ValidationError(option.starts_with("-") ? std::string(option) + " has an empty value: give one, or "
                                                                                    "leave the option out."
                                                            : "a word is empty: leave it out.");
@@ -154,10 +230,13 @@ int run(int argc, char** argv, const Program& program, const FunctionRef<std::ve
     const CLI::Option* parse_only = app.add_flag("--parse-only")->group("");
     try {
         const std::vector<Command> commands = verbs(app);
-        if (argc > 1 && std::string_view(argv[1]) == "help")
-            return help(app, program, std::span<char* const>(argv, static_cast<std::size_t>(argc)).subspan(2));
-        refuse_empty_values(std::span(argv, static_cast<std::size_t>(argc)));
-        app.parse(argc, argv);
+        if (program.setup && *program.setup) add_setup_to_help(app, **program.setup);
+        std::vector<std::string> words(argv + 1, argv + std::max(argc, 1));
+        if (!words.empty() && words.front() == "help") return help(app, program, {words.begin() + 1, words.end()});
+        if (program.renew) program.renew(words);
+        refuse_empty_values(words);
+        app.parse(std::vector<std::string>(words.rbegin(), words.rend())); // which takes them from the end
+        check(app, program, commands);
         return parse_only->count() > 0 ? exit_done : run(commands);
     } catch (const CLI::ParseError& error) {
         return report_usage(app, program, error);

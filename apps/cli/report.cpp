@@ -3,13 +3,30 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 #include "terminal.h"
 
 namespace unseen::app {
+namespace {
+
+// Fifteen digits, the most that any double keeps: 0.12795, not 0.12794999999999998.
+void shorten_numbers(Json& json) {
+    if (json.is_structured())
+        for (Json& element : json) shorten_numbers(element);
+    if (!json.is_number_float()) return;
+    char text[32];
+    std::snprintf(text, sizeof text, "%.15g", json.get<double>());
+    json = std::strtod(text, nullptr);
+}
+
+} // namespace
 
 std::string json_text(const Json& json) {
-    const std::string plain = json.dump(2, ' ', false, Json::error_handler_t::replace); // names may be no UTF-8
+    Json short_numbers = json;
+    shorten_numbers(short_numbers);
+    const std::string plain =
+        short_numbers.dump(2, ' ', false, Json::error_handler_t::replace); // names may be no UTF-8
     std::string text;
     constexpr const char* digits = "0123456789abcdef";
     for (std::size_t i = 0; i < plain.size(); ++i) {

@@ -16,11 +16,11 @@ namespace unseen::app {
 
 using Json = nlohmann::ordered_json;
 
-// Infinite and undefined numbers are null: JSON has neither.
 // What is printed or written of a report, with a line break behind it. Control characters are escaped, also those above
 // ASCII, which JSON would allow: nothing steers the terminal.
 std::string json_text(const Json& json);
 
+// Infinite and undefined numbers are null: JSON has neither.
 Json number_or_null(double value);
 
 // Where --json goes: nowhere (no name), stdout ("-"), or a file that appears when the report is published. Opened
@@ -49,7 +49,7 @@ void print_table(std::vector<std::vector<std::string>> rows);
 // The same as a table of Markdown.
 void print_markdown(const std::vector<std::vector<std::string>>& rows);
 
-// Of a tree's texture: null and "none" where it has none.
+// A tree's texture; null or "none" if it has none.
 Json texture_json(const vdtree::VertexTree& tree);
 std::string texture_text(const vdtree::VertexTree& tree);
 

@@ -2,7 +2,7 @@
 
 #include <unseen/calibration/display_profile.h>
 
-#include "model_file.h"
+#include "load_model.h"
 #include "option_names.h"
 #include "terminal.h"
 

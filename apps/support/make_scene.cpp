@@ -49,6 +49,7 @@ class Maker {
 public:
     explicit Maker(const MakeSceneOptions& options) : options_(options), chance_(options.seed) {}
 
+    std::vector<std::string> left_out() && { return std::move(left_out_); }
     Result<SceneDraft> run() {
         if (const auto read = read_statues(); !read) return read.error();
         const auto made = options_.kind == SceneKind::museum     ? museum()
@@ -86,7 +87,14 @@ private:
     Result<std::vector<std::size_t>> statues(std::uint64_t triangles, std::size_t most = 100) {
         std::vector<std::size_t> made;
         for (const Scanned& scanned : scanned_) {
-            if (scanned.mesh.triangles.size() > triangles || made.size() == most) continue;
+            if (made.size() == most) continue;
+            if (scanned.mesh.triangles.size() > triangles) {
+                if (!options_.statues.empty())
+                    left_out_.push_back("'" + scanned.name + "' is left out: it has " +
+                                        std::to_string(scanned.mesh.triangles.size()) + " triangles, and a statue here " +
+                                        std::to_string(triangles) + "; simplify it, or give more --triangles.");
+                continue;
+            }
             SubdivideOptions refining;
             refining.triangles = triangles;
             refining.seed = options_.seed;
@@ -397,6 +405,7 @@ private:
     Chance chance_;
     SceneDraft draft_;
     std::vector<Scanned> scanned_;
+    std::vector<std::string> left_out_;
 };
 
 Result<void> check(const MakeSceneOptions& options) {
@@ -415,9 +424,11 @@ Result<void> check(const MakeSceneOptions& options) {
 
 Result<MadeScene> make_scene(const fs::path& file, const MakeSceneOptions& options) {
     if (const auto valid = check(options); !valid) return valid.error();
-    const auto draft = Maker(options).run();
+    Maker maker(options);
+    const auto draft = maker.run();
     if (!draft) return draft.error();
     MadeScene made;
+    made.left_out = std::move(maker).left_out();
     for (const SceneDraft::Mesh& mesh : draft->meshes()) {
         ++made.meshes;
         made.mesh_triangles += mesh.mesh.triangles.size();

@@ -44,6 +44,7 @@ struct MakeSceneOptions {
 struct MadeScene {
     std::uint64_t objects = 0, triangles = 0; // of nodes that are no background
     std::uint64_t meshes = 0, mesh_triangles = 0, background_triangles = 0;
+    std::vector<std::string> left_out; // a sentence for each statue that has more triangles than fit
 };
 
 // Writes a scene as .glb. The same file for the same options, whatever the machine's cores. Fails on options out of

@@ -17,7 +17,7 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "build_team.h"
-#include "model_file.h"
+#include "load_model.h"
 #include "option_names.h"
 #include "options.h"
 #include "other_libraries.h"
@@ -32,14 +32,14 @@ namespace unseen::app {
 namespace {
 
 struct BuildArguments {
-    std::string mesh, out, json;
+    TextureOptions& texture;
+    std::string mesh = {}, out = {}, json = {};
     std::string clusterer_name = "quadric";
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     bool repairs = false;
     double gap = 1e-6, largest_hole = 0.1; // of repairs; shares of the mesh's and the part's diagonal
     bool no_fold_errors = false, lit_fold_errors = false, is_verbose = false;
-    TextureOptions texture;
 
     bool is_by_openmesh() const { return clusterer_name == "openmesh"; }
     vdtree::ClustererKind clusterer() const {
@@ -268,8 +268,8 @@ Result<int> run(const BuildArguments& a) {
 
 } // namespace
 
-Command build_command(CLI::App& app) {
-    auto a = std::make_shared<BuildArguments>();
+Command build_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<BuildArguments>(BuildArguments{setup.view_options().texture});
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
@@ -297,17 +297,15 @@ Command build_command(CLI::App& app) {
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, most_threads));
-    CLI::Option* leave = verb->add_flag("--no-fold-errors", a->no_fold_errors,
-                                        "Leave out the following: faster, and a smaller file; the default fold test "
-                                        "measures then when it first needs to");
-    verb->add_flag("--fold-errors")
-        ->description("The default: measure what every fold changes, for the fold test 'error', "
-                      "and give proxies the luminance that keeps the surface's light")
-        ->excludes(leave);
+    CLI::Option* leave =
+        verb->add_flag("--no-fold-errors", a->no_fold_errors,
+                       "Do not measure what every fold changes: faster, and a smaller file; the default "
+                       "fold test then measures when it first needs to");
+    verb->add_flag("--fold-errors")->group("")->excludes(leave); // the default
     verb->add_flag("--lit-fold-errors", a->lit_fold_errors,
                    "Measure also what every fold changes under lights, for scenes with lights that stand still; else "
                    "the first of them measures it");
-    add_texture_options(*verb, a->texture);
+    setup.act_in(*verb, Setup::files | Setup::skip_bad);
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"

@@ -35,15 +35,16 @@ using calibration::Procedure;
 using calibration::SimulatedObserver;
 
 struct CalibrateArguments {
-    std::string out, json, simulate, state, photometer, observer, conditions, date;
+    DisplayOptions& display;
+    std::string out = {}, json = {}, simulate = {}, state = {}, photometer = {}, observer = {}, conditions = {},
+                date = {};
     bool chart = false, gamma = false;
-    // Of the plan; what is not given is as CalibrationPlan has it, or as in the file of a calibration that goes on.
-    std::optional<Method> method;
-    std::optional<double> seed, trials, settings, luminance;
-    std::vector<double> frequencies, eccentricities;
-    std::optional<bool> wide; // patches among the places; default: where the places are not named
-    DisplayOptions display;
-    CalibrationWindowOptions window;
+    // The plan. Defaults are CalibrationPlan's, or those of the calibration that is resumed.
+    std::optional<Method> method = {};
+    std::optional<double> seed = {}, trials = {}, settings = {}, luminance = {};
+    std::vector<double> frequencies = {}, eccentricities = {};
+    std::optional<bool> wide = {}; // patches among the places; default: where the places are not named
+    CalibrationWindowOptions window = {};
 };
 
 std::string today() {
@@ -398,78 +399,87 @@ void check(const CalibrateArguments& a) {
     const std::string ending = a.chart ? ".png" : ".json";
     if (!a.out.empty() && !has_ending(a.out, ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
     if (a.frequencies.empty() != a.eccentricities.empty())
-        refuse("--frequencies and --eccentricities need each other.");
+        refuse("--frequencies and --eccentricities belong together: give both.");
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
     const bool is_of_display = a.chart || a.gamma || !a.photometer.empty();
-    if (is_of_display && !a.json.empty()) refuse("--json is for observers.");
+    if (is_of_display && !a.json.empty()) refuse("--json reports observers: leave it out.");
     const bool has_plan =
         a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty() || a.wide;
     if (is_of_display && (has_plan || !a.state.empty()))
         refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities, --wide and "
-               "--resume are for observers.");
+               "--resume concern observers, not displays: leave them out.");
     if (a.trials && a.method == Method::adjustment)
-        refuse("--trials is for --method 2ifc: with adjustment, say --settings.");
+        refuse("--trials belongs to --method 2ifc: with adjustment, give --settings.");
     const bool may_be_adjustment = a.method ? *a.method == Method::adjustment : !a.state.empty(); // of a file, its own
     if (a.settings && !may_be_adjustment) refuse("--settings needs --method adjustment.");
 }
 
-} // namespace
-
-Command calibrate_command(CLI::App& app) {
-    auto a = std::make_shared<CalibrateArguments>();
-    CLI::App* verb =
-        app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
-    verb->add_option("-o,--output", a->out,
-                     "The observer's profile; of --gamma and --photometer the display's; of --chart a picture")
-        ->type_name("OUT.json|.png");
+void add_plan_options(CLI::App& verb, CalibrateArguments& a) {
     add_choice<std::optional<Method>, Method>(
-        *verb, "--method", a->method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
+        verb, "--method", a.method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
         "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
-    add_number(*verb, "--trials", a->trials, whole(1, 1e5), "N", "Of 2ifc (default: 200, and 10 for each wide patch)");
-    add_number(*verb, "--settings", a->settings, whole(2, 1000), "N",
-               "Of adjustment, at each place; the first does not count (default: 7)");
+    add_number(verb, "--trials", a.trials, whole(1, 1e5), "N",
+               "Trials of 2ifc (default: 200, and 10 for each wide patch)");
+    add_number(verb, "--settings", a.settings, whole(2, 1000), "N",
+               "Settings of adjustment at each place; the first does not count (default: 7)");
     constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
-    add_number(*verb, "--seed", a->seed, whole(0, most_seed), "N",
-               "Of the order of trials, and of simulated observers (default: 1)");
-    verb->add_option("--simulate", a->simulate,
-                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, "
-                     "summation=, slope=, lapse=, scatter=, delay=")
+    add_number(verb, "--seed", a.seed, whole(0, most_seed), "N",
+               "For the order of trials, and for simulated observers (default: 1)");
+    verb.add_option("--simulate", a.simulate,
+                    "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, "
+                    "summation=, slope=, lapse=, scatter=, delay=")
         ->type_name("NAME|FILE.json[:key=value,...]");
-    verb->add_option("--resume", a->state,
-                     "Keep all answers in this file, and go on with those that are there, by the plan that is there")
+    verb.add_option("--resume", a.state,
+                    "Keep all answers in this file, and resume those that are there, by the plan that is there")
         ->type_name("STATE.json");
-    verb->add_option("--frequencies", a->frequencies, "To measure at (default: octaves that fit the display)")
+    verb.add_option("--frequencies", a.frequencies, "To measure at (default: octaves that fit the display)")
         ->type_name("CPD")
         ->check(positive());
-    verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
+    verb.add_option("--eccentricities", a.eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
         ->type_name("DEG")
         ->check(not_negative());
     // Not by its address: the parser takes an optional<bool> for a count and begins with 0.
-    verb->add_flag_function(
-        "--wide,!--no-wide", [o = a.get()](std::int64_t count) { o->wide = count > 0; },
+    verb.add_flag_function(
+        "--wide,!--no-wide", [&a](std::int64_t count) { a.wide = count > 0; },
         "Measure wide patches, too, or not (default: unless places are named)");
-    add_number(*verb, "--luminance", a->luminance, positive(), "CDM2",
+    add_number(verb, "--luminance", a.luminance, positive(), "CDM2",
                "Mean of the gratings (default: midway from black to white)");
+}
+
+void add_display_measures(CLI::App& verb, CalibrateArguments& a) {
+    verb.add_flag("--gamma", a.gamma, "Measure the display's gamma by matching patches");
+    verb.add_option("--photometer", a.photometer, "Take the display's luminances from a table, header code,cdm2")
+        ->type_name("FILE.csv");
+    verb.add_flag("--chart", a.chart, "Campbell and Robson's chart, in a window or with -o as a picture");
+    verb.add_flag("--full-screen", a.window.full_screen, "Not in a window");
+    verb.add_option("--interval", a.window.interval_s,
+                    "Seconds of a grating, and of the pause between two (default: 0.5)")
+        ->type_name("S")
+        ->check(within(0.01, 60));
+    verb.add_option("--fade", a.window.fade_per_s, "With adjustment: decades of contrast a second (default: 0.25)")
+        ->type_name("D")
+        ->check(within(0.001, 100));
+    verb.add_option("--screenshot", a.window.screenshot, "Write a picture of what is shown at the end")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+}
+
+} // namespace
+
+Command calibrate_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<CalibrateArguments>(CalibrateArguments{setup.display_options()});
+    CLI::App* verb =
+        app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
+    verb->add_option("-o,--output", a->out,
+                     "The observer's profile; with --gamma or --photometer the display's; with --chart a picture")
+        ->type_name("OUT.json|.png");
+    add_plan_options(*verb, *a);
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
     verb->add_option("--date", a->date, "For the profile (default: today)")->type_name("TEXT");
     add_json_option(*verb, a->json);
-    verb->add_flag("--gamma", a->gamma, "Measure the display's gamma by matching patches");
-    verb->add_option("--photometer", a->photometer, "Take the display's luminances from a table, header code,cdm2")
-        ->type_name("FILE.csv");
-    verb->add_flag("--chart", a->chart, "Campbell and Robson's chart, in a window or with -o as a picture");
-    verb->add_flag("--full-screen", a->window.full_screen, "Not in a window");
-    verb->add_option("--interval", a->window.interval_s,
-                     "Seconds of a grating, and of the pause between two (default: 0.5)")
-        ->type_name("S")
-        ->check(within(0.01, 60));
-    verb->add_option("--fade", a->window.fade_per_s, "Of adjustment: decades of contrast a second (default: 0.25)")
-        ->type_name("D")
-        ->check(within(0.001, 100));
-    verb->add_option("--screenshot", a->window.screenshot, "Write a picture of what is shown at the end")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}));
-    add_display_options(*verb, a->display);
+    add_display_measures(*verb, *a);
+    setup.act_in(*verb, Setup::display | Setup::csf);
     verb->callback([o = a.get()] { check(*o); });
     verb->footer(
         std::string(calibration_window_help) +

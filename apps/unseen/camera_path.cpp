@@ -206,6 +206,8 @@ private:
 } // namespace
 
 Result<CameraPath> CameraPath::read(const std::string& path, glm::dvec3 up) {
+    if (path == "orbit")
+        return invalid_argument("say how many degrees a frame: orbit:DEGREES[:FRAMES], such as orbit:1.");
     if (path.starts_with(orbit_prefix)) {
         const auto orbit = parse_orbit(path);
         return orbit ? Result(CameraPath(*orbit)) : orbit.error();

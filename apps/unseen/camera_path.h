@@ -27,8 +27,7 @@ struct Orbit {
     int frames = 1;
 };
 
-// Straight towards the first view's target, at 60 frames a second, and on if there are so many frames. The first frame is
-// the first view.
+// Straight towards the first view's target, and past it, at 60 frames a second. The first frame is the first view.
 struct Walk {
     double metres_a_second = 1.5; // a walker's; negative: backwards
     int frames = 60;

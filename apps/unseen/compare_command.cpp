@@ -1,4 +1,5 @@
-// unseen compare: which pixels of a test image differ visibly from a reference.
+// unseen compare: where a picture differs visibly from a reference.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -29,14 +30,13 @@ constexpr const char* gpu = "gpu";
 enum class Model { modern, second, rpg99 };
 
 struct CompareArguments {
-    std::string reference, test, map, threshold_map, json, profile, observer_name, model_name = "modern",
-                                                                                   device = "cpu";
+    DisplayOptions& display;
+    std::string reference = {}, test = {}, map = {}, threshold_map = {}, json = {}, profile = {};
+    std::string model_name = "modern", device = "cpu";
     Model model = Model::modern;
-    perception::Person observer = perception::default_person;
-    DisplayOptions display;
-    std::optional<glm::dvec2> gaze_px;
-    std::optional<double> field_degrees;
-    std::optional<std::uint64_t> fail_above;
+    std::optional<glm::dvec2> gaze_px = {};
+    std::optional<double> field_degrees = {};
+    std::optional<std::uint64_t> fail_above = {};
 };
 
 struct Pair {
@@ -67,19 +67,34 @@ struct Verdict {
     std::string gpu; // which judged; empty: the CPU
 };
 
+Result<session::ObserverChoice> chosen_observer(const CompareArguments& a) {
+    return a.display.observer.empty() ? session::ObserverChoice() : session::choose_observer(a.display.observer);
+}
+
 Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const perception::Display& display) {
-    if (a.model == Model::second) return perception::second_judge_options(a.observer, display, a.gaze_px);
+    const auto observer = chosen_observer(a);
+    if (!observer) return observer.error();
+    if (a.model == Model::second) {
+        if (observer->csf)
+            return Error{ErrorCode::invalid_argument, "--model second knows no tables of viewers: give --observer "
+                                                      "median, default or strict."};
+        return perception::second_judge_options(observer->person, display, a.gaze_px);
+    }
     perception::JudgeOptions options;
     options.display = display;
     options.gaze_px = a.gaze_px;
-    options.gain = a.observer.gain;
+    options.gain = observer->csf ? 1 : observer->person.gain; // a viewer is one observer
+    options.csf_table = observer->csf;
     if (a.display.csf.empty()) return options;
     auto chosen = session::choose_csf(a.display.csf);
     if (!chosen) return chosen.error();
+    if (observer->csf || (chosen->table && !a.display.observer.empty()))
+        return Error{ErrorCode::invalid_argument,
+                     "--observer and --csf exclude each other where one of them is a viewer's table: give that alone."};
     if (chosen->model) options.csf = *chosen->model;
     if (chosen->table) {
         options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
-        options.gain = 1; // a viewer is one observer
+        options.gain = 1;
     }
     return options;
 }
@@ -130,6 +145,25 @@ Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const p
     return verdict;
 }
 
+// In any channel, however little.
+std::uint64_t different_pixels(const Pair& pair) {
+    const Image& r = pair.reference.image;
+    const Image& t = pair.test.image;
+    const auto pixels = static_cast<std::size_t>(r.width) * static_cast<std::size_t>(r.height);
+    const auto differs = [&](std::size_t pixel) {
+        const auto of = [&](const Image& image, int channel) {
+            const auto count = static_cast<std::size_t>(image.channels);
+            return image.values[pixel * count + std::min(static_cast<std::size_t>(channel), count - 1)];
+        };
+        for (int channel = 0; channel < std::max(r.channels, t.channels); ++channel)
+            if (of(r, channel) != of(t, channel)) return true;
+        return false;
+    };
+    std::uint64_t count = 0;
+    for (std::size_t pixel = 0; pixel < pixels; ++pixel) count += differs(pixel);
+    return count;
+}
+
 // Defined for 8-bit code values; NaN for float images and for images smaller than its window.
 double ssim_of(const Pair& pair) {
     if (!pair.has_codes()) return std::numeric_limits<double>::quiet_NaN();
@@ -153,20 +187,31 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
 std::string observer_of(const CompareArguments& a) {
     const std::string& csf = a.display.csf;
     if (!csf.empty() && !perception::csf_model(csf)) return csf; // a viewer's file
-    const std::string name(a.observer.name);
-    if (csf.empty()) return name + " (of measured people, " + rounded(100 * a.observer.share_above, 2) + "% see more)";
-    return name + " (" + rounded(a.observer.gain, 3) + " times " + csf + ")";
+    const auto observer = chosen_observer(a);
+    if (!observer || observer->csf) return a.display.observer;
+    const perception::Person& person = observer->person;
+    const std::string name(person.name);
+    if (csf.empty()) return name + " (of measured people, " + rounded(100 * person.share_above, 2) + "% see more)";
+    return name + " (" + rounded(person.gain, 3) + " times " + csf + ")";
 }
 
 // Whose verdict it is, and under which conditions.
 std::string judged_by(const CompareArguments& a, const Verdict& verdict, const perception::Display& display) {
-    if (a.model == Model::rpg99)
-        return "by the judge rpg99" + (a.profile.empty() ? "" : ", as " + a.profile + " does it");
+    if (a.model == Model::rpg99) return "by the judge rpg99" + (a.profile.empty() ? "" : ", like " + a.profile);
     std::string text = "by the judge " + a.model_name + " and the observer " + observer_of(a);
-    text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
+    text += ", seen from " + rounded(display.distance.value(), 3) + " m, ";
     text += a.gaze_px ? "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y)
                       : std::string("wherever they look");
     return verdict.gpu.empty() ? text : text + ", on the GPU (" + verdict.gpu + ")";
+}
+
+// A difference is seen around the pixels that differ, too: fewer pixels may differ than it is visible at.
+void print(const Judgement& judgement, std::uint64_t different, double ssim) {
+    const double share = 100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
+    print_line("a difference is visible at " + grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) +
+               " pixels (" + rounded(share, 3) + "%), at most " + rounded(judgement.max_ratio, 3) +
+               " times its threshold; " + grouped(different) + (different == 1 ? " pixel differs" : " pixels differ") +
+               (std::isnan(ssim) ? "" : "; SSIM " + rounded(ssim, 6)));
 }
 
 Result<int> run(const CompareArguments& a) {
@@ -185,7 +230,10 @@ Result<int> run(const CompareArguments& a) {
 
     const Judgement& judgement = verdict->judgement;
     const double ssim = ssim_of(*pair);
-    const Json json = {{"visible_pixels", judgement.visible_pixels},
+    const std::uint64_t different = different_pixels(*pair);
+    const Json json = {{"visible_at", judgement.visible_pixels},
+                       {"different_pixels", different},
+                       {"visible_pixels", judgement.visible_pixels}, // an older name of visible_at
                        {"pixels", judgement.pixels},
                        {"max_ratio", number_or_null(judgement.max_ratio)},
                        {"ssim", number_or_null(ssim)},
@@ -194,11 +242,7 @@ Result<int> run(const CompareArguments& a) {
     if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) {
-        const double share =
-            100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
-        print_line(grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " pixels differ visibly (" +
-                   rounded(share, 3) + "%); the largest difference is " + rounded(judgement.max_ratio, 3) +
-                   " times its threshold; SSIM " + rounded(ssim, 6));
+        print(judgement, different, ssim);
         print_line(judged_by(a, *verdict, *display));
         print_written({a.map, a.threshold_map, a.json});
     }
@@ -212,25 +256,23 @@ void check(CompareArguments& a) {
         a.profile = perceptualdiff;
     }
     a.model = a.model_name == "rpg99" ? Model::rpg99 : a.model_name == "second" ? Model::second : Model::modern;
-    const bool is_rpg99 = a.model == Model::rpg99;
-    if (!is_rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
-    if (!is_rpg99 && a.field_degrees) refuse("--field needs --model rpg99; the others take the display's.");
-    if (is_rpg99 && a.device == gpu) refuse("--device gpu needs --model modern or second: rpg99 runs on the CPU.");
-    if (is_rpg99 && a.gaze_px) refuse("--gaze needs --model modern or second: rpg99 knows no eccentricity.");
-    if (a.model != Model::modern && !a.display.csf.empty())
-        refuse("--csf needs --model modern: the others have a sensitivity of their own.");
-    if (a.observer_name.empty()) return;
-    if (is_rpg99) refuse("--observer needs --model modern or second.");
-    if (!a.display.csf.empty() && !perception::csf_model(a.display.csf))
-        refuse("--observer excludes --csf FILE, which is an observer of its own.");
-    a.observer = *perception::person(a.observer_name);
+    if (a.model != Model::rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
+}
+
+std::vector<Rule> compare_rules() {
+    const std::vector<std::string> rpg99 = {"--model rpg99"};
+    return {{"--field", Rule::needs_one_of, rpg99, "the others take the display's"},
+            {"--device gpu", Rule::excludes, rpg99, "rpg99 runs on the CPU"},
+            {"--gaze", Rule::excludes, rpg99, "rpg99 knows no eccentricity"},
+            {"--observer", Rule::excludes, rpg99, "rpg99 knows one observer"},
+            {"--csf", Rule::excludes, {"--model rpg99", "--model second"}, "they have a sensitivity of their own"}};
 }
 
 } // namespace
 
-Command compare_command(CLI::App& app) {
-    auto a = std::make_shared<CompareArguments>();
-    CLI::App* verb = app.add_subcommand("compare", "Count the pixels that differ visibly");
+Command compare_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<CompareArguments>(CompareArguments{setup.display_options()});
+    CLI::App* verb = app.add_subcommand("compare", "Judge where two pictures differ visibly");
     verb->add_option("REF", a->reference, "The reference: PNG (as the display shows it), PFM or EXR (cd/m2)")
         ->required()
         ->type_name("IMAGE");
@@ -239,13 +281,8 @@ Command compare_command(CLI::App& app) {
                      "modern (default), second (by another model of sight), or rpg99 (of 1999, blind to fine detail)")
         ->type_name("NAME")
         ->check(one_of({"modern", "second", "rpg99"}));
-    verb->add_option("--observer", a->observer_name,
-                     "Not of rpg99: median, default (one in twelve of measured people sees more) or strict (one in "
-                     "twenty)")
-        ->type_name("NAME")
-        ->check(one_of({"median", "default", "strict"}));
     verb->add_option("--profile", a->profile,
-                     "With rpg99: perceptualdiff, which does all as that program does (gamma 2.2, AdobeRGB, black 0)")
+                     "With rpg99: perceptualdiff behaves like that program (gamma 2.2, AdobeRGB, black 0)")
         ->type_name("NAME")
         ->check(one_of({perceptualdiff}));
     verb->add_option_function<double>(
@@ -254,7 +291,7 @@ Command compare_command(CLI::App& app) {
         ->type_name("DEGREES")
         ->check(within(1e-3, 179.9));
     verb->add_option("--device", a->device,
-                     "Where the judges modern and second run: cpu (default), or gpu, which says the same within 0.1%")
+                     "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1%")
         ->type_name("NAME")
         ->check(one_of({"cpu", gpu}));
     add_gaze_option(*verb, a->gaze_px);
@@ -267,17 +304,17 @@ Command compare_command(CLI::App& app) {
         ->check(ending_in({".pfm", ".exr"}));
     verb->add_option_function<std::uint64_t>(
             "--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
-            "Exit status 1 where more pixels than N differ visibly")
+            "Exit status 1 if a difference is visible at more than N pixels")
         ->type_name("N")
         ->check(not_negative());
     add_json_option(*verb, a->json);
-    add_display_options(*verb, a->display);
+    setup.act_in(*verb, Setup::display | Setup::observer | Setup::csf);
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"
                  "  unseen compare a.png b.png --map map.png --json -\n"
                  "  unseen compare a.pfm b.pfm --model second --observer strict\n"
                  "  unseen compare a.png b.png --model rpg99 --profile perceptualdiff --field 45");
-    return {verb, [a] { return run(*a); }};
+    return {verb, [a] { return run(*a); }, compare_rules()};
 }
 
 } // namespace unseen::app

@@ -348,7 +348,7 @@ void check(const CsfArguments& a) {
     if (!a.save.empty() && (a.stimulus.frequency || a.stimulus.luminance || a.stimulus.eccentricity))
         refuse("--save-table holds all frequencies, luminances and eccentricities: leave these options away.");
     if (a.stimulus.distance && a.csf.empty() && a.model_name != name(CsfModel::daly))
-        refuse("--distance is for --model daly: the others know none.");
+        refuse("--distance needs --model daly: the others do not depend on it.");
     if (outputs > 0 && !a.json.empty())
         refuse("--json is for one stimulus: leave --csv, --plot and --save-table away.");
     if (outputs > 0) return;
@@ -378,10 +378,10 @@ Command csf_command(CLI::App& app) {
     number("--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
     number("--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
     number("--velocity", s->velocity, not_negative(), "DEG/S", "How fast the grating moves on the retina (default: 0)");
-    number("--distance", s->distance, positive(), "METRES", "Of the grating, for --model daly (default: 0.5)");
+    number("--distance", s->distance, positive(), "METRES", "Distance of the grating, for --model daly (default: 0.5)");
     number("--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
     verb->add_flag("--pursuit", a->is_pursued,
-                   "The velocities are the image's, and the eye follows: what it lags is left");
+                   "The velocity is the image's, and the eye pursues it: only its lag is left");
     verb->add_option_function<std::string>(
             "--field", [s](const std::string& name) { s->field = field_of(name); },
             "Side of the visual field: nasal, temporal, or the worst of them (default)")

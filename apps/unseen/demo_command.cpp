@@ -5,7 +5,7 @@
 
 #include "cut_report.h"
 #include "demo.h"
-#include "model_file.h"
+#include "load_model.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "session_options.h"
@@ -18,8 +18,9 @@ namespace unseen::app {
 namespace {
 
 struct DemoArguments {
+    ViewOptions& view;
     std::string folder = "unseen-demo";
-    bool is_made = false, is_without_view = false, no_cache = false;
+    bool is_made = false, is_without_view = false;
     int frames = 0;
 };
 
@@ -51,9 +52,7 @@ Result<int> run(const DemoArguments& a) {
     DemoFiles files = demo_files(a.folder, *model);
     if (const auto ready = check_outputs({}, files.names()); !ready) return ready.error();
     print_line("the model: " + model->what + "; its tree is built now, if it is not kept from before");
-    ViewOptions options;
-    options.no_cache = a.no_cache;
-    auto session = open_session(model->mesh, options, {});
+    auto session = open_session(model->mesh, a.view, {});
     if (!session) return session.error();
     const auto demo = make(*session, *model, files);
     if (!demo) return demo.error();
@@ -74,8 +73,8 @@ Result<int> run(const DemoArguments& a) {
 
 } // namespace
 
-Command demo_command(CLI::App& app) {
-    auto a = std::make_shared<DemoArguments>();
+Command demo_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<DemoArguments>(DemoArguments{setup.view_options()});
     CLI::App* verb = app.add_subcommand("demo", "A first look: a model, simplified, drawn and shown; needs no file");
     verb->add_option("-o,--output", a->folder, "Where its files go (default: unseen-demo)")->type_name("FOLDER");
     verb->add_flag("--made", a->is_made, "A model that is made, even where the bunny is installed");
@@ -83,11 +82,11 @@ Command demo_command(CLI::App& app) {
     verb->add_option("--frames", a->frames, "End the viewer after so many frames, for scripts")
         ->type_name("N")
         ->check(whole(1, 1e6));
-    verb->add_flag("--no-cache", a->no_cache, "Build the tree, and keep it nowhere but in the folder");
+    setup.act_in(*verb, Setup::cache);
     verb->footer(
         "The model is the Stanford bunny, where Debian's package glmark2-data is installed, or else a ball with\n"
         "bumps. Written are its tree, what nobody sees gone, and two sheets of pictures; then the viewer opens,\n"
-        "where there is a display.\n\n"
+        "where there is a display. With --no-cache the tree is kept nowhere but in the folder.\n\n"
         "Examples:\n  unseen demo\n  unseen demo -o first-look --no-view");
     return {verb, [a] { return run(*a); }};
 }

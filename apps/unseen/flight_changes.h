@@ -27,11 +27,11 @@ struct FrameChange {
 // frames' own errors, against the full model, can make up, the last one's within the motion of the picture.
 class FlightChanges {
 public:
-    // `glide_s`: of the flight's geomorphs.
+    // `glide_s`: how long the flight's vertices glide.
     static Result<FlightChanges> create(const session::Session& session, const render::Context& context,
                                         std::optional<double> glide_s);
 
-    // Of each frame, once the session's gaze and time are those of it: before the flight's cut follows, and after it
+    // To be called in each frame, once the session has its gaze and time: before the flight's cut follows, and after it
     // has been drawn.
     Result<void> before(const session::Follower& flight, const session::Request& request, const vdtree::View& view,
                         const render::DrawOptions& options);

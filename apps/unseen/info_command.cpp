@@ -5,12 +5,13 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <unseen/meshio/examine.h>
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/meshio/scene_file.h>
 
-#include "model_file.h"
+#include "load_model.h"
 #include "options.h"
 #include "other_libraries.h"
 #include "progress_bar.h"
@@ -23,9 +24,9 @@ namespace unseen::app {
 namespace {
 
 struct InfoArguments {
-    std::string file;
+    const ViewOptions& view;
+    std::string file = {};
     bool verify = false, is_exact = false, json = false, is_verbose = false;
-    session::LoadAs as = session::LoadAs::automatic;
 };
 
 using Rows = std::vector<std::vector<std::string>>;
@@ -138,7 +139,7 @@ void print_materials(const Materials& materials, bool with_all) {
         print_line("and " + grouped(materials.size() - shown) + " more materials (--verbose lists them)");
 }
 
-// Of what the mesh's file said.
+// What the mesh's file said.
 Result<Arrays> arrays_of(const vdtree::VertexTree& tree) {
     if (tree.document().empty()) return Arrays();
     auto document = meshio::unpack(tree.document());
@@ -326,50 +327,55 @@ const char* name_of(meshio::SceneLight::Kind kind) {
 
 Json json_of(glm::dvec3 v) { return {v.x, v.y, v.z}; }
 
-// Every mesh by itself, and who shows it.
-Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
-    const meshio::SceneContents& contents = file.contents();
-    const session::Messages messages = terminal_messages();
-    for (const std::string& warning : contents.warnings) messages.warning(a.file + ": " + warning);
-    for (const std::string& note : contents.notes) messages.note(a.file + ": " + note);
-    struct Shown {
-        std::string name; // of the first node
-        std::uint64_t triangles = 0, nodes = 0, background_nodes = 0;
-    };
-    std::map<std::int32_t, Shown> meshes;
-    Materials materials; // of all meshes, each once
-    for (const meshio::SceneNode& node : contents.nodes) {
-        Shown& shown = meshes[node.mesh];
-        if (shown.nodes++ == 0) shown.name = node.name;
-        shown.background_nodes += node.is_background;
+// A mesh of a scene, and who shows it.
+struct SceneMesh {
+    std::int32_t number = 0;
+    std::string name; // of the first node
+    std::uint64_t triangles = 0, nodes = 0, background_nodes = 0;
+
+    std::uint64_t objects() const { return nodes - background_nodes; }
+};
+
+// All meshes; `materials` receives theirs, each once.
+Result<std::vector<SceneMesh>> examine_meshes(const InfoArguments& a, meshio::SceneFile& file, Materials& materials) {
+    std::map<std::int32_t, SceneMesh> meshes;
+    for (const meshio::SceneNode& node : file.contents().nodes) {
+        SceneMesh& mesh = meshes[node.mesh];
+        if (mesh.nodes++ == 0) mesh.name = node.name;
+        mesh.number = node.mesh;
+        mesh.background_nodes += node.is_background;
     }
-    std::uint64_t objects = 0, own = 0, shown_triangles = 0, background = 0;
-    Json meshes_json = Json::array();
-    std::vector<std::vector<std::string>> lines;
-    for (auto& [number, shown] : meshes) {
+    std::vector<SceneMesh> all;
+    for (auto& [number, mesh] : meshes) {
         const auto read = file.mesh(static_cast<std::size_t>(number));
         if (!read) return read.error();
         if (*read) {
             if (const auto examined = meshio::examine((*read)->mesh.view()); !examined)
                 return Error{examined.error().code, a.file + ": " + examined.error().message};
-            shown.triangles = (*read)->mesh.triangles.size();
+            mesh.triangles = (*read)->mesh.triangles.size();
             for (const meshio::Material& material : (*read)->materials)
                 if (std::ranges::none_of(materials, [&](const auto& m) { return m.name == material.name; }))
                     materials.push_back(material);
         }
-        const std::uint64_t of_objects = shown.nodes - shown.background_nodes;
-        objects += of_objects;
-        own += shown.triangles;
-        shown_triangles += shown.triangles * of_objects;
-        background += shown.triangles * shown.background_nodes;
-        meshes_json.push_back({{"mesh", number},
-                               {"name", shown.name},
-                               {"triangles", shown.triangles},
-                               {"nodes", shown.nodes},
-                               {"background_nodes", shown.background_nodes}});
-        lines.push_back({"mesh " + std::to_string(number) + " '" + printable(shown.name) + "'",
-                         grouped(shown.triangles) + " triangles, " + grouped(shown.nodes) +
-                             (shown.nodes == 1 ? " node" : " nodes") + (of_objects == 0 ? ", background" : "")});
+        all.push_back(std::move(mesh));
+    }
+    return all;
+}
+
+Json scene_json(const meshio::SceneContents& contents, const std::vector<SceneMesh>& meshes) {
+    Json json = {{"kind", "scene"}};
+    std::uint64_t objects = 0, own = 0, shown = 0, background = 0;
+    Json list = Json::array();
+    for (const SceneMesh& mesh : meshes) {
+        objects += mesh.objects();
+        own += mesh.triangles;
+        shown += mesh.triangles * mesh.objects();
+        background += mesh.triangles * mesh.background_nodes;
+        list.push_back({{"mesh", mesh.number},
+                        {"name", mesh.name},
+                        {"triangles", mesh.triangles},
+                        {"nodes", mesh.nodes},
+                        {"background_nodes", mesh.background_nodes}});
     }
     Json lights = Json::array();
     for (const meshio::SceneLight& light : contents.lights)
@@ -380,35 +386,54 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
                   {"eye", json_of(contents.camera->eye)},
                   {"forward", json_of(contents.camera->forward)},
                   {"fov_y_degrees", contents.camera->fov_y_degrees}};
-    Json json = {{"kind", "scene"},
-                 {"objects", objects},
-                 {"triangles", shown_triangles},
-                 {"meshes", std::move(meshes_json)},
+    json.update({{"objects", objects},
+                 {"triangles", shown},
+                 {"meshes", std::move(list)},
                  {"mesh_triangles", own},
                  {"background_triangles", background},
-                 {"materials", materials_json(materials)},
                  {"lights", std::move(lights)},
-                 {"camera", std::move(camera)},
-                 {"file_bytes", file_bytes_of(a.file)}};
-    if (a.verify) json["verified"] = true;
-    Rows rows = {{"kind", "scene"},
-                 {"objects", grouped(objects)},
-                 {"their triangles", grouped(shown_triangles)},
-                 {"different meshes", grouped(meshes.size())},
-                 {"their triangles, once each", grouped(own)},
-                 {"background triangles", grouped(background)},
-                 {"materials", grouped(materials.size())},
-                 {"lights", grouped(contents.lights.size())},
-                 {"camera", contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none"},
-                 {"bytes on disk", grouped(file_bytes_of(a.file))}};
-    if (a.verify) rows.push_back({"verified", "sound"});
+                 {"camera", std::move(camera)}});
+    return json;
+}
+
+Rows scene_rows(const meshio::SceneContents& contents, const Json& json, std::size_t materials) {
+    const auto count = [&](const char* key) { return grouped(json[key].get<std::uint64_t>()); };
+    return {{"kind", "scene"},
+            {"objects", count("objects")},
+            {"their triangles", count("triangles")},
+            {"different meshes", grouped(json["meshes"].size())},
+            {"their triangles, once each", count("mesh_triangles")},
+            {"background triangles", count("background_triangles")},
+            {"materials", grouped(materials)},
+            {"lights", grouped(contents.lights.size())},
+            {"camera", contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none"},
+            {"bytes on disk", count("file_bytes")}};
+}
+
+Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
+    const meshio::SceneContents& contents = file.contents();
+    const session::Messages messages = terminal_messages();
+    for (const auto& warning : contents.warnings) messages.warning(a.file + ": " + warning);
+    for (const auto& note : contents.notes) messages.note(a.file + ": " + note);
+    Materials materials;
+    const auto meshes = examine_meshes(a, file, materials);
+    if (!meshes) return meshes.error();
+    Json json = scene_json(contents, *meshes);
+    json["materials"] = materials_json(materials);
+    json["file_bytes"] = file_bytes_of(a.file);
+    Rows rows = scene_rows(contents, json, materials.size());
+    if (a.verify) json["verified"] = true, rows.push_back({"verified", "sound"});
     constexpr std::size_t most_lines = 40;
-    const std::size_t left_out = lines.size() > most_lines && !a.is_verbose ? lines.size() - most_lines : 0;
-    lines.resize(lines.size() - left_out);
-    rows.insert(rows.end(), lines.begin(), lines.end());
+    const std::size_t lines = a.is_verbose ? meshes->size() : std::min(meshes->size(), most_lines);
+    for (const SceneMesh& mesh : std::span(*meshes).first(lines))
+        rows.push_back({"mesh " + std::to_string(mesh.number) + " '" + printable(mesh.name) + "'",
+                        grouped(mesh.triangles) + " triangles, " + grouped(mesh.nodes) +
+                            (mesh.nodes == 1 ? " node" : " nodes") + (mesh.objects() == 0 ? ", background" : "")});
     output(a.json, json, rows);
-    if (!a.json) print_materials(materials, a.is_verbose);
-    if (!a.json && left_out > 0) print_line("and " + grouped(left_out) + " more meshes (--verbose lists them)");
+    if (a.json) return exit_done;
+    print_materials(materials, a.is_verbose);
+    if (lines < meshes->size())
+        print_line("and " + grouped(meshes->size() - lines) + " more meshes (--verbose lists them)");
     return exit_done;
 }
 
@@ -418,40 +443,40 @@ Result<int> run(const InfoArguments& a) {
         return Error{ErrorCode::invalid_argument, a.file +
                                                       " is no tree, and --exact checks the bounds of trees: build one "
                                                       "of it, or leave --exact out."};
-    if (a.as == session::LoadAs::scene && !meshio::is_gltf_file(a.file))
+    if (a.view.as == session::LoadAs::scene && !meshio::is_gltf_file(a.file))
         return Error{ErrorCode::invalid_argument,
                      a.file + " is no glTF file (.glb, .gltf), and only these are scenes: leave --as out."};
-    if (a.as != session::LoadAs::model && meshio::is_gltf_file(a.file)) {
+    if (a.view.as != session::LoadAs::model && meshio::is_gltf_file(a.file)) {
         meshio::ReadOptions options;
         options.drop = {true, true, true, true}; // nothing is made of it
         options.skip_bad = !a.verify;
         auto file = meshio::SceneFile::read(a.file, options);
         if (!file) return file.error();
-        if (a.as == session::LoadAs::scene || file->contents().is_scene) return describe_scene(a, *file);
+        if (a.view.as == session::LoadAs::scene || file->contents().is_scene) return describe_scene(a, *file);
     }
     return describe_mesh(a);
 }
 
 } // namespace
 
-Command info_command(CLI::App& app) {
-    auto a = std::make_shared<InfoArguments>();
+Command info_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<InfoArguments>(InfoArguments{setup.view_options()});
     CLI::App* verb = app.add_subcommand("info", "Say what a mesh, a tree or a scene holds, and what is wrong with it");
     verb->add_option("FILE", a->file, "A mesh, a tree or a scene")->required()->type_name("MESH|TREE.vdt|SCENE.glb");
-    add_as_option(*verb, a->as);
+    setup.act_in(*verb, Setup::scenes);
     CLI::Option* verify =
         verb->add_flag("--verify", a->verify, "Check everything: checksums, ranges, nesting of the bounds");
-    verb->add_flag("--exact", a->is_exact, "With --verify, of a tree: check the bounds in exact arithmetic, too")
+    verb->add_flag("--exact", a->is_exact, "With --verify, for a tree: check the bounds in exact arithmetic, too")
         ->needs(verify);
     verb->add_flag("--json", a->json, "JSON instead of a table");
-    verb->add_flag("--verbose", a->is_verbose, "Of a mesh: counts of zero as well; of a scene: all meshes");
+    verb->add_flag("--verbose", a->is_verbose, "For a mesh also counts of zero, for a scene all meshes");
     verb->footer(
         "A mesh is examined: holes, non-manifold and inconsistent edges, duplicates, parts that are inside out, size;\n"
         "what is unusual is said with what it means for simplification. Bad vertices and faces are counted and left\n"
         "out, but for --verify. Values of vertices are listed: name, type, components, range of each.\n\n"
-        "Of a scene: its objects, how often each mesh is shown, materials, lights and camera; --as model examines it "
-        "as one "
-        "mesh.\n\n"
+        "For a scene: its objects, how often each mesh is shown, materials, lights and camera; --as model examines it "
+        "as\n"
+        "one mesh.\n\n"
         "Examples:\n  unseen info bunny.ply\n  unseen info museum.glb\n  unseen info bunny.vdt --verify --json");
     return {verb, [a] { return run(*a); }};
 }

@@ -6,26 +6,18 @@
 
 #include <unseen/session_gpu/level_control.h>
 
+#include "level_views.h"
 #include "options.h"
 
 namespace unseen::app {
-
-// Instead of the picture.
-enum class LevelPicture {
-    layers,       // the background and each layer
-    combinations, // for each layer, all the others
-    maps,         // for each layer, which steps of luminance go unseen in that
-    levels,       // the picture, coloured by level
-};
 
 struct LevelFlightOptions {
     session::LevelControlOptions control;
     std::string path; // see camera_path.h; empty: one picture, of the view in which nothing changes any more
     std::string out;  // of pictures: with a path a name with one %d; empty: none
     std::string json;
-    std::string
-        selection; // of the method `given`: a file of selected levels, whose budget counts where `what` has none
-    std::optional<LevelPicture> show;
+    std::string selection; // of the method `given`: a file, whose budget counts unless `what` has one
+    std::optional<LevelView> show;
     double frames_a_second = 60;
     WhatOptions what;
     bool is_verbose = false;

@@ -20,13 +20,12 @@ namespace unseen::app {
 namespace {
 
 struct LodArguments {
-    std::string model, out, json, csv, sheet;
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {}, out = {}, json = {}, csv = {}, sheet = {};
     bool is_separate = false;
-    ViewOptions view;
-    DisplayOptions display;
-    session::LodOptions options;
-    meshio::GltfOptions gltf;
-    bool is_verbose = false;
+    session::LodOptions options = {};
+    meshio::GltfOptions gltf = {};
 };
 
 // "out.glb", 2: "out_lod2.glb".
@@ -119,6 +118,62 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
     if (!sizes.empty()) print_line("geometry by level: " + sizes);
 }
 
+Json to_json(const session::Lod& lod, const session::Session& session, const meshio::LevelsWritten& written,
+             const std::vector<std::string>& files) {
+    Json objects = Json::array();
+    for (const session::LodObject& object : lod.objects) {
+        Json levels = Json::array();
+        for (const session::LodLevel& level : object.levels) levels.push_back(level_json(level));
+        const glm::dvec3 c = object.sphere.centre;
+        objects.push_back({{"name", object.name},
+                           {"centre_m", {c.x, c.y, c.z}},
+                           {"radius_m", object.sphere.radius},
+                           {"same_as", lod.objects[object.same_as].name},
+                           {"levels", std::move(levels)},
+                           {"notes", object.notes}});
+    }
+    Json sizes = Json::array();
+    for (const std::string& file : files) {
+        std::error_code unknown;
+        sizes.push_back({{"file", std::filesystem::path(file).filename().string()},
+                         {"bytes", std::filesystem::file_size(file, unknown)}});
+    }
+    return {{"source_triangles", session.triangle_count()},
+            {"display", session.observer().display.name},
+            {"observer", session::describe(session.observer())},
+            {"width_px", lod.width_px},
+            {"height_px", lod.height_px},
+            {"fov_y_degrees", lod.fov_y_degrees},
+            {"directions", lod.directions},
+            {"samples", lod.samples},
+            {"looks", lod.looks},
+            {"objects", std::move(objects)},
+            {"geometry_bytes", written.bytes},
+            {"files", std::move(sizes)}};
+}
+
+// One file a level, of those that there are.
+Result<std::vector<std::string>> write_separately(const LodArguments& a, const session::Scene& scene,
+                                                  const session::Lod& lod, std::vector<std::string> files) {
+    std::size_t most = 1;
+    for (const session::LodObject& object : lod.objects) most = std::max(most, object.levels.size());
+    files.resize(std::min(files.size(), most));
+    for (std::size_t i = 0; i < files.size(); ++i)
+        if (const auto one = session::write_level(files[i], scene, lod, i, a.gltf); !one) return one.error();
+    return files;
+}
+
+Result<session::Lod> make_levels(LodArguments& a, session::Session& session, const render::Context& context) {
+    if (session.scene().objects.empty())
+        return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
+    ProgressBar bar("judging levels");
+    a.options.progress = [&](double share) {
+        bar(share, "levels");
+        return true;
+    };
+    return session::make_levels(session, context, a.options);
+}
+
 Result<int> run(LodArguments& a) {
     std::vector<std::string> files;
     if (a.is_separate)
@@ -137,69 +192,21 @@ Result<int> run(LodArguments& a) {
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
-    if (session->scene().objects.empty())
-        return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
-    Result<session::Lod> lod = session::Lod{};
-    {
-        ProgressBar bar("looking at levels");
-        a.options.progress = [&](double share) {
-            bar(share, "levels");
-            return true;
-        };
-        lod = session::make_levels(*session, *context, a.options);
-    }
+    const auto lod = make_levels(a, *session, *context);
     if (!lod) return lod.error();
+
     const auto written = session::write_levels(a.out, session->scene(), *lod, a.gltf);
     if (!written) return written.error();
-    for (const std::string& note : written->notes) print_note(a.out + ": " + note);
-
-    std::size_t most = 1;
-    for (const session::LodObject& object : lod->objects) most = std::max(most, object.levels.size());
-    files.resize(std::min(files.size(), most));
-    for (std::size_t i = 0; i < files.size(); ++i)
-        if (const auto one = session::write_level(files[i], session->scene(), *lod, i, a.gltf); !one)
-            return one.error();
-
+    for (const auto& note : written->notes) print_note(a.out + ": " + note);
+    const auto separate = write_separately(a, session->scene(), *lod, files);
+    if (!separate) return separate.error();
     if (!a.sheet.empty()) {
         const auto sheet =
             draw_level_sheet(*session, *context, *lod, std::filesystem::path(a.model).filename().string());
         if (!sheet) return sheet.error();
         if (auto ok = perception::write_image(a.sheet, *sheet); !ok) return ok.error();
     }
-
-    Json objects = Json::array();
-    for (const session::LodObject& object : lod->objects) {
-        Json levels = Json::array();
-        for (const session::LodLevel& level : object.levels) levels.push_back(level_json(level));
-        const glm::dvec3 c = object.sphere.centre;
-        objects.push_back({{"name", object.name},
-                           {"centre_m", {c.x, c.y, c.z}},
-                           {"radius_m", object.sphere.radius},
-                           {"same_as", lod->objects[object.same_as].name},
-                           {"levels", std::move(levels)},
-                           {"notes", object.notes}});
-    }
-    Json sizes = Json::array();
-    for (const std::string& file : files) {
-        std::error_code unknown;
-        sizes.push_back({{"file", std::filesystem::path(file).filename().string()},
-                         {"bytes", std::filesystem::file_size(file, unknown)}});
-    }
-    const perception::Display& display = session->observer().display;
-    if (auto ok = report->prepare({{"source_triangles", session->triangle_count()},
-                                   {"display", display.name},
-                                   {"observer", session::describe(session->observer())},
-                                   {"width_px", lod->width_px},
-                                   {"height_px", lod->height_px},
-                                   {"fov_y_degrees", lod->fov_y_degrees},
-                                   {"directions", lod->directions},
-                                   {"samples", lod->samples},
-                                   {"looks", lod->looks},
-                                   {"objects", std::move(objects)},
-                                   {"geometry_bytes", written->bytes},
-                                   {"files", std::move(sizes)}});
-        !ok)
-        return ok.error();
+    if (auto ok = report->prepare(to_json(*lod, *session, *written, *separate)); !ok) return ok.error();
     if (*csv) {
         if (auto ok = (*csv)->write(to_csv(*lod)); !ok) return ok.error();
         if (auto ok = (*csv)->commit(); !ok) return ok.error();
@@ -209,7 +216,7 @@ Result<int> run(LodArguments& a) {
     print_scene(*session);
     print(*lod, *written);
     std::vector<std::string> all = {a.out};
-    all.insert(all.end(), files.begin(), files.end());
+    all.insert(all.end(), separate->begin(), separate->end());
     all.insert(all.end(), {a.csv, a.json, a.sheet});
     print_written(all);
     return exit_done;
@@ -217,8 +224,8 @@ Result<int> run(LodArguments& a) {
 
 } // namespace
 
-Command lod_command(CLI::App& app) {
-    auto a = std::make_shared<LodArguments>();
+Command lod_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<LodArguments>(LodArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("lod", "Make levels of detail with the distances from which nobody sees them, for engines");
     add_model_option(*verb, a->model);
@@ -227,38 +234,36 @@ Command lod_command(CLI::App& app) {
         ->required()
         ->check(ending_in({".glb", ".gltf"}));
     verb->add_flag("--separate", a->is_separate, "Also a file a level: OUT_lod0.glb, ...");
-    verb->add_option("--levels", a->options.chain.levels, "At most, with the full mesh (default: 5)")
+    verb->add_option("--levels", a->options.chain.levels, "Most levels, the full mesh included (default: 5)")
         ->type_name("N")
         ->check(whole(2, session::most_levels));
     verb->add_option_function<double>(
             "--coarsest", [a](double percent) { a->options.chain.least_share = percent / 100; },
-            "Triangles that the last level keeps, in percent of the full mesh's (default: 1)")
+            "Triangles of the last level, in percent of the full mesh's (default: 1)")
         ->type_name("PERCENT")
         ->check(within(1e-4, 50));
-    verb->add_option("--directions", a->options.directions, "That each level is looked at from (default: 12)")
+    verb->add_option("--directions", a->options.directions, "From how many sides each level is judged (default: 12)")
         ->type_name("N")
         ->check(whole(1, 1000));
-    verb->add_option("--samples", a->options.samples, "Of the pictures that are judged, a pixel (default: 64)")
+    add_samples_option(*verb, a->options.samples, "64");
+    verb->add_option("--seed", a->options.seed, "For the directions (default: 1)")
         ->type_name("N")
-        ->check(whole(1, 256));
-    verb->add_option("--seed", a->options.seed, "Of the directions (default: 1)")->type_name("N")->check(whole(0, 1e9));
+        ->check(whole(0, 1e9));
     add_number(
         *verb, "--fov", a->options.fov_y_degrees, within(1, 179), "DEGREES",
         "Vertical field of the engine's camera, over the whole display (default: as the display fills the sight)");
     verb->add_flag("--quantize", a->gltf.quantize, "Numbers of 16 bits: KHR_mesh_quantization");
     verb->add_flag("--meshopt", a->gltf.meshopt, "Compressed: EXT_meshopt_compression");
-    verb->add_option("--csv", a->csv, "One line a level")->type_name("FILE.csv");
+    verb->add_option("--csv", a->csv, "A line for each level")->type_name("FILE.csv");
     verb->add_option("--sheet", a->sheet, "A picture of the levels: where each begins, and from near by")
         ->type_name("SHEET.png")
         ->check(ending_in({".png"}));
     add_json_option(*verb, a->json);
-    add_as_option(*verb, a->view.as);
-    add_surroundings_options(*verb, a->view);
-    add_display_options(*verb, a->display);
+    setup.act_in(*verb, Setup::model | Setup::scenes);
     verb->footer(
         "The levels are evenly spaced in visibility. Each begins at the distance from which the fold test says that\n"
-        "nobody sees it; there two judges look at it from directions at random, and where either sees a pixel, the\n"
-        "distance grows. A model's levels replace all of it; of a scene each node has levels of its own.\n\n"
+        "nobody sees it; there two judges look at it from random directions, and if either sees a difference, the\n"
+        "distance grows. A model has one chain of levels; in a scene each node has its own.\n\n"
         "Examples:\n  unseen lod statue.glb -o statue_lods.glb --separate --csv statue.csv\n"
         "  unseen lod bunny.ply -o bunny.glb --levels 4 --quantize --meshopt\n"
         "  unseen lod museum.glb -o museum_lods.glb --display tv.json --fov 60 --json -");

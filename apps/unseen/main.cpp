@@ -1,6 +1,8 @@
 // The command `unseen`.
+#include <optional>
 #include <string>
 
+#include "old_spellings.h"
 #include "other_libraries.h"
 #include "program.h"
 #include "verbs.h"
@@ -17,7 +19,7 @@ constexpr const char* examples = R"(Examples:
   unseen sheet bunny.vdt -o sheet.png
   unseen view bunny.vdt
 
-'unseen VERB --help' tells more. Exit status: 0 done, 1 failed, 2 wrong usage.)";
+'unseen VERB --help' explains a verb, 'unseen help setup' the options that verbs share. Exit status: 0 done, 1 failed, 2 wrong usage.)";
 
 } // namespace
 
@@ -25,14 +27,19 @@ int main(int argc, char** argv) {
     using namespace unseen::app;
     const std::string notes = licence_notes();
     const std::string version = UNSEEN_VERSION + (notes.empty() ? notes : "\n" + notes);
-    const Program program{
+    std::optional<Setup> setup;
+    Program program{
         "unseen", about, examples, version.c_str(), {{"bench", "measuring is a program of its own, unseen-bench."}}};
-    return run_program(argc, argv, program, [](CLI::App& app) {
-        return std::vector<Command>{build_command(app),     info_command(app),  simplify_command(app),
-                                    render_command(app),    sheet_command(app), compare_command(app),
-                                    tradeoff_command(app),  lod_command(app),   csf_command(app),
-                                    calibrate_command(app), view_command(app),  demo_command(app),
-                                    make_command(app),      scene_command(app), select_command(app),
-                                    study_command(app),     cache_command(app)};
+    program.verb_for_files = "view";
+    program.setup = &setup;
+    program.renew = renew_spelling;
+    return run_program(argc, argv, program, [&](CLI::App& app) {
+        Setup& s = setup.emplace(app);
+        return std::vector<Command>{build_command(app, s),     info_command(app, s),   simplify_command(app, s),
+                                    render_command(app, s),    fly_command(app, s),    view_command(app, s),
+                                    compare_command(app, s),   sheet_command(app, s),  tradeoff_command(app, s),
+                                    lod_command(app, s),       levels_command(app, s), csf_command(app),
+                                    calibrate_command(app, s), study_command(app, s),  demo_command(app, s),
+                                    make_command(app, s),      cache_command(app)};
     });
 }

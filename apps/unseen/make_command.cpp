@@ -1,11 +1,11 @@
-// unseen make: meshes made of other meshes.
+// unseen make: larger meshes and scenes, to try things out with.
 #include <functional>
 #include <memory>
 
 #include <subdivide.h>
 #include <unseen/meshio/mesh_io.h>
 
-#include "model_file.h"
+#include "load_model.h"
 #include "options.h"
 #include "output_files.h"
 #include "progress_bar.h"
@@ -17,10 +17,10 @@ namespace unseen::app {
 namespace {
 
 struct SubdivideArguments {
-    std::string mesh, out, json;
-    SubdivideOptions options;
-    bool skips_bad = false;
-    TriangleCount triangles; // not given: as many as the rounds make
+    ViewOptions& view;
+    std::string mesh = {}, out = {}, json = {};
+    SubdivideOptions options = {};
+    TriangleCount triangles = {}; // not given: as many as the rounds make
 };
 
 Result<vdtree::Mesh> subdivide_with_progress(vdtree::Mesh mesh, const SubdivideArguments& a) {
@@ -40,7 +40,7 @@ Result<int> run(const SubdivideArguments& a) {
     if (const auto ready = check_outputs({a.mesh}, {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    auto read = read_mesh_file(a.mesh, a.skips_bad);
+    auto read = read_mesh_file(a.mesh, a.view.texture.skips_bad);
     if (!read) return read.error();
     if (read->document && !read->document->arrays.empty())
         print_note(a.mesh + ": values of vertices are left out of what is made.");
@@ -60,8 +60,8 @@ Result<int> run(const SubdivideArguments& a) {
     return exit_done;
 }
 
-Command subdivide_command(CLI::App& make) {
-    auto a = std::make_shared<SubdivideArguments>();
+Command subdivide_command(CLI::App& make, Setup& setup) {
+    auto a = std::make_shared<SubdivideArguments>(SubdivideArguments{setup.view_options()});
     CLI::App* verb =
         make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
@@ -79,8 +79,8 @@ Command subdivide_command(CLI::App& make) {
                      "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
         ->type_name("SHARE")
         ->check(within(0, 1));
-    add_skip_bad_option(*verb, a->skips_bad);
     add_json_option(*verb, a->json);
+    setup.act_in(*verb, Setup::skip_bad);
     verb->callback([=] {
         if (times->count() + triangles->count() != 1) refuse("give either --times or --triangles.");
     });
@@ -92,12 +92,14 @@ Command subdivide_command(CLI::App& make) {
 
 } // namespace
 
-Command make_command(CLI::App& app) {
-    CLI::App* verb = app.add_subcommand("make", "Make meshes of other meshes, to try things out with");
+Command make_command(CLI::App& app, Setup& setup) {
+    CLI::App* verb = app.add_subcommand("make", "Make larger meshes, and scenes, to try things out with");
     verb->require_subcommand(1);
-    verb->footer("Examples:\n  unseen make subdivide dragon.ply -o dragon_14m.ply --times 2\n\n"
-                 "'unseen make subdivide --help' tells more.");
-    return {verb, subdivide_command(*verb).run};
+    const Command subdivide = subdivide_command(*verb, setup), scene = make_scene_command(*verb);
+    verb->footer("Examples:\n  unseen make subdivide dragon.ply --times 2 -o dragon_14m.ply\n"
+                 "  unseen make scene museum -o museum.glb --bars-per-metre 12\n\n"
+                 "'unseen make PART --help' explains a part.");
+    return {verb, [=] { return subdivide.parser->parsed() ? subdivide.run() : scene.run(); }};
 }
 
 } // namespace unseen::app

@@ -1,8 +1,8 @@
 // The verbs that draw, in a build without OpenGL: they say so.
 #include "calibration_window.h"
 #include "gpu_comparison.h"
+#include "hiding.h"
 #include "verbs.h"
-#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -34,7 +34,7 @@ Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { r
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context*) {
-    if (what.visibility == Visibility::spheres && !what.masks) return session.simplify(view, request);
+    if (what.hiding == Hiding::spheres && !what.masks) return session.simplify(view, request);
     return Error{ErrorCode::unsupported,
                  "--visibility picture and --masking scene are not in this build, for it was made without OpenGL; "
                  "configure it with -DUNSEEN_BUILD_RENDER=ON."};
@@ -47,13 +47,14 @@ Result<GpuComparison> compare_on_gpu(const perception::Image&, const perception:
                  "with -DUNSEEN_BUILD_RENDER=ON, or use --device cpu."};
 }
 
-Command demo_command(CLI::App& app) { return absent(app, "demo"); }
-Command render_command(CLI::App& app) { return absent(app, "render"); }
-Command lod_command(CLI::App& app) { return absent(app, "lod"); }
-Command select_command(CLI::App& app) { return absent(app, "select"); }
-Command sheet_command(CLI::App& app) { return absent(app, "sheet"); }
-Command study_command(CLI::App& app) { return absent(app, "study"); }
-Command tradeoff_command(CLI::App& app) { return absent(app, "tradeoff"); }
-Command view_command(CLI::App& app) { return absent(app, "view"); }
+Command demo_command(CLI::App& app, Setup&) { return absent(app, "demo"); }
+Command fly_command(CLI::App& app, Setup&) { return absent(app, "fly"); }
+Command levels_command(CLI::App& app, Setup&) { return absent(app, "levels"); }
+Command lod_command(CLI::App& app, Setup&) { return absent(app, "lod"); }
+Command render_command(CLI::App& app, Setup&) { return absent(app, "render"); }
+Command sheet_command(CLI::App& app, Setup&) { return absent(app, "sheet"); }
+Command study_command(CLI::App& app, Setup&) { return absent(app, "study"); }
+Command tradeoff_command(CLI::App& app, Setup&) { return absent(app, "tradeoff"); }
+Command view_command(CLI::App& app, Setup&) { return absent(app, "view"); }
 
 } // namespace unseen::app

@@ -23,7 +23,7 @@ std::optional<NamePattern> parse_pattern(const std::string& pattern) {
 
 std::string complaint_about_picture_names(const std::string& pattern) {
     if (parse_pattern(pattern) && has_ending(pattern, ".png")) return {};
-    return "with --path, -o must be a name with one %d or %04d for the frame's number, not in its folder's name, and "
+    return "-o must be a name with one %d or %04d for the frame's number, not in its folder's name, and "
            "end in .png, not '" +
            pattern + "'.";
 }

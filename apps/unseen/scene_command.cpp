@@ -1,4 +1,4 @@
-// unseen scene: scenes to try things out with.
+// unseen make scene: scenes to try things out with.
 #include <algorithm>
 #include <memory>
 
@@ -27,6 +27,7 @@ Result<int> run(SceneArguments& a) {
     a.options.statues.assign(a.statues.begin(), a.statues.end());
     const auto made = make_scene(a.out, a.options);
     if (!made) return made.error();
+    for (const std::string& sentence : made->left_out) print_note(sentence);
     const Json json = {{"objects", made->objects},
                        {"triangles", made->triangles},
                        {"meshes", made->meshes},
@@ -42,8 +43,9 @@ Result<int> run(SceneArguments& a) {
     return exit_done;
 }
 
-CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
-    CLI::App* make = verb.add_subcommand("make", "Make a scene, with a camera, lights and a background");
+CLI::App* add_scene_part(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
+    CLI::App* make =
+        verb.add_subcommand("scene", "Make a scene of many objects, with a camera, lights and a background");
     make->add_option_function<std::string>(
             "KIND",
             [a](const std::string& kind) {
@@ -56,7 +58,7 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
                                   : kind == "models"   ? SceneKind::models
                                                        : SceneKind::forest;
             },
-            "museum: a statue behind a gate, in the sun through a window with bars; treasure: a chamber of statues; "
+            "museum: a statue behind a gate, lit through a barred window; treasure: a chamber of statues; "
             "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
             "trees; building: fifty furnished rooms with doors between them; spheres, bunnies (two of the statues) and "
             "models (all of them): forty objects on a plain, to "
@@ -66,11 +68,10 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
         ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models")
         ->check(one_of({"museum", "treasure", "house", "forest", "building", "spheres", "bunnies", "models"}));
     make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
-    add_triangles_option(
-        *make, a->triangles,
-        "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
-        "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
-        "million); a forest has 0.3 million at least")
+    add_triangles_option(*make, a->triangles,
+                         "Roughly N in all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+                         "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
+                         "million); a forest has 0.3 million at least")
         ->type_name("N");
     make->add_option("--mesh", a->statues,
                      "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "
@@ -78,7 +79,7 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
                      "here. Bunnies and models take the first two or four, simplified where they have more")
         ->type_name("FILE")
         ->allow_extra_args(false);
-    CLI::Option* spacing = make->add_option("--bars-per-metre", a->options.bars_per_metre, "Of a museum (default: 8)")
+    CLI::Option* spacing = make->add_option("--bars-per-metre", a->options.bars_per_metre, "In the museum (default: 8)")
                                ->type_name("N")
                                ->check(within(1, 100));
     CLI::Option* bars = add_choice<MuseumBars, MuseumBars>(*make, "--bars", a->options.bars,
@@ -86,17 +87,13 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
                                                             {"gate", MuseumBars::gate},
                                                             {"window", MuseumBars::window},
                                                             {"none", MuseumBars::none}},
-                                                           "Of a museum: both (default), gate, window or none");
-    make->add_option_function<double>(
-            "--seed", [a](const double& v) { a->options.seed = static_cast<std::uint64_t>(v); },
-            "Of what is strewn about (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+                                                           "In the museum: both (default), gate, window or none");
+    add_seed_option(*make, a->options.seed, "For what is strewn about");
     add_json_option(*make, a->json);
     make->callback([a, bars, spacing] {
         if (a->options.kind != SceneKind::museum && (*bars || *spacing))
-            refuse("--bars and --bars-per-metre are of the museum.");
-        if (a->triangles.share > 0) refuse("--triangles: of a scene that is made, a number, not a share.");
+            refuse("--bars and --bars-per-metre act in the museum alone.");
+        if (a->triangles.share > 0) refuse("--triangles: must be a number here, not a share.");
         a->options.triangles = a->triangles.triangles;
         if (a->options.triangles != 0 && (a->options.triangles < MakeSceneOptions::least_triangles ||
                                           a->options.triangles > MakeSceneOptions::most_triangles))
@@ -107,18 +104,14 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
 
 } // namespace
 
-Command scene_command(CLI::App& app) {
+Command make_scene_command(CLI::App& make) {
     auto a = std::make_shared<SceneArguments>();
-    CLI::App* verb = app.add_subcommand("scene", "Make scenes of many objects, to try things out with");
-    verb->require_subcommand(1);
-    CLI::App* make = add_make(*verb, a);
-    const std::string examples = "Examples:\n  unseen scene make museum -o museum.glb --bars-per-metre 12\n"
-                                 "  unseen scene make museum -o open.glb --bars none --mesh dragon.ply\n"
-                                 "  unseen scene make forest -o forest.glb --triangles 10000000 --seed 7\n"
-                                 "  unseen render museum.glb -o museum.png\n"
-                                 "  unseen simplify forest.glb -o seen.glb --triangles 5%";
-    make->footer(examples);
-    verb->footer(examples + "\n\n'unseen scene make --help' tells more.");
+    CLI::App* verb = add_scene_part(make, a);
+    verb->footer("Examples:\n  unseen make scene museum -o museum.glb --bars-per-metre 12\n"
+                 "  unseen make scene museum -o open.glb --bars none --mesh dragon.ply\n"
+                 "  unseen make scene forest -o forest.glb --triangles 10M --seed 7\n"
+                 "  unseen render museum.glb -o museum.png\n"
+                 "  unseen simplify forest.glb -o seen.glb --triangles 5%");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -21,11 +21,11 @@ namespace unseen::app {
 namespace {
 
 struct SheetArguments {
-    std::string model, out, maps, json;
-    ViewOptions view;
-    DisplayOptions display;
-    TriangleCount budget; // not given: the sheet's own
-    SheetOptions sheet;
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {}, out = {}, maps = {}, json = {};
+    TriangleCount budget = {}; // not given: the sheet's own
+    SheetOptions sheet = {};
     bool is_verbose = false;
 };
 
@@ -68,11 +68,11 @@ Result<int> run(const SheetArguments& a) {
 
 } // namespace
 
-Command sheet_command(CLI::App& app) {
-    auto a = std::make_shared<SheetArguments>();
+Command sheet_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<SheetArguments>(SheetArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("sheet", "Draw and judge the full, imperceptible, budget and gaze-directed cuts");
-    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    add_model_option(*verb, a->model, false);
     verb->add_option("-o,--output", a->out, "The contact sheet, wireframes below")
         ->type_name("SHEET.png")
         ->check(ending_in({".png"}));
@@ -86,9 +86,7 @@ Command sheet_command(CLI::App& app) {
     verb->get_option("--gaze")->description(
         "Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
         "(default: 29 degrees to the right of the window's centre)");
-    verb->add_option("--samples", a->sheet.samples, "Samples a pixel, 1 to 256 (default: 64)")
-        ->type_name("N")
-        ->check(whole(1, 256));
+    add_samples_option(*verb, a->sheet.samples, "64");
     verb->add_option_function<int>(
             "--cell", [o = a.get()](int px) { o->sheet.cell_px = px; },
             "The longer side of a picture (default: " + std::to_string(usual_cell_px) + ", with maps " +
@@ -100,16 +98,16 @@ Command sheet_command(CLI::App& app) {
                          "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')");
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
-    add_view_options(*verb, a->view);
-    add_display_options(*verb, a->display);
+    setup.act_in(*verb, Setup::view | Setup::model);
     verb->callback([o = a.get()] {
         if (o->out.empty() && o->maps.empty()) refuse("-o is required, or --maps.");
-        if (o->out.empty() && o->budget.is_given()) refuse("--triangles is of the sheet of cuts: it needs -o.");
     });
     verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"
                  "  unseen sheet bunny.vdt -o bunny.png --maps maps.png\n"
                  "  unseen sheet bunny.vdt -o bunny.png --direction 1 1 1 --triangles 10000 --gaze 0 512");
-    return {verb, [a] { return run(*a); }};
+    return {verb,
+            [a] { return run(*a); },
+            {{"--triangles", Rule::needs_one_of, {"-o"}, "the sheet of maps has no budget"}}};
 }
 
 } // namespace unseen::app

@@ -8,21 +8,21 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "cut_report.h"
+#include "hiding.h"
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
-#include "visibility.h"
 
 namespace unseen::app {
 namespace {
 
 struct SimplifyArguments {
-    std::string model, out, json;
-    ViewOptions view;
-    DisplayOptions display;
-    WhatOptions what;
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {}, out = {}, json = {};
+    WhatOptions what = {};
     bool is_verbose = false;
 };
 
@@ -99,8 +99,8 @@ Result<int> run(const SimplifyArguments& a) {
 
 } // namespace
 
-Command simplify_command(CLI::App& app) {
-    auto a = std::make_shared<SimplifyArguments>();
+Command simplify_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<SimplifyArguments>(SimplifyArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh, or scene, for a view");
     add_model_option(*verb, a->model);
     verb->add_option("-o,--output", a->out, "The mesh")
@@ -109,18 +109,16 @@ Command simplify_command(CLI::App& app) {
         ->check(ending_in({".ply", ".obj", ".glb", ".gltf", ".vtp", ".vtk"}));
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
-    add_as_option(*verb, a->view.as);
-    add_view_options(*verb, a->view);
-    add_orthographic_option(*verb, a->view);
-    add_display_options(*verb, a->display);
-    add_what_options(*verb, a->what);
-    add_visibility_option(*verb, a->what);
-    add_masking_option(*verb, a->what, true);
+    std::vector<Rule> rules;
+    add_what_options(*verb, a->what, rules);
+    add_hiding_option(*verb, a->what);
+    add_masking_option(*verb, a->what, rules);
+    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
         "to the folder of OUT under their names, where no other file of that name may be.\n\n"
-        "Of a scene each node gets a mesh of its own, as seen from the view; transforms, materials, lights and the\n"
+        "In a scene each node gets a mesh of its own, as seen from the view; transforms, materials, lights and the\n"
         "camera stay, and the background is written whole.\n\n"
         "OUT.ply, .vtp and .vtk have the values of vertices that the model's PLY or VTK file had: vertices that stay\n"
         "keep theirs, others have the mean of those that they stand for, of whole numbers the nearest one's.\n\n"
@@ -133,10 +131,12 @@ Command simplify_command(CLI::App& app) {
         "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"
         "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     const CLI::Option* visibility = verb->get_option("--visibility");
-    return {verb, [a, visibility] {
+    return {verb,
+            [a, visibility] {
                 if (visibility->count() > 0) a->what.request.purpose = session::Purpose::picture;
                 return run(*a);
-            }};
+            },
+            std::move(rules)};
 }
 
 } // namespace unseen::app

@@ -29,23 +29,23 @@ namespace fs = std::filesystem;
 constexpr const char* study_file = "study.json";
 
 struct StudyArguments {
+    ViewOptions& view;
+    DisplayOptions& display;
     // make
-    std::vector<std::string> models, conditions, training;
-    std::string folder;
-    std::optional<StudyTask> task;
+    std::vector<std::string> models = {}, conditions = {}, training = {};
+    std::string folder = {};
+    std::optional<StudyTask> task = {};
     bool levels = false;
-    std::optional<double> views, degrees, samples, repeats, seed;
-    std::vector<double> distances;
-    session::LevelControlOptions control;
-    ViewOptions view;
-    DisplayOptions display;
+    std::optional<double> views = {}, degrees = {}, samples = {}, repeats = {}, seed = {};
+    std::vector<double> distances = {};
+    session::LevelControlOptions control = {};
     // run
-    std::string subject = "unnamed", simulate, answers;
-    StudyWindowOptions window;
-    std::optional<double> criterion;
+    std::string subject = "unnamed", simulate = {}, answers = {};
+    StudyWindowOptions window = {};
+    std::optional<double> criterion = {};
     // analyse
-    std::vector<std::string> files;
-    std::string json;
+    std::vector<std::string> files = {};
+    std::string json = {};
     bool markdown = false;
     enum class Part { make, run, analyse } part = Part::make;
 };
@@ -57,27 +57,25 @@ Result<session::StudyCondition> condition_named(const std::string& text, std::ui
     session::StudyCondition condition{.name = text, .request = {}};
     const std::size_t colon = text.find(':');
     const std::string kind = text.substr(0, colon), value = colon == text.npos ? "" : text.substr(colon + 1);
-    const bool is_share = value.ends_with('%');
-    const auto number = finite_from(is_share ? value.substr(0, value.size() - 1) : value);
     if (kind == "imperceptible" && colon == text.npos) return condition;
-    if (number && *number > 0) {
-        if (kind == "threshold" && !is_share) {
-            condition.request.threshold = *number;
-            return condition;
-        }
-        if (kind == "pixels" && !is_share) {
-            condition.request.goal = Goal::pixels(*number);
-            return condition;
-        }
-        const double triangles = is_share ? *number / 100 * static_cast<double>(all_triangles) : *number;
-        if (kind == "triangles" && triangles < 4e9) {
-            condition.request.goal = Goal::budget(static_cast<vdtree::Index>(std::max(triangles, 1.0)));
-            return condition;
-        }
+    const auto number = finite_from(value);
+    const bool is_positive = number && *number > 0;
+    if (kind == "threshold" && is_positive) {
+        condition.request.threshold = *number;
+        return condition;
     }
-    return invalid_argument("'" + text +
-                            "' is no condition: imperceptible, threshold:X, pixels:E, triangles:N or "
-                            "triangles:P%, with a number above 0.");
+    if (kind == "pixels" && is_positive) {
+        condition.request.goal = Goal::pixels(*number);
+        return condition;
+    }
+    if (const auto count = TriangleCount::of(value); kind == "triangles" && count) {
+        condition.request.goal = Goal::budget(count->of(all_triangles));
+        return condition;
+    }
+    return invalid_argument(
+        "'" + text +
+        "' is no condition: give imperceptible, threshold:X, pixels:E, triangles:N or triangles:P%, "
+        "with a number above 0.");
 }
 
 Result<std::vector<session::StudyCondition>> conditions_of(const StudyArguments& a, std::uint64_t all_triangles) {
@@ -92,6 +90,42 @@ Result<std::vector<session::StudyCondition>> conditions_of(const StudyArguments&
     return all;
 }
 
+session::StudyPicturesOptions pictures_of(const StudyArguments& a, std::size_t model, const session::Session& session) {
+    session::StudyPicturesOptions options;
+    options.folder = a.folder;
+    options.prefix =
+        fs::path(a.models[model]).stem().string() + "-" + (a.models.size() > 1 ? std::to_string(model + 1) + "-" : "");
+    const bool is_scene = session.scene().objects.size() > 1 || !session.scene().backdrop.empty();
+    options.views = static_cast<int>(a.views.value_or(is_scene ? 1 : 5));
+    // All around a model; a scene is looked at from about where its camera is.
+    options.degrees = a.degrees.value_or(is_scene ? 3 : 360.0 / options.views);
+    options.samples = static_cast<int>(a.samples.value_or(64));
+    if (!a.distances.empty()) options.distances = a.distances;
+    return options;
+}
+
+Result<void> add_pairs(StudyArguments& a, std::size_t model, const render::Context& context, Study& study) {
+    auto session = open_session(a.models[model], a.view, a.display);
+    if (!session) return session.error();
+    study.pixels_per_degree = perception::pixels_per_degree(session->observer().display).value();
+    session::StudyPicturesOptions options = pictures_of(a, model, *session);
+    options.pairs_original = study.task == StudyTask::differ;
+    ProgressBar bar("drawing " + a.models[model]);
+    options.progress = [&](double share) { bar(share, "pictures"); };
+    const vdtree::View view = make_view(*session, a.view);
+    Result<std::vector<calibration::StudyPair>> pairs = std::vector<calibration::StudyPair>();
+    if (a.levels) {
+        pairs = session::draw_level_pairs(*session, context, view, a.control, options);
+    } else {
+        const auto conditions = conditions_of(a, session->triangle_count());
+        if (!conditions) return conditions.error();
+        pairs = session::draw_study_pairs(*session, context, view, *conditions, options);
+    }
+    if (!pairs) return pairs.error();
+    std::ranges::move(*pairs, std::back_inserter(study.pairs));
+    return {};
+}
+
 Result<int> make_study(StudyArguments& a) {
     const fs::path folder = a.folder;
     std::vector<std::string> inputs;
@@ -104,35 +138,8 @@ Result<int> make_study(StudyArguments& a) {
     study.task = a.task.value_or(a.levels ? StudyTask::differ : StudyTask::which);
     if (a.repeats) study.repeats = static_cast<int>(*a.repeats);
     if (a.seed) study.seed = static_cast<std::uint64_t>(*a.seed);
-    for (std::size_t i = 0; i < a.models.size(); ++i) {
-        auto session = open_session(a.models[i], a.view, a.display);
-        if (!session) return session.error();
-        study.pixels_per_degree = perception::pixels_per_degree(session->observer().display).value();
-        session::StudyPicturesOptions options;
-        options.folder = folder;
-        options.prefix =
-            fs::path(a.models[i]).stem().string() + "-" + (a.models.size() > 1 ? std::to_string(i + 1) + "-" : "");
-        const bool is_scene = session->scene().objects.size() > 1 || !session->scene().backdrop.empty();
-        options.views = static_cast<int>(a.views.value_or(is_scene ? 1 : 5));
-        // All around a model; a scene is looked at from about where its camera is.
-        options.degrees = a.degrees.value_or(is_scene ? 3 : 360.0 / options.views);
-        options.samples = static_cast<int>(a.samples.value_or(64));
-        if (!a.distances.empty()) options.distances = a.distances;
-        options.pairs_original = study.task == StudyTask::differ;
-        ProgressBar bar("drawing " + a.models[i]);
-        options.progress = [&](double share) { bar(share, "pictures"); };
-        const vdtree::View view = make_view(*session, a.view);
-        Result<std::vector<calibration::StudyPair>> pairs = std::vector<calibration::StudyPair>();
-        if (a.levels) {
-            pairs = session::draw_level_pairs(*session, *context, view, a.control, options);
-        } else {
-            const auto conditions = conditions_of(a, session->triangle_count());
-            if (!conditions) return conditions.error();
-            pairs = session::draw_study_pairs(*session, *context, view, *conditions, options);
-        }
-        if (!pairs) return pairs.error();
-        std::ranges::move(*pairs, std::back_inserter(study.pairs));
-    }
+    for (std::size_t i = 0; i < a.models.size(); ++i)
+        if (const auto added = add_pairs(a, i, *context, study); !added) return added.error();
     if (const auto written = calibration::write_study(folder / study_file, study); !written) return written.error();
     print_line(std::to_string(study.pairs.size()) + " pairs, " +
                std::to_string(calibration::trials_of(study, "").size()) + " trials a subject");
@@ -178,6 +185,35 @@ private:
     std::vector<std::optional<double>> visibility_;
 };
 
+void warn_of_another_display(const Study& study, const perception::Display& display) {
+    constexpr double alike = 0.02;
+    const double ppd = perception::pixels_per_degree(display).value();
+    if (!(std::abs(ppd / study.pixels_per_degree - 1) <= alike))
+        print_warning("the pictures were made for " + rounded(study.pixels_per_degree, 3) +
+                      " pixels a degree, and this display has " + rounded(ppd, 3) +
+                      ": change the distance (--distance), or make them for it.");
+}
+
+using Trials = std::vector<calibration::StudyTrial>;
+using Answers = std::vector<calibration::StudyAnswer>;
+
+Result<void> simulate(const StudyArguments& a, const Study& study, const perception::Display& display,
+                      const Trials& trials, Answers& answers) {
+    const auto person = perception::person(a.simulate);
+    if (!person) return person.error();
+    calibration::PictureObserver observer{.person = *person, .seed = study.seed};
+    if (a.criterion) observer.criterion = *a.criterion;
+    SimulatedSubject subject(observer, display, study);
+    ProgressBar bar("answering");
+    for (std::size_t i = answers.size(); i < trials.size(); ++i) {
+        bar(static_cast<double>(i) / static_cast<double>(trials.size()), "trials");
+        auto answer = subject.answer(trials[i]);
+        if (!answer) return answer.error();
+        answers.push_back(*answer);
+    }
+    return calibration::write_answers(a.answers, study, a.subject, answers);
+}
+
 Result<int> run_study(StudyArguments& a) {
     const auto display = make_display(a.display);
     if (!display) return display.error();
@@ -185,43 +221,25 @@ Result<int> run_study(StudyArguments& a) {
     const auto study = calibration::read_study(file);
     if (!study) return study.error();
     if (a.answers.empty()) a.answers = (fs::path(a.folder) / ("answers-" + a.subject + ".csv")).string();
-    constexpr double alike = 0.02;
-    const double ppd = perception::pixels_per_degree(*display).value();
-    if (!(std::abs(ppd / study->pixels_per_degree - 1) <= alike))
-        print_warning("the pictures were made for " + rounded(study->pixels_per_degree, 3) +
-                      " pixels a degree, and this display has " + rounded(ppd, 3) +
-                      ": change the distance (--distance), or make them for it.");
-    const std::vector<calibration::StudyTrial> trials = calibration::trials_of(*study, a.subject);
-    std::vector<calibration::StudyAnswer> answers;
+    warn_of_another_display(*study, *display);
+    const Trials trials = calibration::trials_of(*study, a.subject);
+    Answers answers;
     if (fs::exists(a.answers)) {
         auto before = calibration::read_answers(a.answers, *study, a.subject);
         if (!before) return before.error();
         answers = std::move(*before);
     } else if (const auto ready = check_outputs({file.string()}, {a.answers}); !ready) return ready.error();
-    const auto save = [&] { return calibration::write_answers(a.answers, *study, a.subject, answers); };
     if (!a.simulate.empty()) {
-        const auto person = perception::person(a.simulate);
-        if (!person) return person.error();
-        calibration::PictureObserver observer{.person = *person, .seed = study->seed};
-        if (a.criterion) observer.criterion = *a.criterion;
-        SimulatedSubject subject(observer, *display, *study);
-        ProgressBar bar("answering");
-        for (std::size_t i = answers.size(); i < trials.size(); ++i) {
-            bar(static_cast<double>(i) / static_cast<double>(trials.size()), "trials");
-            auto answer = subject.answer(trials[i]);
-            if (!answer) return answer.error();
-            answers.push_back(*answer);
-        }
-        if (auto saved = save(); !saved) return saved.error();
+        if (const auto done = simulate(a, *study, *display, trials, answers); !done) return done.error();
     } else if (answers.size() < trials.size()) {
         const auto keep = [&](const calibration::StudyAnswer& answer) {
             answers.push_back(answer);
-            return save();
+            return calibration::write_answers(a.answers, *study, a.subject, answers);
         };
         if (auto shown = run_study_window(*study, trials, answers.size(), a.window, keep); !shown) return shown.error();
     }
     print_line(std::to_string(answers.size()) + " of " + std::to_string(trials.size()) + " trials are answered" +
-               (answers.size() < trials.size() ? "; the same command goes on." : "."));
+               (answers.size() < trials.size() ? "; the same command continues." : "."));
     if (!answers.empty()) print_written({a.answers});
     return exit_done;
 }
@@ -298,7 +316,7 @@ void print(const calibration::StudyAnalysis& analysis, bool markdown) {
     if (markdown) print_line("");
     print_line(
         "seen: of `which` right answers, half of them by guessing; of `differ` \"different\". by chance: how likely "
-        "so many, or more, are for who sees nothing.");
+        "this, or more, is for somebody who sees nothing.");
     if (analysis.false_alarms)
         print_line("\"different\" of one picture and itself: " + percent(analysis.false_alarms->value()) + " (" +
                    interval(*analysis.false_alarms) + ")");
@@ -341,18 +359,18 @@ Result<int> run(StudyArguments& a) {
 
 // ---- options
 
-void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
+void add_make(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments>& a) {
     CLI::App* make = verb.add_subcommand("make", "Draw the pictures of a study");
     make->add_option("MODEL", a->models, "Trees, meshes or scenes")
         ->required()
         ->type_name("TREE.vdt|MESH|SCENE.glb ...");
     make->add_option("-o,--output", a->folder, "Where pictures and study.json go")->required()->type_name("FOLDER");
-    add_choice<std::optional<StudyTask>, StudyTask>(*make, "--task", a->task,
-                                                    {{"which", StudyTask::which}, {"differ", StudyTask::differ}},
-                                                    "What is asked: which of both is not the original, or whether they "
-                                                    "differ (default: which; of --levels: differ)");
+    add_choice<std::optional<StudyTask>, StudyTask>(
+        *make, "--task", a->task, {{"which", StudyTask::which}, {"differ", StudyTask::differ}},
+        "What is asked: which of the two is not the original, or whether they "
+        "differ (default: which; of --levels: differ)");
     make->add_option("--condition", a->conditions,
-                     "What is to be told from the original: imperceptible, threshold:X, pixels:E, triangles:N or "
+                     "What subjects compare with the original: imperceptible, threshold:X, pixels:E, triangles:N or "
                      "triangles:P%; may be given again (default: imperceptible)")
         ->type_name("NAME")
         ->allow_extra_args(false);
@@ -360,32 +378,30 @@ void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
         ->type_name("NAME")
         ->allow_extra_args(false);
     CLI::Option* levels = make->add_flag("--levels", a->levels,
-                                         "Of scenes with one object: the discrete levels around the one that 'unseen "
-                                         "render --method perceptual' keeps, to see whether people agree");
+                                         "For scenes with one object: the discrete levels around the one that 'unseen "
+                                         "levels' keeps, to see whether people agree");
     CLI::Option* maps = add_choice<session::MapRecipe, session::MapRecipe>(
         *make, "--maps", a->control.maps,
         {{"modern", session::MapRecipe::modern}, {"rpg99", session::MapRecipe::rpg99}},
-        "Of --levels: thresholds by the modern judge (default), or as in the paper of 2007");
+        "With --levels: thresholds of the modern judge (default), or as in the paper of 2007");
     maps->needs(levels);
     const auto count = [&](const char* name, std::optional<double>& value, double most, const char* text) {
         make->add_option(name, value, text)->type_name("N")->check(whole(1, most));
     };
-    count("--views", a->views, 360, "Around each model (default: 5; of scenes 1)");
-    make->add_option("--degrees", a->degrees, "From a view to the next one (default: all around; of scenes 3)")
+    count("--views", a->views, 360, "Views around each model (default: 5; of a scene 1)");
+    make->add_option("--degrees", a->degrees, "Angle from one view to the next (default: all around; in a scene 3)")
         ->type_name("A")
         ->check(finite_numbers(1));
     make->add_option("--distances", a->distances,
-                     "Of the eye from the target, times the view's; all views from each (default: 1)")
+                     "Distances of the eye, as multiples of the view's; all views from each (default: 1)")
         ->type_name("X ...")
         ->check(positive());
-    count("--samples", a->samples, 256, "A pixel (default: 64)");
-    count("--repeats", a->repeats, 1000, "Of every pair (default: 2)");
-    make->add_option("--seed", a->seed, "Of orders and sides (default: 1)")
+    count("--samples", a->samples, 256, "Samples a pixel (default: 64)");
+    count("--repeats", a->repeats, 1000, "How often each pair is shown (default: 2)");
+    make->add_option("--seed", a->seed, "For orders and sides (default: 1)")
         ->type_name("N")
         ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
-    add_as_option(*make, a->view.as);
-    add_view_options(*make, a->view);
-    add_display_options(*make, a->display);
+    setup.act_in(*make, Setup::view | Setup::model | Setup::scenes);
     make->callback([a, levels] {
         a->part = StudyArguments::Part::make;
         if (*levels && (!a->conditions.empty() || !a->training.empty()))
@@ -398,9 +414,9 @@ void add_make(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
                  "  unseen study make museum.glb -o levels --levels --maps rpg99 --size 512x512 --repeats 8");
 }
 
-void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
+void add_run(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments>& a) {
     CLI::App* part = verb.add_subcommand("run", "Show a study to somebody, or let a simulated observer answer");
-    part->add_option("FOLDER", a->folder, "Of 'unseen study make'")->required();
+    part->add_option("FOLDER", a->folder, "The folder of 'unseen study make'")->required();
     part->add_option("--subject", a->subject, "Who answers: orders and sides follow from it (default: unnamed)")
         ->type_name("NAME")
         ->check([](const std::string& name) {
@@ -416,7 +432,7 @@ void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
                          "and is right in three of four at the threshold: median, default or strict")
             ->type_name("PERSON");
     part->add_option("--criterion", a->criterion,
-                     "Of --simulate and the task differ: how many standard deviations of noise a difference must "
+                     "With --simulate and the task differ: how many standard deviations of noise a difference must "
                      "exceed (default: 1, 16% false alarms)")
         ->type_name("X")
         ->check(within(-5, 5))
@@ -430,7 +446,7 @@ void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
         ->type_name("OUT.png")
         ->check(ending_in({".png"}))
         ->excludes(simulate);
-    add_display_options(*part, a->display);
+    setup.act_in(*part, Setup::display);
     part->callback([a] { a->part = StudyArguments::Part::run; });
     part->footer(std::string(study_window_help) +
                  "\nExamples:\n  unseen study run study --subject ann --display lab.json --full-screen\n"
@@ -439,7 +455,7 @@ void add_run(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
 
 void add_analyse(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
     CLI::App* part = verb.add_subcommand("analyse", "What the answers of all subjects come to");
-    part->add_option("ANSWERS", a->files, "Of 'unseen study run'")->required()->type_name("ANSWERS.csv ...");
+    part->add_option("ANSWERS", a->files, "Files of 'unseen study run'")->required()->type_name("ANSWERS.csv ...");
     add_json_option(*part, a->json);
     part->add_flag("--markdown", a->markdown, "The table in Markdown");
     part->callback([a] { a->part = StudyArguments::Part::analyse; });
@@ -449,17 +465,17 @@ void add_analyse(CLI::App& verb, const std::shared_ptr<StudyArguments>& a) {
 
 } // namespace
 
-Command study_command(CLI::App& app) {
-    auto a = std::make_shared<StudyArguments>();
+Command study_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<StudyArguments>(StudyArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("study", "Whether people, or a simulated one, tell a simplification from its original");
     verb->require_subcommand(1);
-    add_make(*verb, a);
-    add_run(*verb, a);
+    add_make(*verb, setup, a);
+    add_run(*verb, setup, a);
     add_analyse(*verb, a);
     verb->footer("Examples:\n  unseen study make horse.ply -o study --views 10 --size 512x512\n"
                  "  unseen study run study --subject ann\n"
-                 "  unseen study analyse study/answers-*.csv\n\n'unseen study PART --help' tells more.");
+                 "  unseen study analyse study/answers-*.csv\n\n'unseen study PART --help' explains a part.");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -18,11 +18,10 @@ namespace unseen::app {
 namespace {
 
 struct TradeoffArguments {
-    std::string model, json, csv;
-    ViewOptions view;
-    DisplayOptions display;
-    session::TradeoffOptions options;
-    bool is_verbose = false;
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {}, json = {}, csv = {};
+    session::TradeoffOptions options = {};
 };
 
 // What selects the point in simplify, render and view.
@@ -89,7 +88,7 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
     std::ranges::stable_sort(sorted, std::greater<>(), [](const auto* p) { return p->triangles; });
     const auto all = static_cast<double>(std::max<std::uint64_t>(session.triangle_count(), 1));
     std::vector<std::vector<std::string>> rows = {{"", "triangles", "of all", "follow, ms", "draw, ms", "make, ms",
-                                                   "visible pixels", "V", "second judge", "V", "SSIM", ""}};
+                                                   "visible at, px", "V", "second judge", "V", "SSIM", ""}};
     for (const session::TradeoffPoint* p : sorted)
         rows.push_back({p->name, grouped(p->triangles), rounded(100 * p->triangles / all, 3) + "%",
                         timing_text(p->follow_ms), timing_text(p->draw_ms), rounded(p->make_ms, 3),
@@ -108,7 +107,9 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
         print_line("judged with " + std::to_string(tradeoff.samples) + " samples a pixel in place of " +
                    std::to_string(wanted_samples) +
                    ", to keep to the time: V is larger for that. --seconds gives more.");
-    for (const std::string& name : tradeoff.left_out) print_note("left out: " + name);
+    std::string left_out;
+    for (const std::string& name : tradeoff.left_out) left_out += (left_out.empty() ? "left out: " : "; ") + name;
+    if (!left_out.empty()) print_note(left_out);
     const auto best = std::ranges::find_if(tradeoff.points, &session::TradeoffPoint::is_recommended);
     print_line("recommended, as the safe way with the fewest triangles that shows nothing: " + options_of(*best));
     const auto still = std::ranges::find_if(tradeoff.points, [&](const session::TradeoffPoint& p) {
@@ -158,23 +159,19 @@ Result<int> run(TradeoffArguments& a) {
 
 } // namespace
 
-Command tradeoff_command(CLI::App& app) {
-    auto a = std::make_shared<TradeoffArguments>();
+Command tradeoff_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<TradeoffArguments>(TradeoffArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("tradeoff", "What accuracy costs for a model and a view: which options to take");
     add_model_option(*verb, a->model);
-    verb->add_option("--csv", a->csv, "One line a way")->type_name("FILE.csv");
+    verb->add_option("--csv", a->csv, "A line for each way")->type_name("FILE.csv");
     add_json_option(*verb, a->json);
     verb->add_option("--seconds", a->options.seconds,
-                     "About how long to measure; ways that do not fit are left out (default: 45)")
+                     "Roughly how long to measure; ways that do not fit are left out (default: 45)")
         ->type_name("T")
         ->check(positive());
-    verb->add_option("--samples", a->options.samples, "Of the pictures that are judged, a pixel (default: 64)")
-        ->type_name("N")
-        ->check(whole(1, 256));
-    add_as_option(*verb, a->view.as);
-    add_view_options(*verb, a->view);
-    add_display_options(*verb, a->display);
+    add_samples_option(*verb, a->options.samples, "64");
+    setup.act_in(*verb, Setup::view | Setup::model | Setup::scenes);
     verb->footer("Examples:\n  unseen tradeoff bunny.vdt\n"
                  "  unseen tradeoff part.stl --unit 0.001 --size 1920x1080 --csv tradeoff.csv\n"
                  "  unseen tradeoff museum.glb --observer strict --json -");

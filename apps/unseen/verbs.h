@@ -2,25 +2,28 @@
 #pragma once
 
 #include "command.h"
+#include "setup.h"
 
 namespace unseen::app {
 
-Command build_command(CLI::App& app);
-Command demo_command(CLI::App& app);
-Command info_command(CLI::App& app);
-Command make_command(CLI::App& app);
-Command scene_command(CLI::App& app);
-Command lod_command(CLI::App& app);
-Command select_command(CLI::App& app);
-Command simplify_command(CLI::App& app);
-Command render_command(CLI::App& app);
-Command compare_command(CLI::App& app);
+Command build_command(CLI::App& app, Setup& setup);
 Command cache_command(CLI::App& app);
-Command calibrate_command(CLI::App& app);
+Command calibrate_command(CLI::App& app, Setup& setup);
+Command compare_command(CLI::App& app, Setup& setup);
 Command csf_command(CLI::App& app);
-Command sheet_command(CLI::App& app);
-Command study_command(CLI::App& app);
-Command tradeoff_command(CLI::App& app);
-Command view_command(CLI::App& app);
+Command demo_command(CLI::App& app, Setup& setup);
+Command fly_command(CLI::App& app, Setup& setup);
+Command info_command(CLI::App& app, Setup& setup);
+Command levels_command(CLI::App& app, Setup& setup);
+Command lod_command(CLI::App& app, Setup& setup);
+Command make_command(CLI::App& app, Setup& setup);
+Command render_command(CLI::App& app, Setup& setup);
+Command sheet_command(CLI::App& app, Setup& setup);
+Command simplify_command(CLI::App& app, Setup& setup);
+Command study_command(CLI::App& app, Setup& setup);
+Command tradeoff_command(CLI::App& app, Setup& setup);
+Command view_command(CLI::App& app, Setup& setup);
+
+Command make_scene_command(CLI::App& make); // a part of `make`
 
 } // namespace unseen::app

@@ -14,11 +14,11 @@ namespace unseen::app {
 namespace {
 
 struct ViewArguments {
-    std::string model;
-    ViewOptions view;
-    DisplayOptions display;
-    GazeOptions gaze;
-    ViewerOptions viewer;
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {};
+    GazeOptions gaze = {};
+    ViewerOptions viewer = {};
 };
 
 Result<int> run(ViewArguments& a) {
@@ -44,36 +44,27 @@ Result<int> run(ViewArguments& a) {
 
 } // namespace
 
-Command view_command(CLI::App& app) {
-    auto a = std::make_shared<ViewArguments>();
+Command view_command(CLI::App& app, Setup& setup) {
+    auto a = std::make_shared<ViewArguments>(ViewArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb = app.add_subcommand("view", "Look at a model or a scene in a window");
     add_model_option(*verb, a->model);
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
-    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading,
-                                                 {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
-                                                 "smooth (default) or flat");
     verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture of the model when the viewer ends")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
         ->type_name("N")
         ->check(whole(1, 1e6));
-    add_geomorph_option(*verb, a->viewer.geomorph_seconds);
-    add_as_option(*verb, a->view.as);
-    add_view_options(*verb, a->view);
-    add_orthographic_option(*verb, a->view);
-    add_display_options(*verb, a->display);
-    add_what_options(*verb, a->viewer.what);
-    add_moving_gaze_options(*verb, a->gaze, true);
-    verb->callback([o = a.get()] {
-        check_gaze(o->viewer.what, o->gaze);
-        check_geomorph(o->viewer.geomorph_seconds, o->view);
-    });
+    std::vector<Rule> rules;
+    add_geomorph_option(*verb, a->viewer.geomorph_seconds, rules);
+    add_what_options(*verb, a->viewer.what, rules);
+    add_moving_gaze_options(*verb, a->gaze, true, rules);
+    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
     verb->footer(viewer_help() + "\nExamples:\n  unseen view bunny.vdt\n"
                                  "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                  "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25\n"
                                  "  unseen view part.stl --orthographic fit --direction 0 -1 0 --up 0 0 1");
-    return {verb, [a] { return run(*a); }};
+    return {verb, [a] { return run(*a); }, std::move(rules)};
 }
 
 } // namespace unseen::app

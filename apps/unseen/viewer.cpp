@@ -19,6 +19,7 @@
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
+#include "hiding.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "viewer_overlay.h"
@@ -257,7 +258,7 @@ private:
     // How much of the world the window's height shows in perspective, of what is that far.
     double height_per_distance() const { return 2 * std::tan(glm::radians(view_.fov_y_degrees) / 2); }
 
-    // Of the eye from the target; in parallel: the distance at which perspective shows the target in the same size.
+    // From the eye to the target; in a parallel view the distance at which perspective shows the target in the same size.
     double distance() const {
         return view_.orthographic_height ? *view_.orthographic_height / height_per_distance()
                                          : glm::length(view_.eye - view_.target);

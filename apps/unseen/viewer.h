@@ -21,7 +21,7 @@ struct ViewerOptions {
     render::DrawOptions draw;
     std::string screenshot;                 // of the model alone, written when the viewer ends
     std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
-    int frames = 0;                         // ends after so many; 0: when the user wants to
+    int frames = 0;                         // after which it ends; 0: when the user wants to
 };
 
 // Shows the window and runs until it is closed. On the main thread only. Screenshots that somebody asks for in the

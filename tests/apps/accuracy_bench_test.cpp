@@ -130,7 +130,7 @@ TEST_F(AccuracyBenchTest, BoundsHoldAndTighterOnesCostMore) {
 }
 
 TEST_F(AccuracyBenchTest, ScenesHaveLevels) {
-    ASSERT_EQ(run({"scene", "make", "museum", "--triangles", "10000", "-o", "museum.glb"}).status, 0);
+    ASSERT_EQ(run({"make", "scene", "museum", "--triangles", "10000", "-o", "museum.glb"}).status, 0);
     const Outcome outcome =
         bench({"accuracy", "--quick", "museum.glb", "--only", "levels", "--window", "96", "--json", "-"});
     if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;

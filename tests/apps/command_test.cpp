@@ -1,5 +1,6 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
 #include <chrono>
+#include <map>
 
 #include "run_command.h"
 
@@ -85,7 +86,12 @@ TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
         {"simplify", "ball.obj", "-o", "out.ply", "--fill", "0"},
         {"simplify", "ball.obj", "-o", "out.ply", "--fov", "180"},
         {"simplify", "ball.obj", "-o", "out.ply", "--size", "0x100"},
-        {"simplify", "ball.obj", "-o", "out.ply", "--size", "100"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--size", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--full", "--fold-test", "error"},
+        {"simplify", "picture.png", "-o", "out.ply"},
+        {"csf", "--frequency", "4", "--luminance", "1", "--light", "1", "0", "0"},
+        {"compare", "a.png", "b.png", "--light", "1", "0", "0"},
+        {"info", "ball.obj", "--size", "512"},
         {"simplify", "ball.obj", "-o", "out.ply", "--size", "100000x100"},
         {"simplify", "ball.obj", "-o", "out.ply", "--ambient", "1.5"},
         {"simplify", "ball.obj", "-o", "out.ply", "--unit", "0"},
@@ -404,7 +410,7 @@ TEST_F(BuildTest, ColoursAreReflectanceUnlessTheyArePrelit) {
     EXPECT_THAT(of_tree.err, AllOf(IsAnErrorForPeople(), HasSubstr("decided when it was built")));
     const Outcome both = run({"simplify", "shaded.obj", "-o", "o.ply", "--prelit", "--ambient", "0.3"});
     EXPECT_EQ(both.status, 2);
-    EXPECT_THAT(both.err, HasSubstr("--prelit excludes"));
+    EXPECT_THAT(both.err, HasSubstr("--prelit and --ambient exclude each other"));
 }
 
 TEST_F(InfoTest, HasTheStableKeys) {
@@ -635,7 +641,7 @@ TEST_F(SimplifyTest, TakesNoOptionThatDoesNothing) {
         words.insert(words.end(), other.begin(), other.end());
         const Outcome refused = run(words);
         EXPECT_NE(refused.status, 0);
-        EXPECT_THAT(refused.err, HasSubstr("--masking scene needs --fold-test error"));
+        EXPECT_THAT(refused.err, HasSubstr("only --fold-test error knows what masks"));
     }
     const auto triangles = [&](std::vector<std::string> more) {
         more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "x.ply", "--json", "-"});
@@ -707,11 +713,21 @@ TEST_F(SimplifyTest, ABudgetMayBeAShare) {
     EXPECT_LE(count, 368);
     EXPECT_EQ(simplify({"--triangles", "25%"})["triangles"], count);
     EXPECT_EQ(simplify({"--ratio", "0.25"})["triangles"], count);
+    const int thousand = simplify({"--triangles", "1000"})["triangles"];
+    EXPECT_GT(thousand, count);
+    for (const std::string spelled : {"1k", "1e3", "1,000", "0.001M"})
+        EXPECT_EQ(simplify({"--triangles", spelled})["triangles"], thousand) << spelled;
+    const Outcome more = run({"simplify", "ball.vdt", "-o", "o.ply", "--triangles", "200%"});
+    EXPECT_THAT(more.err, HasSubstr("note: --triangles 200%: a model has no more than 100%"));
     for (const std::vector<std::string>& wrong :
          std::vector<std::vector<std::string>>{{"--triangles", "0%"},
                                                {"--triangles", "%"},
                                                {"--triangles", "nan%"},
                                                {"--triangles", "-5%"},
+                                               {"--triangles", "k"},
+                                               {"--triangles", "1,00"},
+                                               {"--triangles", "1,0000"},
+                                               {"--triangles", "0.0001k"},
                                                {"--ratio", "0"},
                                                {"--ratio", "1.5"},
                                                {"--ratio", "50%"},
@@ -737,6 +753,131 @@ TEST_F(UsageTest, SuggestsWhatWasMeant) {
     EXPECT_THAT(complaint({"make", "subdivid"}), HasSubstr("'subdivide'?"));
     EXPECT_THAT(complaint({"frobnicate"}), AllOf(HasSubstr("no verb 'frobnicate'."), Not(HasSubstr("mean"))));
     EXPECT_THAT(complaint({"info", "a.vdt", "b.vdt"}), HasSubstr("'b.vdt' is one word too many"));
+    EXPECT_THAT(complaint({"bunny.vdt"}), HasSubstr("no verb 'bunny.vdt': did you mean 'unseen view bunny.vdt'?\n"));
+    EXPECT_THAT(complaint({"simplify", "b.vdt", "-o", "o.ply", "--clusterer", "octree"}),
+                HasSubstr("no option '--clusterer' here; see 'unseen build'.\n"));
+    EXPECT_THAT(complaint({"simplify", "b.png", "-o", "o.ply"}), HasSubstr("'b.png' is a picture"));
+}
+
+// Each option acts in its verb, or is refused; what the verbs share is documented once.
+TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
+    const std::vector<std::string> verbs = {"build m.obj -o t.vdt",
+                                            "info m.obj",
+                                            "simplify m.obj -o o.ply",
+                                            "render m.obj -o o.png",
+                                            "fly m.obj",
+                                            "view m.obj",
+                                            "compare a.png b.png",
+                                            "sheet m.obj -o s.png",
+                                            "tradeoff m.obj",
+                                            "lod m.obj -o l.glb",
+                                            "levels m.obj -o l.png",
+                                            "levels precompute s.glb -o s.sel --triangles 9",
+                                            "levels info s.sel",
+                                            "csf --frequency 4 --luminance 1",
+                                            "calibrate --simulate castle",
+                                            "study make m.obj -o f",
+                                            "study run f",
+                                            "study analyse a.csv",
+                                            "demo --no-view",
+                                            "make subdivide m.obj --times 1 -o o.ply",
+                                            "make scene museum -o m.glb",
+                                            "cache"};
+    const std::vector<std::string> options = {"--eye 1 2 3",      "--eye 0 0 9 --target 1 2 3",
+                                              "--up 0 0 1",       "--direction 1 0 0",
+                                              "--fill 0.5",       "--fov 30",
+                                              "--size 512",       "--orthographic fit",
+                                              "--display d.json", "--ppd 30",
+                                              "--distance 1",     "--peak 200",
+                                              "--black 0.1",      "--observer strict",
+                                              "--csf castle",     "--light 1 0 0",
+                                              "--ambient 0.1",    "--fill-light 0.1",
+                                              "--lights l.json",  "--no-shadows",
+                                              "--background 10",  "--unit 0.1",
+                                              "--texture t.png",  "--no-texture",
+                                              "--drop skins",     "--no-weld",
+                                              "--prelit",         "--skip-bad",
+                                              "--no-cache",       "--as model"};
+    const std::string setup = run({"help", "setup"}).out;
+    for (const std::string& verb : verbs) {
+        const auto parse = [&](const std::string& more) {
+            return run_shell("'" UNSEEN_COMMAND "' --parse-only " + verb + " " + more);
+        };
+        std::string name = verb.substr(0, verb.find(' '));
+        if (name == "levels" || name == "study" || name == "make") {
+            const std::string part = verb.substr(name.size() + 1, verb.find(' ', name.size() + 1) - name.size() - 1);
+            if (part.find('.') == std::string::npos) name += " " + part;
+        }
+        const std::string help = run_shell("'" UNSEEN_COMMAND "' " + name + " --help").out;
+        if (help.find("Not in this build") != std::string::npos) continue;
+        ASSERT_EQ(parse("").status, 0) << parse("").err;
+        for (const std::string& option : options) {
+            const std::string first =
+                option.substr(option.rfind("--"), option.find(' ', option.rfind("--")) - option.rfind("--"));
+            const std::string shown = first == "--no-shadows" ? "--shadows" : first;
+            const bool acts =
+                help.find(" " + shown + " ") != std::string::npos || help.find(" " + shown + "\n") != std::string::npos;
+            EXPECT_EQ(parse(option).status, acts ? 0 : 2) << name << " " << option << "\n" << parse(option).err;
+            EXPECT_THAT(setup, HasSubstr("\n  " + shown)) << "documented";
+        }
+    }
+}
+
+TEST_F(UsageTest, VerbsHaveFewOptions) {
+    std::istringstream lines(run({"help", "--options"}).out);
+    std::map<std::string, int> counts;
+    int all = 0;
+    for (std::string line; std::getline(lines, line);) {
+        if (line.ends_with(" setup")) continue; // counted once, as options of "setup"
+        ++counts[line.substr(0, line.find_first_of("- "))], ++all;
+    }
+    for (const auto& [verb, count] : counts) EXPECT_LE(count, 45) << verb;
+    EXPECT_GT(counts["simplify"], 5);
+    EXPECT_LE(all, 300);
+}
+
+TEST_F(SimplifyTest, ASetupComesFromAFile) {
+    fs::create_directory(path("lab"));
+    write_text(path("lab/far.json"), R"({"width_px": 1920, "height_px": 1080, "diagonal_m": 0.6,
+                                         "viewing_distance_m": 3, "peak_cdm2": 100, "black_cdm2": 0.5})");
+    write_text(path("lab/setup.json"), R"({"display": "far.json", "size": "256x256", "light": [1, 0, 0],
+                                           "observer": "strict", "no-weld": true, "as": "model"})");
+    const std::vector<std::string> spelled = {"--display", "lab/far.json", "--size", "256", "--light", "1", "0",
+                                              "0",         "--observer",   "strict"};
+    const auto with = [](std::vector<std::string> words, std::vector<std::string> more) {
+        words.insert(words.end(), more.begin(), more.end());
+        return words;
+    };
+    const int by_file = simplify({"--setup", "lab/setup.json"})["triangles"];
+    EXPECT_EQ(simplify(spelled)["triangles"], by_file);
+    EXPECT_NE(simplify({})["triangles"], by_file);
+    const int nearer = simplify({"--setup", "lab/setup.json", "--distance", "0.2"})["triangles"];
+    EXPECT_EQ(simplify(with(spelled, {"--distance", "0.2"}))["triangles"], nearer) << "the command line counts more";
+    // What does not act in a verb is passed over.
+    EXPECT_EQ(run({"build", "ball.obj", "-o", "b.vdt", "--setup", "lab/setup.json"}).status, 0);
+    EXPECT_EQ(run({"cache", "--setup", "lab/setup.json"}).status, 2);
+    const std::vector<std::pair<std::string, std::string>> wrong = {
+        {"[]", "is no JSON object of options"},
+        {R"({"sise": 1})", "'wrong.json': there is no option 'sise' of the setup: did you mean 'size'?"},
+        {R"({"triangles": 5})", "there is no option 'triangles' of the setup"},
+        {R"({"light": [1, 2]})", "'wrong.json', light: "},
+        {R"({"ambient": 2})", "'wrong.json', ambient: --ambient: must be a number from 0 to 1, not '2'"},
+        {R"({"size": null})", "'wrong.json', size: must be a number, a text, true, false, or an array"},
+        {R"({"eye": [1, 2, 3], "direction": [1, 0, 0]})", "--eye and --direction exclude each other"}};
+    for (const auto& [text, sentence] : wrong) {
+        write_text(path("wrong.json"), text);
+        const Outcome refused = run({"simplify", "ball.vdt", "-o", "o.ply", "--setup", "wrong.json"});
+        EXPECT_EQ(refused.status, 2) << text;
+        EXPECT_THAT(refused.err, HasSubstr(sentence));
+    }
+    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lab/setup.json", "--setup", "lab/setup.json"}).status, 2);
+    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "o.ply", "--setup", "gone.json"}).status, 2);
+}
+
+TEST_F(MakeTest, OldSpellingsAreTaken) {
+    EXPECT_EQ(run({"scene", "make", "museum", "--triangles", "10000", "-o", "m.glb"}).status, 0);
+    EXPECT_EQ(run({"--parse-only", "simplify", "m.glb", "-o", "o.glb", "--ratio", "0.5"}).status, 0);
+    EXPECT_EQ(run({"simplify", "m.glb", "-o", "o.glb", "--imperceptible", "--full"}).status, 2);
 }
 
 TEST_F(UsageTest, HelpIsAVerb) {
@@ -824,9 +965,9 @@ TEST_F(UsageTest, NamesThatCannotBeAreRefusedFirst) {
              {"simplify", "missing.ply", "-o", name + ".ply"},
              {"simplify", "missing.ply", "-o", "o.ply", "--json", name},
              {"render", "missing.ply", "-o", name + ".png"},
-             {"render", "missing.ply", "--path", "orbit", "-o", name + "%04d.png"},
+             {"fly", "missing.ply", "--path", "orbit", "-o", name + "%04d.png"},
              {"sheet", "missing.ply", "-o", name + ".png"},
-             {"scene", "make", "museum", "-o", name + ".glb"},
+             {"make", "scene", "museum", "-o", name + ".glb"},
              {"make", "subdivide", "missing.ply", "--times", "1", "-o", name + ".ply"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 1) << words[0];
@@ -855,7 +996,7 @@ TEST_F(SimplifyTest, AFullDiskLeavesTheOldOutputs) {
              {"o.ply", "simplify ball.vdt --triangles 500 -o o.ply"},
              {"o.glb", "simplify ball.vdt --triangles 500 -o o.glb"},
              {"o.obj", "make subdivide ball.obj --times 1 -o o.obj"},
-             {"m.glb", "scene make museum -o m.glb"},
+             {"m.glb", "make scene museum -o m.glb"},
              {"t.json", "csf --table --save-table t.json"},
              {"r.json", "simplify ball.vdt --triangles 500 -o s.ply --verbose --json r.json"}}) {
         write_text(path(out), "old");

@@ -31,7 +31,8 @@ protected:
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         const Json report = outcome.json();
-        EXPECT_THAT(keys(report), UnorderedElementsAre("visible_pixels", "pixels", "max_ratio", "ssim", "device"));
+        EXPECT_THAT(keys(report), UnorderedElementsAre("visible_at", "different_pixels", "visible_pixels", "pixels",
+                                                       "max_ratio", "ssim", "device"));
         EXPECT_TRUE(report["visible_pixels"].is_number_unsigned()) << report;
         EXPECT_EQ(report["pixels"], 128 * 128) << report;
         return report;
@@ -112,7 +113,7 @@ TEST_F(CompareTest, SeesByAnotherSensitivity) {
     const Json by_file = compare({"a.pfm", "b.pfm", "--csf", "me.json"});
     EXPECT_NEAR(by_file["max_ratio"].get<double>(),
                 compare({"a.pfm", "b.pfm", "--observer", "median"})["max_ratio"].get<double>(), 0.01);
-    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--csf", "me.json"}).out, HasSubstr("observer me.json, looked"));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--csf", "me.json"}).out, HasSubstr("observer me.json, seen"));
 }
 
 TEST_F(CompareTest, RefusesWhatTheJudgeDoesNotKnow) {
@@ -123,10 +124,12 @@ TEST_F(CompareTest, RefusesWhatTheJudgeDoesNotKnow) {
         EXPECT_NE(outcome.status, 0);
         return outcome.err;
     };
-    EXPECT_THAT(error({"--model", "rpg99", "--observer", "strict"}), HasSubstr("--observer needs --model modern"));
-    EXPECT_THAT(error({"--observer", "strict", "--csf", "me.json"}), HasSubstr("--observer excludes --csf FILE"));
-    EXPECT_THAT(error({"--model", "second", "--csf", "castle"}), HasSubstr("--csf needs --model modern"));
-    EXPECT_THAT(error({"--model", "rpg99", "--csf", "castle"}), HasSubstr("--csf needs --model modern"));
+    EXPECT_THAT(error({"--model", "rpg99", "--observer", "strict"}),
+                HasSubstr("--observer and --model rpg99 exclude each other"));
+    EXPECT_THAT(error({"--observer", "strict", "--csf", "me.json"}),
+                HasSubstr("--observer and --csf exclude each other"));
+    EXPECT_THAT(error({"--model", "second", "--csf", "castle"}), HasSubstr("--csf and --model second"));
+    EXPECT_THAT(error({"--model", "rpg99", "--csf", "castle"}), HasSubstr("--csf and --model rpg99"));
     EXPECT_THAT(error({"--model", "summing"}), HasSubstr("modern"));
 }
 

@@ -75,7 +75,7 @@ TEST_F(CsfCommandTest, ContradictionsAreRefused) {
         {{"--velocity", "-1"}, "0 or more"},
         {{"--pursuit"}, "--velocity"},
         {{"--distance", "0"}, "above 0"},
-        {{"--distance", "3"}, "--distance is for --model daly"},
+        {{"--distance", "3"}, "--distance needs --model daly"},
         {{"--plot", "csf.png"}, "leave --frequency away"},
         {{"--table", "--save-table", "table.json"}, "leave these options away"},
         {{"--table", "--area", "1"}, "--area"},

@@ -39,7 +39,7 @@ TEST_F(CutShortTest, ATreeCutShortOrOverwrittenWhileItIsDrawnIsAnError) {
     const fs::path log = folder().string() + ".log";
     for (const bool is_overwritten : {true, false}) {
         const pid_t process = start(
-            {"render", "heavy.vdt", "--pixels", "1", "--path", "orbit:0.01:1000000", "--csv", "frames.csv"}, log, log);
+            {"fly", "heavy.vdt", "--pixels", "1", "--path", "orbit:0.01:1000000", "--csv", "frames.csv"}, log, log);
         ASSERT_GT(process, 0);
         const fs::path maps = "/proc/" + std::to_string(process) + "/maps";
         for (int i = 0; i < 3000 && read_text(maps).find("heavy.vdt") == std::string::npos; ++i) usleep(10'000);

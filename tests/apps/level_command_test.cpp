@@ -1,4 +1,4 @@
-// unseen render --method: discrete levels of detail as a user asks for them.
+// unseen levels: discrete levels of detail as a user asks for them.
 #include "run_command.h"
 
 #include <numeric>
@@ -16,14 +16,14 @@ class LevelCommandTest : public CommandTest {
 protected:
     void SetUp() override {
         CommandTest::SetUp();
-        const Outcome made = run({"scene", "make", "treasure", "-o", "scene.glb", "--triangles", "30000"});
+        const Outcome made = run({"make", "scene", "treasure", "-o", "scene.glb", "--triangles", "30000"});
         ASSERT_EQ(made.status, 0) << made.err;
         const Outcome probe = run({"render", "scene.glb", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
         if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
         fs::remove(path("probe.png"));
     }
     Outcome render(std::vector<std::string> more) const {
-        std::vector<std::string> words = {"render", "scene.glb", "--size",
+        std::vector<std::string> words = {"levels", "scene.glb", "--size",
                                           std::to_string(width) + "x" + std::to_string(height)};
         words.insert(words.end(), more.begin(), more.end());
         return run(words);
@@ -126,9 +126,9 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
         EXPECT_GE(picture->image.width, panels * width + (panels - 1) * 4) << show;
     }
     // One object is in no layers.
-    ASSERT_EQ(run({"scene", "make", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
+    ASSERT_EQ(run({"make", "scene", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
     for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const Outcome drawn = run({"render", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o",
+        const Outcome drawn = run({"levels", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o",
                                    show + ".png", "--show", show, "--no-shadows"});
         EXPECT_EQ(drawn.status, 0) << drawn.err;
     }
@@ -136,7 +136,7 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
 
 // The background alone: by every method, and whatever is to be shown of it.
 TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
-    ASSERT_EQ(run({"scene", "make", "museum", "-o", "museum.glb", "--triangles", "10000"}).status, 0);
+    ASSERT_EQ(run({"make", "scene", "museum", "-o", "museum.glb", "--triangles", "10000"}).status, 0);
     const std::string bytes = read_text(path("museum.glb"));
     const auto length = static_cast<std::size_t>(static_cast<unsigned char>(bytes[12])) |
                         static_cast<std::size_t>(static_cast<unsigned char>(bytes[13])) << 8 |
@@ -150,7 +150,7 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
     std::string first;
     for (const std::string method : {"perceptual", "distance", "area"}) {
         const Outcome drawn =
-            run({"render", "scene.gltf", "--size", "64x48", "--method", method, "-o", method + ".pfm", "--json", "-"});
+            run({"levels", "scene.gltf", "--size", "64x48", "--method", method, "-o", method + ".pfm", "--json", "-"});
         ASSERT_EQ(drawn.status, 0) << method << ": " << drawn.err;
         EXPECT_EQ(drawn.json()["frames"][0]["triangles"], 0);
         EXPECT_TRUE(drawn.json()["is_settled"]);
@@ -163,7 +163,7 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
     const auto [least, most] = std::ranges::minmax(picture->image.values);
     EXPECT_GT(most, 2 * least) << "there are walls";
     for (const std::string show : {"layers", "combinations", "maps", "levels"})
-        EXPECT_EQ(run({"render", "scene.gltf", "--size", "64x48", "--method", "perceptual", "-o", show + ".png",
+        EXPECT_EQ(run({"levels", "scene.gltf", "--size", "64x48", "--method", "perceptual", "-o", show + ".png",
                        "--show", show})
                       .status,
                   0)
@@ -176,21 +176,25 @@ TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
         EXPECT_EQ(outcome.status, 2) << outcome.out;
         return outcome.err;
     };
-    EXPECT_THAT(refused({"--method", "perceptual"}), HasSubstr("-o or --json"));
-    EXPECT_THAT(refused({"--method", "perceptual", "--bias", "2", "--json", "-"}), HasSubstr("distance or area"));
-    EXPECT_THAT(refused({"--method", "area", "--layers", "3", "--json", "-"}), HasSubstr("perceptual"));
-    EXPECT_THAT(refused({"--method", "perceptual", "--layers", "17", "--json", "-"}), HasSubstr("--layers"));
-    EXPECT_THAT(refused({"--levels", "3", "-o", "a.png"}), HasSubstr("needs --method"));
-    EXPECT_THAT(refused({"--fade", "3", "-o", "a.png"}), HasSubstr("needs --method"));
-    EXPECT_THAT(refused({"--method", "area", "--fade", "3", "-o", "a.png"}), HasSubstr("needs --path"));
-    EXPECT_THAT(refused({"--show", "levels", "-o", "a.png"}), HasSubstr("need --method"));
-    EXPECT_THAT(refused({"--method", "area", "--show", "maps", "-o", "a.png"}), HasSubstr("perceptual"));
-    EXPECT_THAT(refused({"--method", "area", "--show", "cost", "-o", "a.png"}), HasSubstr("exclude --method"));
-    EXPECT_THAT(refused({"--method", "area", "--full", "--json", "-"}), HasSubstr("--bias"));
-    EXPECT_THAT(refused({"--method", "area", "--samples", "4", "--json", "-"}), HasSubstr("one sample"));
-    EXPECT_THAT(refused({"--method", "area", "--path", "orbit:1:3", "-o", "a.png"}), HasSubstr("%d"));
-    EXPECT_THAT(refused({"--method", "area", "--show", "levels", "-o", "a.pfm"}), HasSubstr(".png"));
-    EXPECT_THAT(refused({"--method", "nearest", "-o", "a.png"}), HasSubstr("--method"));
+    const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+        {{}, "-o is required, or --json"},
+        {{"--bias", "2", "--json", "-"}, "--bias needs --method distance or --method area"},
+        {{"--method", "area", "--layers", "3", "--json", "-"}, "--layers and --method area exclude each other"},
+        {{"--layers", "17", "--json", "-"}, "--layers"},
+        {{"--method", "area", "--fade", "3", "-o", "a.png"}, "--fade needs --path"},
+        {{"--method", "area", "--show", "maps", "-o", "a.png"}, "only --method perceptual"},
+        {{"--method", "area", "--show", "cost", "-o", "a.png"}, "must be layers"},
+        {{"--method", "area", "--full", "--json", "-"}, "no option '--full'"},
+        {{"--method", "area", "--samples", "4", "--json", "-"}, "no option '--samples'"},
+        {{"--method", "area", "--triangles", "9", "--json", "-"}, "--triangles needs --selection"},
+        {{"--method", "area", "--path", "orbit:1:3", "-o", "a.png"}, "%d"},
+        {{"--method", "area", "--show", "levels", "-o", "a.pfm"}, ".png"},
+        {{"--method", "nearest", "-o", "a.png"}, "--method"},
+        {{"--fps", "30", "-o", "a.png"}, "--fps needs --lights"}};
+    for (const auto& [words, sentence] : wrong) EXPECT_THAT(refused(words), HasSubstr(sentence));
+    EXPECT_THAT(run({"render", "scene.glb", "--show", "levels", "-o", "a.png"}).err, HasSubstr("--show"));
+    EXPECT_THAT(run({"render", "scene.glb", "--method", "area"}).err, HasSubstr("-o is required, or --json"))
+        << "an old spelling";
     EXPECT_EQ(files(), std::set<std::string>({"scene.glb"}));
 }
 

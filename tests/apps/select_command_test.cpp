@@ -1,4 +1,4 @@
-// unseen select and unseen-bench selection: levels selected beforehand, as a user asks for them; when it is killed on the way, and by several
+// unseen levels precompute and unseen-bench selection: levels selected beforehand, as a user asks for them; when it is killed on the way, and by several
 // processes.
 #include "run_command.h"
 
@@ -15,14 +15,14 @@ class SelectCommandTest : public CommandTest {
 protected:
     void SetUp() override {
         CommandTest::SetUp();
-        const Outcome made = run({"scene", "make", "bunnies", "-o", "scene.glb", "--triangles", "12000"});
+        const Outcome made = run({"make", "scene", "bunnies", "-o", "scene.glb", "--triangles", "12000"});
         ASSERT_EQ(made.status, 0) << made.err;
         const Outcome probe = run({"render", "scene.glb", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
         if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
         fs::remove(path("probe.png"));
     }
     std::vector<std::string> words(const std::string& out) const {
-        return {"select", "precompute", "scene.glb", "-o",      out, "--triangles", "8000", "--window",
+        return {"levels", "precompute", "scene.glb", "-o",      out, "--triangles", "8000", "--window",
                 "64",     "--spacing",  "25",        "--depth", "1"};
     }
     std::string text(const std::string& out) const {
@@ -43,14 +43,14 @@ TEST_F(SelectCommandTest, SelectsTellsAndDraws) {
     EXPECT_GT(report["evaluations"], report["cameras"]);
     EXPECT_THAT(files(), UnorderedElementsAre("scene.glb", "a.sel"));
 
-    const Outcome told = run({"select", "info", "a.sel", "--json", "-"});
+    const Outcome told = run({"levels", "info", "a.sel", "--json", "-"});
     ASSERT_EQ(told.status, 0) << told.err;
     EXPECT_EQ(told.json()["budget"], 8000);
     EXPECT_EQ(told.json()["objects"], 40);
     EXPECT_EQ(told.json()["cameras"], report["cameras"]);
-    EXPECT_THAT(run({"select", "info", "a.sel"}).out, HasSubstr("selected at level 4"));
+    EXPECT_THAT(run({"levels", "info", "a.sel"}).out, HasSubstr("selected at level 4"));
 
-    const Outcome flown = run({"render", "scene.glb", "--method", "selection", "--selection", "a.sel", "--path",
+    const Outcome flown = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--path",
                                "walk:60:12", "--size", "160x90", "--json", "-"});
     ASSERT_EQ(flown.status, 0) << flown.err;
     const Json flight = flown.json();
@@ -63,7 +63,7 @@ TEST_F(SelectCommandTest, SelectsTellsAndDraws) {
         changed += frame["changed"].get<int>();
     }
     EXPECT_GT(changed, 0);
-    const Outcome less = run({"render", "scene.glb", "--method", "selection", "--selection", "a.sel", "--triangles",
+    const Outcome less = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--triangles",
                               "5000", "--size", "160x90", "-o", "still.png", "--json", "-"});
     ASSERT_EQ(less.status, 0) << less.err;
     EXPECT_LE(less.json()["frames"][0]["triangles"], 5000);
@@ -107,17 +107,17 @@ TEST_F(SelectCommandTest, GoesOnAfterItWasKilled) {
 
 TEST_F(SelectCommandTest, WhatIsWrongIsSaid) {
     write_text(path("bad.sel"), "no selections");
-    const Outcome bad = run({"select", "info", "bad.sel"});
+    const Outcome bad = run({"levels", "info", "bad.sel"});
     EXPECT_EQ(bad.status, 1);
     EXPECT_THAT(bad.err, HasSubstr("no file of selections"));
-    EXPECT_EQ(run({"render", "scene.glb", "--method", "selection", "-o", "a.png"}).status, 2);
+    EXPECT_EQ(run({"levels", "scene.glb", "--method", "selection", "-o", "a.png"}).status, 2);
     EXPECT_EQ(run({"render", "scene.glb", "--selection", "bad.sel", "-o", "a.png"}).status, 2);
-    EXPECT_EQ(run({"select", "precompute", "scene.glb", "-o", "a.sel"}).status, 2);
-    EXPECT_EQ(run({"select", "precompute", "scene.glb", "-o", "a.png", "--triangles", "9"}).status, 2);
+    EXPECT_EQ(run({"levels", "precompute", "scene.glb", "-o", "a.sel"}).status, 2);
+    EXPECT_EQ(run({"levels", "precompute", "scene.glb", "-o", "a.png", "--triangles", "9"}).status, 2);
     // Of another scene.
     ASSERT_EQ(run(words("a.sel")).status, 0);
-    ASSERT_EQ(run({"scene", "make", "bunnies", "-o", "scene.glb", "--triangles", "12000", "--seed", "2"}).status, 0);
-    const Outcome other = run({"render", "scene.glb", "--method", "selection", "--selection", "a.sel", "-o", "a.png"});
+    ASSERT_EQ(run({"make", "scene", "bunnies", "-o", "scene.glb", "--triangles", "12000", "--seed", "2"}).status, 0);
+    const Outcome other = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "-o", "a.png"});
     EXPECT_EQ(other.status, 1);
     EXPECT_THAT(other.err, HasSubstr("another scene"));
 }
@@ -191,10 +191,10 @@ TEST_F(SelectCommandTest, QualitiesAndTheGrowthOfCostAreMeasured) {
 
 TEST_F(SelectCommandTest, LevelsAreAsManyAsAreAskedFor) {
     ASSERT_EQ(run_shell(text("few.sel") + " --levels 3").status, 0);
-    const Outcome told = run({"select", "info", "few.sel", "--json", "-"});
+    const Outcome told = run({"levels", "info", "few.sel", "--json", "-"});
     EXPECT_EQ(told.json()["levels"], 3);
     const Outcome drawn =
-        run({"render", "scene.glb", "--method", "selection", "--selection", "few.sel", "-o", "few.png", "--json", "-"});
+        run({"levels", "scene.glb", "--method", "selection", "--selection", "few.sel", "-o", "few.png", "--json", "-"});
     ASSERT_EQ(drawn.status, 0) << drawn.err;
     const Json flight = drawn.json();
     for (const Json& object : flight["objects"]) EXPECT_LE(object["level_triangles"].size(), 3u);

@@ -51,7 +51,7 @@ TEST_F(StudyWindowTest, IsAnsweredWithKeysAndTakenUpAgain) {
     EXPECT_EQ(ended(), 0) << errors();
     const std::size_t first = answers();
     ASSERT_LT(first, 5u);
-    EXPECT_THAT(read_text(path("out.txt")), HasSubstr("of 5 trials are answered; the same command goes on"));
+    EXPECT_THAT(read_text(path("out.txt")), HasSubstr("of 5 trials are answered; the same command continues"));
     // Both pictures as they are, on grey.
     const auto shot = unseen::perception::read_image(path("shot.png"));
     ASSERT_TRUE(shot) << shot.error().message;

@@ -122,7 +122,7 @@ TEST_F(TextureCommandTest, CanBeLeftOutOrReplaced) {
     EXPECT_THAT(complaint({"render", "t.vdt", "-o", "x.png", "--texture", "grey.png"}), HasSubstr("unseen build"));
     const Outcome both = run({"build", "square.obj", "-o", "x.vdt", "--texture", "grey.png", "--no-texture"});
     EXPECT_EQ(both.status, 2);
-    EXPECT_THAT(both.err, HasSubstr("--texture excludes --no-texture"));
+    EXPECT_THAT(both.err, HasSubstr("--texture and --no-texture exclude each other"));
 }
 
 TEST_F(TextureCommandTest, OfSeveralMaterialsBecomeOne) {

@@ -30,7 +30,7 @@ protected:
 
     // By frame.
     std::vector<double> triangles(const std::vector<std::string>& more) const {
-        std::vector<std::string> words = {"render", "ball.vdt", "--path", "still.csv",
+        std::vector<std::string> words = {"fly", "ball.vdt", "--path", "still.csv",
                                           "--csv",  "out.csv",  "--size", "512x512"};
         words.insert(words.end(), more.begin(), more.end());
         fs::remove(path("out.csv"));

@@ -296,12 +296,12 @@ Result<Selections> read_selections(const std::filesystem::path& file) {
     const auto bytes = std::as_bytes(std::span(*read));
     if (bytes.size() < selection_magic.size() + 12 ||
         std::memcmp(bytes.data(), selection_magic.data(), selection_magic.size()) != 0)
-        return wrong("byte 0: this is no file of selections; make one with 'unseen select precompute'");
+        return wrong("byte 0: this is no file of selections; make one with 'unseen levels precompute'");
     std::uint32_t version = 0;
     std::memcpy(&version, bytes.data() + selection_magic.size(), sizeof(version));
     if (version != selection_version)
         return wrong("byte 8: version " + std::to_string(version) + " of the format, and this program reads " +
-                     std::to_string(selection_version) + "; make it anew with 'unseen select precompute'");
+                     std::to_string(selection_version) + "; make it anew with 'unseen levels precompute'");
     std::uint64_t hash = 0;
     const auto body = bytes.first(bytes.size() - sizeof(hash));
     std::memcpy(&hash, bytes.data() + body.size(), sizeof(hash));

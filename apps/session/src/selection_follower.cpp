@@ -265,7 +265,7 @@ Result<SelectionFollower> SelectionFollower::create(Selections selections, const
         selections.scene != scene_fingerprint(scene, triangles))
         return Error{ErrorCode::malformed_data,
                      "The selections are of another scene, or of other levels of this one: make them anew with "
-                     "'unseen select precompute'."};
+                     "'unseen levels precompute'."};
     auto impl = std::make_unique<Impl>(Impl{std::move(selections), options, {}, {}});
     if (impl->options.budget == 0) impl->options.budget = impl->selections.budget;
     for (const Object& object : scene.objects) impl->spheres.push_back(world_sphere(object));

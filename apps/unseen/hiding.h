@@ -1,4 +1,4 @@
-// What pictures hide and mask, for verbs that draw none.
+// Simplifying by what pictures hide and mask, for verbs that draw none.
 #pragma once
 
 #include <optional>
@@ -13,8 +13,8 @@ class Context;
 
 namespace unseen::app {
 
-// Where the options go by pictures session::simplify_as_seen(), by default in a context of its own; in builds without
-// OpenGL it fails. Else the session's own simplification.
+// By session::simplify_as_seen() if the options ask for pictures, by default in a context of its own; fails then in
+// builds without OpenGL. Else by the session's own simplification.
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context = nullptr);

@@ -1,4 +1,4 @@
-// unseen select: levels of detail selected beforehand, for cameras all over a scene.
+// unseen levels precompute, unseen levels info: levels of detail selected beforehand, for cameras all over a scene.
 #include <algorithm>
 #include <filesystem>
 #include <functional>
@@ -14,9 +14,9 @@
 #include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "selection_commands.h"
 #include "session_options.h"
 #include "terminal.h"
-#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -26,15 +26,15 @@ using session::PrecomputeReport;
 using session::SelectionQuality;
 using session::Selections;
 
-struct SelectArguments {
-    std::string scene, out, json, file;
-    ViewOptions view;
-    DisplayOptions display;
-    TriangleCount budget;
-    PrecomputeOptions options;
-    std::optional<double> eye_height;
-    std::vector<double> grid;
-    bool is_info = false, is_verbose = false, begins_anew = false;
+struct PrecomputeArguments {
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string scene = {}, out = {}, json = {};
+    TriangleCount budget = {};
+    PrecomputeOptions options = {};
+    std::optional<double> eye_height = {};
+    std::vector<double> grid = {};
+    bool is_verbose = false, begins_anew = false;
 };
 
 Json to_json(const PrecomputeReport& r) {
@@ -65,7 +65,7 @@ struct Ready {
     session::Session session;
 };
 
-Result<Ready> get_ready(const SelectArguments& a, bool is_first) {
+Result<Ready> get_ready(const PrecomputeArguments& a, bool is_first) {
     if (is_first)
         if (const auto ready = check_outputs(inputs_of(a.scene, a.view, a.display), {a.out, a.json}); !ready)
             return ready.error();
@@ -78,23 +78,17 @@ Result<Ready> get_ready(const SelectArguments& a, bool is_first) {
     return Ready{std::move(*report), std::move(*context), std::move(*session)};
 }
 
-Result<int> precompute(SelectArguments& a) {
-    const auto joined = ProcessTeam::join();
-    if (!joined) return joined.error();
-    ProcessTeam* const team = joined->get();
-    const bool is_first = !team || team->rank() == 0;
+// All members of a team have to be ready, or none goes on. The first one says why.
+Result<Ready> get_ready_together(const PrecomputeArguments& a, ProcessTeam* team, bool is_first) {
     auto ready = get_ready(a, is_first);
-    if (team) {
-        const auto ok = agree(*team, ready ? Result<void>() : Result<void>(ready.error()), 0);
-        if (!ok) {
-            team->leave();
-            if (!is_first) return exit_failed; // the first one says why
-            return ok.error();
-        }
-    } else if (!ready) {
-        return ready.error();
-    }
-    auto& [report, context, session] = *ready;
+    if (!team) return ready;
+    const auto ok = agree(*team, ready ? Result<void>() : Result<void>(ready.error()), 0);
+    if (ok) return ready;
+    team->leave();
+    return ok.error();
+}
+
+PrecomputeOptions options_of(const PrecomputeArguments& a, const session::Session& session, const ProcessTeam* team) {
     PrecomputeOptions options = a.options;
     options.budget = a.budget.of(session.triangle_count());
     options.eye_height = a.eye_height;
@@ -103,6 +97,38 @@ Result<int> precompute(SelectArguments& a) {
         options.high = glm::dvec3(a.grid[2], 0, a.grid[3]);
     }
     if (team && options.threads == 0) options.threads = std::max(1, team->cores() / team->members_on_machine());
+    return options;
+}
+
+void print(const PrecomputeReport& done, bool is_verbose) {
+    print_line("selected levels for " + counted(done.cameras, "camera", "cameras") + " at " +
+               counted(done.corners, "corner", "corners") + " of " + counted(done.cells, "cell", "cells") + " in " +
+               duration(1e3 * done.seconds) +
+               (done.resumed > 0 ? "; " + counted(done.resumed, "corner was", "corners were") + " there" : ""));
+    if (done.over_budget > 0)
+        print_note(counted(done.over_budget, "camera has", "cameras have") +
+                   " more triangles in sight than half of the budget, even at the coarsest levels.");
+    if (is_verbose)
+        print_table({{"seconds", ""},
+                     {"loading, levels", rounded(done.load_seconds, 3)},
+                     {"drawing", rounded(done.draw_seconds, 3)},
+                     {"reading back", rounded(done.read_seconds, 3)},
+                     {"searching, of all threads", rounded(done.search_seconds, 3)},
+                     {"drawings", grouped(done.drawings)},
+                     {"triangles drawn", grouped(done.drawn_triangles)},
+                     {"evaluations", grouped(done.evaluations)}});
+}
+
+Result<int> precompute(PrecomputeArguments& a) {
+    a.view.as = session::LoadAs::scene;
+    const auto joined = ProcessTeam::join();
+    if (!joined) return joined.error();
+    ProcessTeam* const team = joined->get();
+    const bool is_first = !team || team->rank() == 0;
+    auto ready = get_ready_together(a, team, is_first);
+    if (!ready) return is_first ? Result<int>(ready.error()) : Result<int>(exit_failed);
+    auto& [report, context, session] = *ready;
+    PrecomputeOptions options = options_of(a, session, team);
     if (is_first && a.begins_anew) {
         std::error_code ignored;
         std::filesystem::remove(a.out + ".part", ignored);
@@ -126,27 +152,16 @@ Result<int> precompute(SelectArguments& a) {
     if (auto ok = report.prepare(to_json(*done)); !ok) return ok.error();
     if (auto ok = report.publish(); !ok) return ok.error();
     if (report.is_on_stdout()) return exit_done;
-    print_line("selected levels for " + counted(done->cameras, "camera", "cameras") + " at " +
-               counted(done->corners, "corner", "corners") + " of " + counted(done->cells, "cell", "cells") + " in " +
-               duration(1e3 * done->seconds) +
-               (done->resumed > 0 ? "; " + counted(done->resumed, "corner was", "corners were") + " there" : ""));
-    if (done->over_budget > 0)
-        print_note(counted(done->over_budget, "camera has", "cameras have") +
-                   " more triangles in sight than half of the budget, even at the coarsest levels.");
-    if (a.is_verbose)
-        print_table({{"seconds", ""},
-                     {"loading, levels", rounded(done->load_seconds, 3)},
-                     {"drawing", rounded(done->draw_seconds, 3)},
-                     {"reading back", rounded(done->read_seconds, 3)},
-                     {"searching, of all threads", rounded(done->search_seconds, 3)},
-                     {"drawings", grouped(done->drawings)},
-                     {"triangles drawn", grouped(done->drawn_triangles)},
-                     {"evaluations", grouped(done->evaluations)}});
+    print(*done, a.is_verbose);
     print_written({a.out, a.json});
     return exit_done;
 }
 
-Result<int> info(SelectArguments& a) {
+struct SelectionInfoArguments {
+    std::string file, json;
+};
+
+Result<int> selection_info(const SelectionInfoArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto read = session::read_selections(a.file);
@@ -204,82 +219,75 @@ Result<int> info(SelectArguments& a) {
     return exit_done;
 }
 
-CLI::App* add_precompute(CLI::App& verb, const std::shared_ptr<SelectArguments>& a) {
-    CLI::App* sub = verb.add_subcommand(
-        "precompute", "For cameras all over a scene, the levels that lose least within a budget of triangles");
-    PrecomputeOptions& o = a->options;
-    sub->add_option("SCENE", a->scene, "A scene (glTF)")->required()->type_name("SCENE.glb");
-    sub->add_option("-o,--output", a->out, "The selections; OUT.sel.part keeps what is done until then")
-        ->required()
-        ->type_name("OUT.sel")
-        ->check(ending_in({".sel"}));
-    CLI::Option* budget =
-        add_triangles_option(*sub, a->budget, "Triangles of a frame, or a share of the scene's")->required();
-    (void)budget;
-    add_choice<SelectionQuality, SelectionQuality>(*sub, "--quality", o.quality,
+void add_search_options(CLI::App& verb, PrecomputeArguments& a) {
+    PrecomputeOptions& o = a.options;
+    add_choice<SelectionQuality, SelectionQuality>(verb, "--quality", o.quality,
                                                    {{"ssim", SelectionQuality::ssim},
                                                     {"pixels", SelectionQuality::pixels},
                                                     {"contrast", SelectionQuality::contrast}},
-                                                   "What pictures lose least of: structural similarity (ssim; "
+                                                   "What pictures should lose least of: structural similarity (ssim; "
                                                    "default), pixels that differ visibly, or visible contrast");
-    sub->add_option("--grid", a->grid,
+    verb.add_option("--grid", a.grid,
                     "The ground that corners are on, world units (default: around the middles of all objects)")
         ->type_name("X0 Z0 X1 Z1")
         ->expected(4)
         ->check(finite_numbers(1));
-    sub->add_option("--spacing", o.spacing, "Of the corners, world units (default: a tenth of the longer side)")
+    verb.add_option("--spacing", o.spacing, "Distance of corners, world units (default: a tenth of the longer side)")
         ->type_name("X")
         ->check(positive());
-    sub->add_option("--depth", o.depth, "How often a cell is halved where its corners select differently (default: 1)")
+    verb.add_option("--depth", o.depth, "How often a cell is halved where its corners select differently (default: 1)")
         ->type_name("N")
         ->check(whole(0, session::most_selection_depth));
-    sub->add_option("--differ", o.differ, "Differently: by more levels than so many, in the mean (default: 0.5)")
+    verb.add_option("--differ", o.differ, "Differently: by more than X levels on average (default: 0.5)")
         ->type_name("X")
         ->check(not_negative());
-    add_number(*sub, "--height", a->eye_height, finite_numbers(1), "Y",
-               "Of eyes, world units (default: that of the scene's camera, or 1.7 above the lowest object)");
-    sub->add_flag("--space", o.is_in_space, "A grid in space, cameras in six directions; else on the ground, in four");
-    sub->add_option("--levels", o.levels,
-                    "Of each object, full detail among them, each of half of the triangles (default: 5)")
+    add_number(verb, "--height", a.eye_height, finite_numbers(1), "Y",
+               "Height of the eyes, world units (default: the scene camera's, or 1.7 above the lowest object)");
+    verb.add_flag("--space", o.is_in_space, "A grid in space, cameras in six directions; else on the ground, in four");
+    verb.add_option("--levels", o.levels, "Levels of each object, each with half the triangles (default: 5)")
         ->type_name("N")
         ->check(whole(2, session::most_levels));
-    sub->add_option("--window", o.window_px, "Of the cameras, a side (default: 256)")
+    verb.add_option("--window", o.window_px, "Width and height of the cameras' pictures (default: 256)")
         ->type_name("PIXELS")
         ->check(whole(11, 8192));
-    sub->add_option("--threads", o.threads, "One draws, the others search; the result is the same (default: all cores)")
+    verb.add_option("--threads", o.threads, "One draws, the others search; the result is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, 1024));
-    sub->add_flag("--anew", a->begins_anew, "Do not go on from what an interrupted search left");
-    add_json_option(*sub, a->json);
-    add_verbose_option(*sub, a->is_verbose);
-    add_display_options(*sub, a->display);
-    sub->callback([a] { a->view.as = session::LoadAs::scene; });
-    return sub;
+    verb.add_flag("--anew", a.begins_anew, "Do not continue an interrupted search");
 }
 
 } // namespace
 
-Command select_command(CLI::App& app) {
-    auto a = std::make_shared<SelectArguments>();
-    CLI::App* verb = app.add_subcommand("select", "Select levels of detail beforehand, within a budget of triangles");
-    verb->require_subcommand(1);
-    CLI::App* precompute_verb = add_precompute(*verb, a);
-    CLI::App* info_verb = verb->add_subcommand("info", "What a file of selections holds");
-    info_verb->add_option("FILE", a->file, "Selections")->required()->type_name("FILE.sel");
-    add_json_option(*info_verb, a->json);
-    info_verb->callback([a] { a->is_info = true; });
-    const std::string examples =
-        "Examples:\n  unseen scene make spheres -o spheres.glb\n"
-        "  unseen select precompute spheres.glb --triangles 300000 -o spheres.sel\n"
-        "  unseen select precompute spheres.glb --triangles 10% --spacing 2 --depth 2 -o fine.sel\n"
-        "  unseen select info spheres.sel\n"
-        "  unseen render spheres.glb --method selection --selection spheres.sel --path walk -o frames/%04d.png" +
+Command precompute_command(CLI::App& levels, Setup& setup) {
+    auto a = std::make_shared<PrecomputeArguments>(PrecomputeArguments{setup.view_options(), setup.display_options()});
+    CLI::App* verb = levels.add_subcommand(
+        "precompute", "For cameras all over a scene, select the levels that lose least within a budget of triangles");
+    verb->add_option("SCENE", a->scene, "A scene (glTF)")->required()->type_name("SCENE.glb");
+    verb->add_option("-o,--output", a->out, "The selections; OUT.sel.part keeps what is done until then")
+        ->required()
+        ->type_name("OUT.sel")
+        ->check(ending_in({".sel"}));
+    add_triangles_option(*verb, a->budget, "Triangles a frame, or a share of the scene's")->required();
+    add_search_options(*verb, *a);
+    add_json_option(*verb, a->json);
+    add_verbose_option(*verb, a->is_verbose);
+    setup.act_in(*verb, Setup::display | Setup::observer | Setup::csf);
+    verb->footer(
+        "Examples:\n  unseen levels precompute spheres.glb --triangles 300k -o spheres.sel\n"
+        "  unseen levels precompute spheres.glb --triangles 10% --spacing 2 --depth 2 -o fine.sel" +
         std::string(ProcessTeam::is_there()
-                        ? "\n  mpirun -np 4 unseen select precompute spheres.glb --triangles 300000 -o spheres.sel"
-                        : "");
-    precompute_verb->footer(examples);
-    verb->footer(examples + "\n\n'unseen select precompute --help' tells more.");
-    return {verb, [a] { return a->is_info ? info(*a) : precompute(*a); }};
+                        ? "\n  mpirun -np 4 unseen levels precompute spheres.glb --triangles 300k -o spheres.sel"
+                        : ""));
+    return {verb, [a] { return precompute(*a); }};
+}
+
+Command selection_info_command(CLI::App& levels) {
+    auto a = std::make_shared<SelectionInfoArguments>();
+    CLI::App* verb = levels.add_subcommand("info", "Say what a file of selections holds");
+    verb->add_option("FILE", a->file, "Selections")->required()->type_name("FILE.sel");
+    add_json_option(*verb, a->json);
+    verb->footer("Examples:\n  unseen levels info spheres.sel");
+    return {verb, [a] { return selection_info(*a); }};
 }
 
 } // namespace unseen::app

@@ -1,4 +1,4 @@
-#include "model_file.h"
+#include "load_model.h"
 
 #include <functional>
 

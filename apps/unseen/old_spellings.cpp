@@ -1,0 +1,52 @@
+#include "old_spellings.h"
+
+#include <algorithm>
+
+#include "numbered_pictures.h"
+
+namespace unseen::app {
+namespace {
+
+using Words = std::vector<std::string>;
+
+// "--path X" or "--path=X".
+Words::iterator find(Words& words, const std::string& option) {
+    return std::ranges::find_if(
+        words, [&](const std::string& word) { return word == option || word.starts_with(option + "="); });
+}
+
+// The method, which is taken out: "tree" means cuts.
+std::string take_method(Words& words) {
+    const auto at = find(words, "--method");
+    if (at == words.end()) return {};
+    const std::size_t equals = at->find('=');
+    const std::string method = equals != std::string::npos ? at->substr(equals + 1)
+                               : at + 1 != words.end()     ? *(at + 1)
+                                                           : std::string();
+    if (method == "tree") words.erase(at, std::min(words.end(), at + (equals == std::string::npos ? 2 : 1)));
+    return method;
+}
+
+void renew_render(Words& words) {
+    const std::string method = take_method(words);
+    const bool is_numbered =
+        find(words, "--show") == words.end() &&
+        std::ranges::any_of(words, [](const std::string& word) { return parse_pattern(word).has_value(); });
+    if (!method.empty() && method != "tree") words[0] = "levels";
+    else if (find(words, "--path") != words.end() || is_numbered) words[0] = "fly";
+}
+
+} // namespace
+
+void renew_spelling(Words& all) {
+    const auto verb = std::ranges::find_if_not(all, [](const std::string& word) { return word.starts_with("-"); });
+    if (verb == all.end()) return;
+    Words words(verb, all.end());
+    if (words[0] == "render") renew_render(words);
+    else if (words[0] == "select") words[0] = "levels";
+    else if (words[0] == "scene" && words.size() > 1 && words[1] == "make") std::swap(words[0], words[1]);
+    all.erase(verb, all.end());
+    all.insert(all.end(), words.begin(), words.end());
+}
+
+} // namespace unseen::app

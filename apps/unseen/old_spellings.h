@@ -1,0 +1,13 @@
+// Command lines that were valid once.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace unseen::app {
+
+// Replaces the words of verbs that have been divided or renamed: `render --path` is `fly`, `render --method` and `select`
+// are `levels`, `scene make` is `make scene`. Today's words stay as they are.
+void renew_spelling(std::vector<std::string>& words);
+
+} // namespace unseen::app
