@@ -12,7 +12,6 @@
 #include "camera_path.h"
 #include "flight_changes.h"
 #include "flight_report.h"
-#include "hiding.h"
 #include "interruption.h"
 #include "numbered_pictures.h"
 #include "output_files.h"
