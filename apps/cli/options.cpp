@@ -342,10 +342,10 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
 }
 
 void add_hiding_option(CLI::App& verb, WhatOptions& o) {
-    add_choice<Hiding, Hiding>(verb, "--visibility", o.hiding,
-                               {{"spheres", Hiding::spheres}, {"picture", Hiding::picture}},
-                               "What counts as hidden: what faces away or lies behind spheres inside solids (spheres), or "
-                               "also what lies behind anything in the picture (picture)");
+    add_choice<Hiding, Hiding>(
+        verb, "--visibility", o.hiding, {{"spheres", Hiding::spheres}, {"picture", Hiding::picture}},
+        "What counts as hidden: what faces away or lies behind spheres inside solids (spheres), or "
+        "also what lies behind anything in the picture (picture)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {

@@ -91,8 +91,9 @@ private:
             if (scanned.mesh.triangles.size() > triangles) {
                 if (!options_.statues.empty())
                     left_out_.push_back("'" + scanned.name + "' is left out: it has " +
-                                        std::to_string(scanned.mesh.triangles.size()) + " triangles, and a statue here " +
-                                        std::to_string(triangles) + "; simplify it, or give more --triangles.");
+                                        std::to_string(scanned.mesh.triangles.size()) +
+                                        " triangles, and a statue here " + std::to_string(triangles) +
+                                        "; simplify it, or give more --triangles.");
                 continue;
             }
             SubdivideOptions refining;

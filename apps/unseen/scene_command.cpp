@@ -68,10 +68,11 @@ CLI::App* add_scene_part(CLI::App& verb, const std::shared_ptr<SceneArguments>& 
         ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models")
         ->check(one_of({"museum", "treasure", "house", "forest", "building", "spheres", "bunnies", "models"}));
     make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
-    add_triangles_option(*make, a->triangles,
-                         "Roughly N in all objects, shared meshes counted for each, 10,000 to 100,000,000 "
-                         "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
-                         "million); a forest has 0.3 million at least")
+    add_triangles_option(
+        *make, a->triangles,
+        "Roughly N in all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+        "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
+        "million); a forest has 0.3 million at least")
         ->type_name("N");
     make->add_option("--mesh", a->statues,
                      "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "

@@ -30,8 +30,8 @@ protected:
 
     // By frame.
     std::vector<double> triangles(const std::vector<std::string>& more) const {
-        std::vector<std::string> words = {"fly", "ball.vdt", "--path", "still.csv",
-                                          "--csv",  "out.csv",  "--size", "512x512"};
+        std::vector<std::string> words = {"fly",   "ball.vdt", "--path", "still.csv",
+                                          "--csv", "out.csv",  "--size", "512x512"};
         words.insert(words.end(), more.begin(), more.end());
         fs::remove(path("out.csv"));
         succeed(words);
