@@ -62,8 +62,8 @@ TEST_F(HostileFilesTest, WaitForNoPipeThatNobodyWritesToAndReadNoDevice) {
 }
 
 TEST_F(HostileFilesTest, ReadWhatAPipesWriterHasToSay) {
-    const Outcome outcome =
-        run_program({"/bin/bash", "-c", "'" UNSEEN_COMMAND "' csf --csv <(sleep 0.2; echo frequency_cpd; echo 4)"});
+    const Outcome outcome = run_program(
+        {"/bin/bash", "-c", "'" UNSEEN_COMMAND "' csf --csv <(sleep 0.2; echo frequency,luminance; echo 4,100)"});
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("\n4,"));
 }
