@@ -279,7 +279,10 @@ std::string Setup::help() const {
         "  {\"display\": \"lab.json\", \"observer\": \"strict\", \"light\": [1, 0, 0], \"shadows\": false, \"size\": "
         "\"512x512\"}\n";
     const CLI::Formatter formatter;
-    for (const Section& section : sections_) text += "\n" + formatter.make_expanded(section.group);
+    for (const Section& section : sections_) {
+        const std::string options = formatter.make_expanded(section.group);
+        text += "\n" + section.name + options.substr(options.find('\n')); // whose first line names no group
+    }
     return text;
 }
 

@@ -815,10 +815,11 @@ TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
             const std::string first =
                 option.substr(option.rfind("--"), option.find(' ', option.rfind("--")) - option.rfind("--"));
             const std::string shown = first == "--no-shadows" ? "--shadows" : first;
+            if (help.find("\n  " + shown) != std::string::npos) continue; // the verb's own
             const bool acts =
                 help.find(" " + shown + " ") != std::string::npos || help.find(" " + shown + "\n") != std::string::npos;
             EXPECT_EQ(parse(option).status, acts ? 0 : 2) << name << " " << option << "\n" << parse(option).err;
-            EXPECT_THAT(setup, HasSubstr("\n  " + shown)) << "documented";
+            EXPECT_THAT(setup, HasSubstr("\n    " + shown)) << "documented";
         }
     }
 }
@@ -841,7 +842,7 @@ TEST_F(SimplifyTest, ASetupComesFromAFile) {
     write_text(path("lab/far.json"), R"({"width_px": 1920, "height_px": 1080, "diagonal_m": 0.6,
                                          "viewing_distance_m": 3, "peak_cdm2": 100, "black_cdm2": 0.5})");
     write_text(path("lab/setup.json"), R"({"display": "far.json", "size": "256x256", "light": [1, 0, 0],
-                                           "observer": "strict", "no-weld": true, "as": "model"})");
+                                           "observer": "strict", "shadows": false, "no-cache": true})");
     const std::vector<std::string> spelled = {"--display", "lab/far.json", "--size", "256", "--light", "1", "0",
                                               "0",         "--observer",   "strict"};
     const auto with = [](std::vector<std::string> words, std::vector<std::string> more) {
@@ -870,7 +871,9 @@ TEST_F(SimplifyTest, ASetupComesFromAFile) {
         EXPECT_EQ(refused.status, 2) << text;
         EXPECT_THAT(refused.err, HasSubstr(sentence));
     }
-    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lab/setup.json", "--setup", "lab/setup.json"}).status, 2);
+    EXPECT_THAT(
+        run({"simplify", "ball.vdt", "-o", "o.ply", "--json", "lab/setup.json", "--setup", "lab/setup.json"}).err,
+        HasSubstr("is read: give the output another name"));
     EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "o.ply", "--setup", "gone.json"}).status, 2);
 }
 
