@@ -67,16 +67,16 @@ const CLI::App& root_of(const CLI::App& app) { return app.get_parent() ? root_of
 
 std::string complaint_about_option(const std::string& word, const CLI::App& app, const Program& program) {
     const std::string option = word.substr(0, word.find('='));
-    std::vector<std::string> names = names_of_options(app);
-    if (program.setup && *program.setup) std::ranges::copy((*program.setup)->names_in(app), std::back_inserter(names));
-    std::string near = suggestion(option, names);
     std::vector<std::string> owners = owners_of(option, root_of(app), "");
-    if (near.empty() && !owners.empty()) {
+    if (!owners.empty()) {
         constexpr std::size_t enough = 3;
         owners.resize(std::min(owners.size(), enough));
         for (std::string& owner : owners) owner = std::string("'") + program.name + " " + owner + "'";
-        near = " here; see " + listed(owners) + ".";
+        return "there is no option '" + word + "' here; see " + listed(owners) + ".";
     }
+    std::vector<std::string> names = names_of_options(app);
+    if (program.setup && *program.setup) std::ranges::copy((*program.setup)->names_in(app), std::back_inserter(names));
+    const std::string near = suggestion(option, names);
     return "there is no option '" + word + "'" + (near.empty() ? "." : near);
 }
 

@@ -86,11 +86,11 @@ Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const 
     options.gain = observer->csf ? 1 : observer->person.gain; // a viewer is one observer
     options.csf_table = observer->csf;
     if (a.display.csf.empty()) return options;
-    auto chosen = session::choose_csf(a.display.csf);
-    if (!chosen) return chosen.error();
-    if (observer->csf || (chosen->table && !a.display.observer.empty()))
+    if (observer->csf || (!a.display.observer.empty() && !perception::csf_model(a.display.csf)))
         return Error{ErrorCode::invalid_argument,
                      "--observer and --csf exclude each other where one of them is a viewer's table: give that alone."};
+    auto chosen = session::choose_csf(a.display.csf);
+    if (!chosen) return chosen.error();
     if (chosen->model) options.csf = *chosen->model;
     if (chosen->table) {
         options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
