@@ -136,11 +136,11 @@ TEST_F(GpuJudgeTest, JudgesPicturesOfAnyShape) {
                                         {8, 9},
                                         {17, 33},
                                         {203, 101},
-                                        {513, 66}})
-        for (const Pair& pair : pairs(width, height)) {
-            expect_alike(context(), pair, {});
-            expect_alike(context(), pair, looking_aside(width));
-        }
+                                        {513, 66}}) {
+        const Pair pair = pairs(width, height)[2]; // all of them: JudgesAsTheCpuDoes
+        expect_alike(context(), pair, {});
+        expect_alike(context(), pair, looking_aside(width));
+    }
 }
 
 TEST_F(GpuJudgeTest, JudgesForOtherObserversAndDisplays) {

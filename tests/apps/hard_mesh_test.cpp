@@ -42,7 +42,7 @@ VertexTree built(const HardMesh& hard) {
 }
 
 // Looked at, and so many degrees aside.
-constexpr double degrees_aside[] = {0, 12, 29, 50};
+constexpr double degrees_aside[] = {0, 12, 50}; // the fold oracle looks 29 degrees aside
 
 // A tree as it is seen, in light of its own or under lights.
 class Seen {
