@@ -27,7 +27,7 @@ bool unseen::fuzz::accepts(std::string_view bytes) {
     const auto read = unseen::perception::decode_image(bytes, "fuzz");
     if (!read) {
         if (read.error().message.empty()) std::abort();
-        return false;
+        return is_accepted && !unseen::perception::is_image(bytes); // JPEG
     }
     const unseen::perception::Image& image = read->image;
     const std::size_t values = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height) *

@@ -177,8 +177,18 @@ void make_texts(const fs::path& folder) {
     procedure->choose(1);
     expect(procedure->save(plain));
     keep("procedure.json", '\4');
-    write(folder / "observer.json", "\2{\"format\": \"unseen observer\", \"version\": 1}");
-    write(folder / "csf.json", "\1{\"format\": \"unseen csf\", \"version\": 1}");
+    const auto table = [](const std::string& version, const std::string& more) {
+        return "{\"format\": \"unseen-csf\", \"version\": " + version +
+               ", \"frequency_cpd\": [1, 16], \"eccentricity_deg\": [0, 10], \"luminance_cdm2\": [3, 100], "
+               "\"sensitivity\": [[[60, 5], [120, 10]], [[30, 0.5], [50, 1.5]]]" +
+               more + "}";
+    };
+    write(folder / "csf.json", "\1" + table("1", ""));
+    write(folder / "observer.json",
+          "\2" + table("3",
+                       ", \"observer\": \"a\", \"date\": \"2024-01-31\", \"method\": \"m\", \"display\": \"d\", "
+                       "\"conditions\": \"c\", \"measured_at_cdm2\": 100, \"measured\": [[4, 0, 80, 60, 100, 20]], "
+                       "\"measured_wide\": [[4, 0, 9, 80, 60, 100, 20]], \"summation\": [1.1, 1, 1.2]"));
     write(folder / "lights.json",
           "\3{\"ambient\": 0.1, \"material\": {\"specular\": 0.04, \"shininess\": 40}, \"lights\": [{\"type\": "
           "\"spot\", \"position\": [0, 3, 0], \"direction\": [0, -1, 0], \"inner_degrees\": 20, "
