@@ -14,6 +14,8 @@ function(unseen_add_library name)
     target_include_directories(${target} PRIVATE src)
     target_compile_features(${target} PUBLIC cxx_std_20)
     target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS})
+    unseen_add_internal_headers(${name} ${arg_DEPENDS})
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:${target}_internal>)
     # Before 1.0 a minor version may change the ABI.
     set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}
         SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR} INSTALL_RPATH "$ORIGIN"
@@ -32,6 +34,29 @@ function(unseen_add_library name)
         unseen_install_pkg_config(${name} DEPENDS ${arg_DEPENDS} PACKAGES ${arg_PACKAGES}
             LIBRARIES ${arg_LIBRARIES})
     endif()
+endfunction()
+
+# unseen_add_internal_headers(name depends...)
+#
+# An interface `unseen_<name>_internal`: headers in internal/include, which other modules may use but nobody installs, and
+# those of the modules that this one depends on.
+function(unseen_add_internal_headers name)
+    set(target unseen_${name}_internal)
+    add_library(${target} INTERFACE)
+    if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/internal/include)
+        target_include_directories(${target} INTERFACE $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/internal/include>)
+    endif()
+    unseen_link_internal_headers(${target} INTERFACE ${ARGN})
+endfunction()
+
+# Gives a target the internal headers of those of its dependencies that are modules.
+function(unseen_link_internal_headers target scope)
+    foreach(depends IN LISTS ARGN)
+        string(REGEX REPLACE "^unseen::(.*)$" "unseen_\\1_internal" internal ${depends})
+        if(internal MATCHES "^unseen_.*_internal$" AND TARGET ${internal})
+            target_link_libraries(${target} ${scope} ${internal})
+        endif()
+    endforeach()
 endfunction()
 
 set(UNSEEN_EXPORTS_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/exports.map)

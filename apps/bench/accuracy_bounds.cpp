@@ -15,7 +15,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/criteria.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "bench_tools.h"

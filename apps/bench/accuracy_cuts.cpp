@@ -206,7 +206,7 @@ Result<AccuracyPoints> node_test_points(AccuracySubject& subject, const Accuracy
     const glm::dvec3 eye = vdtree::eye_in_tree(tree, subject.view, placement);
     const double nodes = static_cast<double>(tree.interior_count());
     const Pinned pinned;
-    // The twin: what <unseen/vdtree/distance_criterion.h> says, in double from the tree's floats on.
+    // The twin: what <unseen/vdtree/criteria.h> says, in double from the tree's floats on.
     std::vector<std::uint8_t> unfolds(tree.interior_count());
     const double switch_distance = static_cast<double>(criterion->parts().switch_distance[0]);
     const auto decide = [&](auto real) {

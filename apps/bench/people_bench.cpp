@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include <unseen/calibration/people.h>
+#include <unseen/calibration/internal/people.h>
 #include <unseen/perception/person.h>
 
 #include "terminal.h"

@@ -14,6 +14,7 @@
 #include <turning_light.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/render/context.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "bench_tools.h"
 #include "judged_model.h"

@@ -12,8 +12,8 @@
 #include <string_view>
 #include <utility>
 
+#include <unseen/calibration/internal/simulated_observer.h>
 #include <unseen/calibration/procedure.h>
-#include <unseen/calibration/simulated_observer.h>
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/vdtree/internal/input_file.h>

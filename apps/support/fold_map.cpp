@@ -10,8 +10,8 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/criterion.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/number_format.h>
-#include <unseen/vdtree/normal_mask.h>
 
 #include "colour_bar.h"
 

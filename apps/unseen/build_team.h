@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include <unseen/vdtree/builder.h>
-#include <unseen/vdtree/team.h>
+#include <unseen/vdtree/internal/team.h>
 
 namespace unseen::app {
 

@@ -8,11 +8,10 @@
 #include <memory>
 #include <optional>
 
-#include <unseen/calibration/display_fit.h>
 #include <unseen/calibration/display_profile.h>
+#include <unseen/calibration/internal/simulated_observer.h>
 #include <unseen/calibration/observer_profile.h>
 #include <unseen/calibration/procedure.h>
-#include <unseen/calibration/simulated_observer.h>
 #include <unseen/vdtree/internal/errors.h>
 
 #include "calibration_window.h"

@@ -11,9 +11,9 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
-#include <unseen/calibration/display_fit.h>
+#include <unseen/calibration/display_profile.h>
 #include <unseen/perception/image.h>
-#include <unseen/render/test_pattern.h>
+#include <unseen/render/internal/test_pattern.h>
 
 #include "terminal.h"
 

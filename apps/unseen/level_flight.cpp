@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include <unseen/render/internal/layers.h>
 #include <unseen/session/selection_follower.h>
 #include <unseen/session_gpu/frame_image.h>
 

@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <unseen/render/internal/layers.h>
 #include <unseen/session_gpu/frame_image.h>
 
 #include "colour_bar.h"

@@ -2,6 +2,8 @@
 #include <array>
 #include <memory>
 
+#include <unseen/render/internal/layers.h>
+
 #include "level_flight.h"
 #include "numbered_pictures.h"
 #include "selection_commands.h"

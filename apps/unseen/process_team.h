@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/result.h>
-#include <unseen/vdtree/team.h>
 
 namespace unseen::app {
 

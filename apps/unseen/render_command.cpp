@@ -3,6 +3,7 @@
 #include <memory>
 
 #include <unseen/perception/image.h>
+#include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
 #include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include <unseen/calibration/picture_observer.h>
+#include <unseen/calibration/internal/picture_observer.h>
 #include <unseen/calibration/study.h>
 #include <unseen/session_gpu/study_pictures.h>
 #include <unseen/vdtree/internal/errors.h>

@@ -7,7 +7,7 @@
 #include <GLFW/glfw3.h>
 
 #include <unseen/perception/image.h>
-#include <unseen/render/overlay.h>
+#include <unseen/render/internal/overlay.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
 

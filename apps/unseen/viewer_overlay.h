@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include <unseen/render/overlay.h>
+#include <unseen/render/internal/overlay.h>
 
 #include "screen_text.h"
 

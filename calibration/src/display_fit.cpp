@@ -1,5 +1,5 @@
 // Fits of a display's transfer function, and photometers' tables.
-#include <unseen/calibration/display_fit.h>
+#include <unseen/calibration/display_profile.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>

@@ -27,7 +27,7 @@ constexpr Range share{.minimum = 0, .maximum = 1};
 constexpr Range any_number{.minimum = -unbounded, .maximum = unbounded};
 constexpr Range half_angle{.minimum = 0, .maximum = 180};
 constexpr double fastest_deg_per_s = 360000; // a thousand turns a second
-// Directions that are opposite but for so many radians have no shorter arc between them.
+// Directions within this many radians of being opposite have no shorter arc between them.
 constexpr double opposite = 1e-6;
 
 std::string too_many_cast(std::size_t casting) {

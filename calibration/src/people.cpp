@@ -1,4 +1,4 @@
-#include <unseen/calibration/people.h>
+#include <unseen/calibration/internal/people.h>
 
 #include <algorithm>
 #include <array>

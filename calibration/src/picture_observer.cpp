@@ -1,4 +1,4 @@
-#include <unseen/calibration/picture_observer.h>
+#include <unseen/calibration/internal/picture_observer.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ double detectability(const PictureObserver& observer, double visibility) {
     return std::min(PictureObserver::threshold_d * std::pow(std::max(visibility, 0.0), observer.exponent), most_d);
 }
 
-// Of the normal distribution.
+// The normal distribution function.
 double below(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
 } // namespace

@@ -1,5 +1,5 @@
 // QUEST+: a posterior on a grid, and what stimuli's answers are expected to tell of the threshold.
-#include <unseen/calibration/quest.h>
+#include <unseen/calibration/internal/quest.h>
 
 #include <algorithm>
 #include <cassert>

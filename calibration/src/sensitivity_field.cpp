@@ -1,5 +1,5 @@
 // A Gaussian process over log sensitivity: covariances, and posteriors by Cholesky's factorisation.
-#include <unseen/calibration/sensitivity_field.h>
+#include <unseen/calibration/internal/sensitivity_field.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ constexpr double decline_per_degree = 0.012;
 constexpr double fall_per_cpd_degree = 0.006; // castleCSF's nasal and temporal fields lie 0.011 apart
 constexpr double share_of_loss = 0.2;
 constexpr double local = 0.07, local_share_of_loss = 0.16;
-// Of how people sum over area little is known but the spread of all, which is that of the gain.
+// How people sum over area: only the spread over all people is known, which is that of the gain.
 constexpr double summation = 0.3;
 constexpr double local_octaves = 1.5; // length over which it stays alike; also in octaves of 2 deg + eccentricity
 // What lies lower is not seen at any contrast, and need not vary more.

@@ -1,5 +1,5 @@
 // The simulated observer: thresholds from a table, chance from the seed and the trial.
-#include <unseen/calibration/simulated_observer.h>
+#include <unseen/calibration/internal/simulated_observer.h>
 
 #include <algorithm>
 #include <charconv>

@@ -43,7 +43,7 @@ bool belongs_to(StudyChoice choice, StudyTask task) {
 
 bool is_of_one_picture(const StudyPair& pair) { return pair.original == pair.other; }
 
-// Of text, the same everywhere (FNV-1a).
+// FNV-1a, the same on every machine.
 std::uint64_t hash_of(std::string_view text) {
     std::uint64_t hash = 0xcbf29ce484222325u;
     for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
@@ -73,10 +73,10 @@ Result<void> validate(const Study& study) {
         if (pair.original.empty() || pair.other.empty())
             return invalid_argument(place + "original and other must name pictures.");
         if (study.task == StudyTask::which && is_of_one_picture(pair))
-            return invalid_argument(place + "which of one picture and itself is the original, nobody can tell.");
+            return invalid_argument(place + "both pictures are the same file; a pair needs two.");
         counted += !pair.is_training;
     }
-    if (counted == 0) return invalid_argument("study: there is no pair but for training.");
+    if (counted == 0) return invalid_argument("study: all pairs are for training; add one that counts.");
     if (counted * static_cast<std::size_t>(study.repeats) > most_trials)
         return invalid_argument("study: there are more than 100,000 trials.");
     return {};
@@ -295,7 +295,7 @@ struct Numbered {
     Line line;
 };
 
-// Of a table with these columns.
+// Reads a table with the columns of write_answers().
 Result<std::vector<Numbered>> read_lines(const fs::path& file) {
     const auto text = read_text_file(file);
     if (!text) return text.error();
@@ -399,7 +399,7 @@ double log_choose(std::uint64_t n, std::uint64_t k) {
     return log_factorial(n) - log_factorial(k) - log_factorial(n - k);
 }
 
-// Fisher's exact test: so many or more of the first, were both of one kind.
+// Fisher's exact test: the probability of at least this many of the first, if both were of one kind.
 double fisher(const Share& first, const Share& second) {
     const std::uint64_t all = first.of + second.of, marked = first.count + second.count;
     double sum = 0;

@@ -3,7 +3,7 @@
 layout(binding = 0) uniform sampler2D first;
 layout(binding = 1) uniform sampler2D second;
 layout(binding = 2) uniform sampler2D third;
-layout(location = 0) uniform vec4 weights; // of the Gaussians, energies' scale
+layout(location = 0) uniform vec4 weights; // of the Gaussians
 layout(location = 1) uniform vec4 halvings; // of the Gaussians, exponent
 layout(location = 2) uniform ivec2 first_size;
 layout(location = 3) uniform ivec2 second_size;
@@ -28,10 +28,9 @@ vec4 enlarged(sampler2D plane, float halvings_of, ivec2 size, ivec2 at) {
 
 void main() {
     ivec2 at = place();
-    vec4 energy = (weights.x * enlarged(first, halvings.x, first_size, at) +
-                   weights.y * enlarged(second, halvings.y, second_size, at) +
-                   weights.z * enlarged(third, halvings.z, third_size, at)) *
-                  weights.w;
+    vec4 energy = weights.x * enlarged(first, halvings.x, first_size, at) +
+                  weights.y * enlarged(second, halvings.y, second_size, at) +
+                  weights.z * enlarged(third, halvings.z, third_size, at);
 #if defined(EXPONENT_3_5) // the usual one, without logarithms
     powers = energy * sqrt(energy) * sqrt(sqrt(energy));
 #elif defined(EXPONENT_2)

@@ -5,7 +5,7 @@ layout(location = 1) in vec4 vertex_shade; // linear RGB; relative luminance in 
 layout(location = 0) uniform mat4 clip_from_unit;
 
 #ifdef LIT
-layout(location = 2) in ivec2 packed_normal; // octahedral, as in <unseen/vdtree/packed.h>
+layout(location = 2) in ivec2 packed_normal; // octahedral, as in <unseen/vdtree/vertex_tree.h>
 layout(location = 3) in float albedo;
 
 const int none = -32768;

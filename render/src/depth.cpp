@@ -1,5 +1,5 @@
 // Reversed depth is near / distance, so the farthest is the least.
-#include <unseen/render/depth.h>
+#include <unseen/render/internal/depth.h>
 
 #include <algorithm>
 #include <limits>

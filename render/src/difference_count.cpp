@@ -1,5 +1,5 @@
 // The surface is drawn again where its depth is, and what looks like the picture is dropped. Nothing is written.
-#include <unseen/render/difference_count.h>
+#include <unseen/render/internal/difference_count.h>
 
 #include <deque>
 #include <string>

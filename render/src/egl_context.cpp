@@ -94,11 +94,11 @@ std::vector<Candidate> candidates() {
     return all;
 }
 
-// Displays are the process's, shared with whoever else uses EGL: they are initialised, but never terminated, which
-// would pull the ground from under the others. Context and surface are ours.
+// EGL displays belong to the process and are shared with other users of EGL: they are initialised, but never terminated,
+// which would end the others' contexts. Context and surface are ours.
 class EglPlatform final : public Platform {
 public:
-    // The reason where there is none.
+    // Fails with the reason if the candidate has no context.
     Result<void> open(const Candidate& candidate);
 
     EglPlatform() = default;

@@ -1,5 +1,5 @@
 // As perception's rpg99_map() computes it on the CPU in doubles, which is the reference: levels are of two floats.
-#include <unseen/render/elevation.h>
+#include <unseen/render/internal/elevation.h>
 
 #include <cmath>
 #include <string>

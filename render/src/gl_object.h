@@ -9,28 +9,32 @@
 
 namespace unseen::render {
 
-// Makes, deletes and labels one kind of object. Defined for the kinds below.
-struct BufferTraits;
-struct VertexArrayTraits;
-struct Texture2dTraits;
-struct Texture2dArrayTraits;
-struct TimestampTraits;
-struct RenderbufferTraits;
-struct FramebufferTraits;
-struct ProgramTraits;
-struct SamplerTraits;
+enum class GlKind {
+    buffer,
+    vertex_array,
+    texture_2d,
+    texture_2d_array,
+    timestamp, // a query of when the GPU comes to it
+    renderbuffer,
+    framebuffer,
+    program,
+    sampler
+};
 
-// Whether objects that go on this thread are deleted: told whenever a context was to be made current. Where that failed
+// Makes an object with a label for debug messages and debuggers. 0 if GL refuses.
+unsigned make_object(GlKind kind, std::string_view label);
+void delete_object(GlKind kind, unsigned id) noexcept;
+
+// Whether destroyed objects of this thread are deleted. Called whenever a context was to be made current: if that failed,
 // the names would be those of another context.
 void let_objects_go(bool are_in_current_context) noexcept;
 
-template <class Traits>
+template <GlKind kind>
 class GlObject {
 public:
     GlObject() noexcept = default;
 
-    // A new object. The label shows up in debug messages and in debuggers. Id 0 where GL refuses.
-    static GlObject create(std::string_view label = {});
+    static GlObject create(std::string_view label = {}) { return GlObject(make_object(kind, label)); }
 
     // Takes ownership of a name that other code made.
     static GlObject wrap(unsigned id) noexcept { return GlObject(id); }
@@ -40,7 +44,9 @@ public:
         std::swap(id_, other.id_); // the old object goes with `other`
         return *this;
     }
-    ~GlObject();
+    ~GlObject() {
+        if (id_ != 0) delete_object(kind, id_);
+    }
 
     unsigned id() const noexcept { return id_; }
     explicit operator bool() const noexcept { return id_ != 0; }
@@ -53,24 +59,14 @@ private:
     unsigned id_ = 0;
 };
 
-using Buffer = GlObject<BufferTraits>;
-using VertexArray = GlObject<VertexArrayTraits>;
-using Texture2d = GlObject<Texture2dTraits>;
-using Texture2dArray = GlObject<Texture2dArrayTraits>;
-using Timestamp = GlObject<TimestampTraits>; // a query of when the GPU comes to it
-using Renderbuffer = GlObject<RenderbufferTraits>;
-using FramebufferObject = GlObject<FramebufferTraits>;
-using ProgramObject = GlObject<ProgramTraits>;
-using Sampler = GlObject<SamplerTraits>;
-
-extern template class GlObject<BufferTraits>;
-extern template class GlObject<VertexArrayTraits>;
-extern template class GlObject<Texture2dTraits>;
-extern template class GlObject<Texture2dArrayTraits>;
-extern template class GlObject<TimestampTraits>;
-extern template class GlObject<RenderbufferTraits>;
-extern template class GlObject<FramebufferTraits>;
-extern template class GlObject<ProgramTraits>;
-extern template class GlObject<SamplerTraits>;
+using Buffer = GlObject<GlKind::buffer>;
+using VertexArray = GlObject<GlKind::vertex_array>;
+using Texture2d = GlObject<GlKind::texture_2d>;
+using Texture2dArray = GlObject<GlKind::texture_2d_array>;
+using Timestamp = GlObject<GlKind::timestamp>;
+using Renderbuffer = GlObject<GlKind::renderbuffer>;
+using FramebufferObject = GlObject<GlKind::framebuffer>;
+using ProgramObject = GlObject<GlKind::program>;
+using Sampler = GlObject<GlKind::sampler>;
 
 } // namespace unseen::render

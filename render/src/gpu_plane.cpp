@@ -12,9 +12,7 @@ namespace unseen::render {
 glm::ivec2 texels_of(glm::ivec2 pixels) { return {(pixels.x + 3) / 4, pixels.y}; }
 
 Result<GpuPlanes> GpuPlanes::create(glm::ivec2 pixels, int count, PlaneFormat format, const char* label) {
-    const GLenum internal = format == PlaneFormat::full   ? GL_RGBA32F
-                            : format == PlaneFormat::half ? GL_RGBA16F
-                                                          : GL_R32F;
+    const GLenum internal = format == PlaneFormat::full ? GL_RGBA32F : GL_R32F;
     const glm::ivec2 texels = format == PlaneFormat::single ? pixels : texels_of(pixels);
     GpuPlanes planes;
     planes.framebuffer_ = FramebufferObject::create(label);
@@ -26,7 +24,7 @@ Result<GpuPlanes> GpuPlanes::create(glm::ivec2 pixels, int count, PlaneFormat fo
         drawn.push_back(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(i));
         glNamedFramebufferTexture(id, drawn.back(), texture.id(), 0);
     }
-    const std::uint64_t texel_bytes = format == PlaneFormat::full ? 16 : format == PlaneFormat::half ? 8 : 4;
+    const std::uint64_t texel_bytes = format == PlaneFormat::full ? 16 : 4;
     planes.bytes_ = texel_bytes * static_cast<std::uint64_t>(texels.x) * static_cast<std::uint64_t>(texels.y) *
                     static_cast<std::uint64_t>(count);
     glNamedFramebufferDrawBuffers(id, count, drawn.data());

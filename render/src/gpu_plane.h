@@ -16,7 +16,6 @@ namespace unseen::render {
 
 enum class PlaneFormat {
     full,   // four 32-bit floats a texel
-    half,   // four 16-bit floats
     single, // one 32-bit float: a pixel a texel
 };
 
@@ -24,7 +23,7 @@ enum class PlaneFormat {
 class GpuPlanes {
 public:
     GpuPlanes() noexcept = default;
-    // Of so many pixels, or more where it is reused for others. Fails where memory does not suffice.
+    // Planes of this many pixels. Fails if memory runs out.
     static Result<GpuPlanes> create(glm::ivec2 pixels, int count, PlaneFormat format, const char* label);
 
     unsigned framebuffer() const noexcept { return framebuffer_.id(); }
@@ -38,7 +37,7 @@ private:
     FramebufferObject framebuffer_;
 };
 
-// Texels of so many pixels.
+// The texels that hold this many pixels.
 glm::ivec2 texels_of(glm::ivec2 pixels);
 
 // What passes of planes share: nothing is blended, tested or cut off, and textures are read as they are. Textures that are
@@ -50,7 +49,7 @@ public:
     PlanePasses(const PlanePasses&) = delete;
     PlanePasses& operator=(const PlanePasses&) = delete;
 
-    // Binds the textures from unit 0 on, and computes so many texels of the planes, from the first of a row on.
+    // Binds the textures from unit 0 on, and computes `texels` of the planes from the given row on.
     void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures,
               int first_row = 0);
     void bind(unsigned unit, unsigned texture);

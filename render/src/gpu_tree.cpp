@@ -7,6 +7,7 @@
 #include <string>
 
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/lighting.h>
 
 #include "gl.h"

@@ -10,7 +10,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/render/gpu_tree.h>
+#include <unseen/render/draw.h>
 
 #include "camera.h"
 #include "context_impl.h"
@@ -22,7 +22,7 @@
 
 namespace unseen::render {
 
-// Of vertices, in the unit frame; empty at first.
+// A box around vertices in the unit frame; empty at first.
 struct Box {
     glm::vec3 low = glm::vec3(std::numeric_limits<float>::infinity()), high = -low;
     void include(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }

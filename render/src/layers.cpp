@@ -1,5 +1,5 @@
 // Layers are slices of array textures, so that one pass reads any number of them.
-#include <unseen/render/layers.h>
+#include <unseen/render/internal/layers.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace unseen::render {
 namespace {
 
 constexpr int most_block = 16;
-// Of the farthest centre's distance over the nearest's: planes nearer than that would part what touches the eye.
+// Largest ratio of the farthest to the nearest centre's distance: nearer planes would divide what touches the eye.
 constexpr double largest_ratio = 1e3;
 
 enum UniformLocation { layers_location = 0, size_location = 1 };
@@ -106,7 +106,7 @@ struct LayerPasses::Impl {
     const Program *combine = nullptr, *combine_masked = nullptr;
     VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
 
-    // Of the last draw.
+    // From the last draw.
     Camera camera;
     std::vector<Item> objects; // for masks
     std::vector<int> layer_of; // by object
@@ -317,8 +317,6 @@ const Target* LayerPasses::background() const noexcept {
     return impl_->has_background ? &impl_->slices.front().target : nullptr;
 }
 
-unsigned LayerPasses::colour_array() const noexcept { return impl_->colours.id(); }
-unsigned LayerPasses::depth_array() const noexcept { return impl_->depths.id(); }
 const Target* LayerPasses::mask() const noexcept { return impl_->is_masked ? &*impl_->mask : nullptr; }
 
 LayerCounts LayerPasses::counts() const noexcept {

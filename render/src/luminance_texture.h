@@ -6,7 +6,7 @@
 
 #include <glm/vec2.hpp>
 
-#include <unseen/render/visibility.h>
+#include <unseen/render/internal/visibility_passes.h>
 
 namespace unseen::render {
 
@@ -19,7 +19,7 @@ Result<void> check_texture(const LuminanceTexture& texture);
 
 // As pixels in memory lie, whatever others have set.
 void reset_pixel_stores();
-// Of the first channel. Waits for the GPU.
+// Reads the first channel. Waits for the GPU.
 std::vector<float> read_floats(unsigned texture, glm::ivec2 size);
 
 } // namespace unseen::render

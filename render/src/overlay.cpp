@@ -1,6 +1,6 @@
 // A texture of the image, and a pass over the pixels that it covers.
 #include <initializer_list>
-#include <unseen/render/overlay.h>
+#include <unseen/render/internal/overlay.h>
 
 #include <algorithm>
 #include <string>

@@ -49,7 +49,7 @@ struct Shadows::Impl {
         vdtree::Similarity placement;
         bool is_same(const Caster& other) const;
     };
-    // Of a map, in coordinates of -1 to 1.
+    // A part of a map, in coordinates from -1 to 1.
     struct Window {
         glm::dvec2 low = glm::dvec2(-1), high = glm::dvec2(1);
         bool is_empty() const { return !(low.x < high.x && low.y < high.y); }
@@ -62,8 +62,8 @@ struct Shadows::Impl {
     using Receivers = std::optional<std::span<const Item>>; // none: anything
 
     Result<void> update(std::span<const Item> casters, const Receivers& receivers);
-    // Draws the maps of the last update's casters with their texels elsewhere, by so many in 0..1 of them; 0.5: as
-    // update() does. Needs a current context.
+    // Draws the maps of the last update's casters with their texels shifted by 0..1 texels; 0.5 as in update(). Needs a
+    // current context.
     Result<void> shift_texels(glm::dvec2 by);
     Result<void> reserve(std::size_t layers);
     void aim();

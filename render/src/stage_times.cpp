@@ -1,5 +1,5 @@
 // Time stamps of the GPU's own clock.
-#include <unseen/render/stage_times.h>
+#include <unseen/render/internal/stage_times.h>
 
 #include <deque>
 

@@ -8,6 +8,7 @@
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "gl.h"
 
@@ -167,14 +168,15 @@ SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_
     return closedness == vdtree::Closedness::closed_outward ? Cull::back : Cull::front;
 }
 
-Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
-                                         int attachment, Use use) {
+namespace {
+
+Result<void> check_draw(std::span<const Item> items, const Camera& camera, const Target::Impl& target, int attachment) {
     const vdtree::View& view = camera.view;
-    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (auto valid = vdtree::validate(view); !valid) return valid;
     if (camera.near_plane)
-        if (auto valid = vdtree::validate_perspective(view, "A near plane of one's own"); !valid) return valid.error();
+        if (auto valid = vdtree::validate_perspective(view, "A near plane of one's own"); !valid) return valid;
     if (camera.tile) {
-        if (auto valid = check_tile(camera, target); !valid) return valid.error();
+        if (auto valid = check_tile(camera, target); !valid) return valid;
     } else if (view.width != target.width || view.height != target.height)
         return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                                 " pixels, and the target has " + std::to_string(target.width) + "x" +
@@ -185,19 +187,28 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
         return invalid_argument("The near plane's distance must be positive and finite, not " +
                                 std::to_string(*camera.near_plane) + ".");
     if (!target.outputs.empty())
-        if (auto valid = target.check_attachment(attachment); !valid) return valid.error();
+        if (auto valid = target.check_attachment(attachment); !valid) return valid;
     if (camera.shadow_mask) {
-        if (auto valid = target.check_attachment(*camera.shadow_mask); !valid) return valid.error();
+        if (auto valid = target.check_attachment(*camera.shadow_mask); !valid) return valid;
         if (*camera.shadow_mask == attachment || target.output(*camera.shadow_mask) != Output::linear ||
             target.is_foreign)
             return invalid_argument("The mask of shadows needs an attachment of its own, of shares or in floats, of a "
                                     "target that is the library's own.");
     }
     for (const Item& item : items)
-        if (auto valid = check(item, target.context); !valid) return valid.error();
+        if (auto valid = check(item, target.context); !valid) return valid;
     if (camera.shadows)
         for (const Item& item : items)
-            if (auto valid = camera.shadows->impl().check(item); !valid) return valid.error();
+            if (auto valid = camera.shadows->impl().check(item); !valid) return valid;
+    return {};
+}
+
+} // namespace
+
+Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
+                                         int attachment, Use use) {
+    if (auto valid = check_draw(items, camera, target, attachment); !valid) return valid.error();
+    const vdtree::View& view = camera.view;
     auto projections = projections_of(items, view, camera.near_plane);
     if (!projections) return projections.error();
 

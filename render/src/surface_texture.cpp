@@ -9,6 +9,8 @@
 
 #include <glm/vec3.hpp>
 
+#include <unseen/vdtree/internal/texture_pyramid.h>
+
 #include "gl.h"
 
 namespace unseen::render {

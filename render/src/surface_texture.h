@@ -6,7 +6,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
+#include <unseen/vdtree/mesh.h>
 
 #include "gl_object.h"
 

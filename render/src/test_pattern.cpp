@@ -1,6 +1,6 @@
 // Checks what is asked for, and hands it to the shader.
 #include <initializer_list>
-#include <unseen/render/test_pattern.h>
+#include <unseen/render/internal/test_pattern.h>
 
 #include <array>
 #include <cmath>

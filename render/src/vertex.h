@@ -4,7 +4,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/vdtree/packed.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::render {
 

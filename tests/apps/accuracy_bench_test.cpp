@@ -57,7 +57,7 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
     EXPECT_EQ(error(points, "imperceptible, followed"), 0) << "what a cut becomes does not depend on the way to it";
     EXPECT_EQ(error(points, "full"), 0);
     EXPECT_LT(error(points, "imperceptible"), 1) << "in thresholds";
-    EXPECT_LE(error(points, "modern"), 1e-3) << "what <unseen/render/visibility.h> promises";
+    EXPECT_LE(error(points, "modern"), 1e-3) << "what <unseen/render/internal/visibility_passes.h> promises";
     EXPECT_EQ(error(points, "modern, CPU"), 0);
     EXPECT_LT(error(points, "16 frames old, margin of 8 deg"), 1) << "what a margin promises";
     EXPECT_EQ(named(points, "quadric, one thread")["values"][1], named(points, "quadric, two threads")["values"][1]);

@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unseen/perception/judge.h>
-#include <unseen/render/depth.h>
+#include <unseen/render/internal/depth.h>
 #include <unseen/render/renderer.h>
 
 #include "built.h"

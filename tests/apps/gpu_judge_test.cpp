@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 
 #include <unseen/perception/judge_tables.h>
+#include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/renderer.h>
 
 #include "built.h"
@@ -27,7 +28,6 @@ using perception::Image;
 using perception::Judge;
 using perception::Judgement;
 using perception::JudgeOptions;
-using render::VisibilityPrecision;
 using session::GpuJudge;
 using support::flat;
 using support::noise;
@@ -35,10 +35,8 @@ using ::testing::HasSubstr;
 using GpuJudgeTest = render::testing::GlTest;
 
 // Of all pixels but one in a thousand.
-constexpr double full_tolerance = 1e-3, half_tolerance = 0.01; // relative
-// Below these V errors are not relative: differences in float round to so much, and half floats keep no less.
-constexpr double full_floor = 1e-4, half_floor = 0.1;
-constexpr double most_in_half_floats = 5e3; // V beyond it is cut off some day
+constexpr double full_tolerance = 1e-3; // relative
+constexpr double full_floor = 1e-4;     // below, V is a rounding of float differences
 
 // Cycles a pixel and contrast grow to the right and to the bottom.
 Image gratings(int width, int height, double mean, double contrast) {
@@ -69,14 +67,14 @@ std::vector<Pair> pairs(int width, int height) {
 
 JudgeOptions looking_aside(int width) { return {.gaze_px = glm::dvec2(width + 400, 30)}; }
 
-// The error that one value in a thousand exceeds; those below `floor` count as it, those above `most` not at all.
-double error_of(const std::vector<float>& is, const std::vector<float>& wanted, double floor, double most) {
+// The relative error that one value in a thousand exceeds; values below `floor` count as `floor`.
+double error_of(const std::vector<float>& is, const std::vector<float>& wanted, double floor) {
     EXPECT_EQ(is.size(), wanted.size());
     std::vector<double> errors;
     for (std::size_t i = 0; i < is.size(); ++i) {
         EXPECT_TRUE(std::isfinite(is[i])) << "pixel " << i;
         const auto w = static_cast<double>(wanted[i]);
-        if (w <= most) errors.push_back(std::abs(static_cast<double>(is[i]) - w) / std::max(w, floor));
+        errors.push_back(std::abs(static_cast<double>(is[i]) - w) / std::max(w, floor));
     }
     if (errors.empty()) return 0;
     const auto nth = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() - 1 - errors.size() / 1000);
@@ -88,32 +86,24 @@ void expect_alike(const render::Context& context, const Pair& pair, const JudgeO
     const auto cpu = perception::judge_modern(pair.reference, pair.test, options);
     const auto cpu_map = perception::threshold_map_modern(pair.reference, options);
     ASSERT_TRUE(cpu && cpu_map) << pair.name;
-    for (const auto precision : {VisibilityPrecision::full, VisibilityPrecision::half}) {
-        const bool is_half = precision == VisibilityPrecision::half;
-        const std::string what = pair.name + " of " + std::to_string(pair.reference.width) + "x" +
-                                 std::to_string(pair.reference.height) + (options.gaze_px ? " aside" : "") +
-                                 (is_half ? " in half floats" : "");
-        auto gpu = GpuJudge::create(context, pair.reference, options, precision);
-        ASSERT_TRUE(gpu) << what << ": " << gpu.error().message;
-        const auto judged = gpu->judge(pair.test);
-        ASSERT_TRUE(judged) << what << ": " << judged.error().message;
-        const double tolerance = is_half ? half_tolerance : full_tolerance;
-        EXPECT_LE(error_of(judged->visibility.values, cpu->visibility.values, is_half ? half_floor : full_floor,
-                           is_half ? most_in_half_floats : 1e300),
-                  tolerance)
-            << what;
-        // Summed up as they are in the map.
-        EXPECT_EQ(judged->pixels, cpu->pixels) << what;
-        const auto& v = judged->visibility.values;
-        EXPECT_EQ(judged->max_ratio, static_cast<double>(*std::max_element(v.begin(), v.end()))) << what;
-        EXPECT_EQ(judged->visible_pixels,
-                  static_cast<std::uint64_t>(std::count_if(v.begin(), v.end(), [](float x) { return !(x < 1); })))
-            << what;
-        const auto map = gpu->threshold_map();
-        ASSERT_TRUE(map) << what << ": " << map.error().message;
-        EXPECT_LE(error_of(map->values, cpu_map->values, 0, 1e300), full_tolerance) << what;
-        EXPECT_EQ(context.take_errors(), "") << what;
-    }
+    const std::string what = pair.name + " of " + std::to_string(pair.reference.width) + "x" +
+                             std::to_string(pair.reference.height) + (options.gaze_px ? " aside" : "");
+    auto gpu = GpuJudge::create(context, pair.reference, options);
+    ASSERT_TRUE(gpu) << what << ": " << gpu.error().message;
+    const auto judged = gpu->judge(pair.test);
+    ASSERT_TRUE(judged) << what << ": " << judged.error().message;
+    const auto& v = judged->visibility.values;
+    EXPECT_LE(error_of(v, cpu->visibility.values, full_floor), full_tolerance) << what;
+    // Summed up as they are in the map.
+    EXPECT_EQ(judged->pixels, cpu->pixels) << what;
+    EXPECT_EQ(judged->max_ratio, static_cast<double>(*std::max_element(v.begin(), v.end()))) << what;
+    EXPECT_EQ(judged->visible_pixels,
+              static_cast<std::uint64_t>(std::count_if(v.begin(), v.end(), [](float x) { return !(x < 1); })))
+        << what;
+    const auto map = gpu->threshold_map();
+    ASSERT_TRUE(map) << what << ": " << map.error().message;
+    EXPECT_LE(error_of(map->values, cpu_map->values, 0), full_tolerance) << what;
+    EXPECT_EQ(context.take_errors(), "") << what;
 }
 
 TEST_F(GpuJudgeTest, JudgesAsTheCpuDoes) {
@@ -221,23 +211,22 @@ TEST_F(GpuJudgeTest, JudgesTexturesAsTheyLie) {
 
 TEST_F(GpuJudgeTest, SeesNothingInEqualPicturesAndTheSameInTheSame) {
     const Image a = noise(203, 150, 20, 0.9, 1), b = noise(203, 150, 20, 0.9, 2);
-    for (const auto precision : {VisibilityPrecision::full, VisibilityPrecision::half})
-        for (const JudgeOptions& options : {JudgeOptions{}, looking_aside(203)}) {
-            auto judge = GpuJudge::create(context(), a, options, precision);
-            ASSERT_TRUE(judge) << judge.error().message;
-            const auto first = judge->judge(b);
-            ASSERT_TRUE(first);
-            EXPECT_GT(first->visible_pixels, 0U);
-            const auto nothing = judge->judge(a);
-            ASSERT_TRUE(nothing);
-            EXPECT_EQ(nothing->max_ratio, 0);
-            EXPECT_EQ(nothing->visible_pixels, 0U);
-            EXPECT_THAT(nothing->visibility.values, ::testing::Each(0.F));
-            auto other = GpuJudge::create(context(), a, options, precision);
-            ASSERT_TRUE(other);
-            EXPECT_EQ(judge->judge(b)->visibility.values, first->visibility.values);
-            EXPECT_EQ(other->judge(b)->visibility.values, first->visibility.values);
-        }
+    for (const JudgeOptions& options : {JudgeOptions{}, looking_aside(203)}) {
+        auto judge = GpuJudge::create(context(), a, options);
+        ASSERT_TRUE(judge) << judge.error().message;
+        const auto first = judge->judge(b);
+        ASSERT_TRUE(first);
+        EXPECT_GT(first->visible_pixels, 0U);
+        const auto nothing = judge->judge(a);
+        ASSERT_TRUE(nothing);
+        EXPECT_EQ(nothing->max_ratio, 0);
+        EXPECT_EQ(nothing->visible_pixels, 0U);
+        EXPECT_THAT(nothing->visibility.values, ::testing::Each(0.F));
+        auto other = GpuJudge::create(context(), a, options);
+        ASSERT_TRUE(other);
+        EXPECT_EQ(judge->judge(b)->visibility.values, first->visibility.values);
+        EXPECT_EQ(other->judge(b)->visibility.values, first->visibility.values);
+    }
 }
 
 TEST_F(GpuJudgeTest, StaysFiniteInTheDarkAndInTheSun) {
@@ -251,28 +240,27 @@ TEST_F(GpuJudgeTest, StaysFiniteInTheDarkAndInTheSun) {
             for (int y = 0; y < 50; y += 2)
                 for (int x = 0; x < 66; x += 2) b.at(x, y) = dots;
             for (const JudgeOptions& options : {JudgeOptions{}, looking_aside(66), steep, behind})
-                for (const auto& [reference, test] : {std::pair(a, b), std::pair(b, a)})
-                    for (const auto precision : {VisibilityPrecision::full, VisibilityPrecision::half}) {
-                        auto judge = GpuJudge::create(context(), reference, options, precision);
-                        ASSERT_TRUE(judge) << judge.error().message;
-                        const auto judged = judge->judge(test);
-                        ASSERT_TRUE(judged) << judged.error().message;
-                        const auto map = judge->threshold_map();
-                        ASSERT_TRUE(map) << map.error().message;
-                        const auto is_sound = [](float v) { return v >= 0 && std::isfinite(v); };
-                        EXPECT_TRUE(std::isfinite(judged->max_ratio));
-                        EXPECT_TRUE(
-                            std::all_of(judged->visibility.values.begin(), judged->visibility.values.end(), is_sound))
+                for (const auto& [reference, test] : {std::pair(a, b), std::pair(b, a)}) {
+                    auto judge = GpuJudge::create(context(), reference, options);
+                    ASSERT_TRUE(judge) << judge.error().message;
+                    const auto judged = judge->judge(test);
+                    ASSERT_TRUE(judged) << judged.error().message;
+                    const auto map = judge->threshold_map();
+                    ASSERT_TRUE(map) << map.error().message;
+                    const auto is_sound = [](float v) { return v >= 0 && std::isfinite(v); };
+                    EXPECT_TRUE(std::isfinite(judged->max_ratio));
+                    EXPECT_TRUE(
+                        std::all_of(judged->visibility.values.begin(), judged->visibility.values.end(), is_sound))
+                        << dots << " on " << ground;
+                    EXPECT_TRUE(std::all_of(map->values.begin(), map->values.end(), is_sound))
+                        << dots << " on " << ground;
+                    const auto cpu = perception::judge_modern(reference, test, options);
+                    if (dots <= 1e5F) {
+                        EXPECT_NEAR(judged->max_ratio, cpu->max_ratio,
+                                    full_tolerance * std::max(cpu->max_ratio, full_floor))
                             << dots << " on " << ground;
-                        EXPECT_TRUE(std::all_of(map->values.begin(), map->values.end(), is_sound))
-                            << dots << " on " << ground;
-                        const auto cpu = perception::judge_modern(reference, test, options);
-                        if (precision == VisibilityPrecision::full && dots <= 1e5F) {
-                            EXPECT_NEAR(judged->max_ratio, cpu->max_ratio,
-                                        full_tolerance * std::max(cpu->max_ratio, full_floor))
-                                << dots << " on " << ground;
-                        }
                     }
+                }
         }
 }
 

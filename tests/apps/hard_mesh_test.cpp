@@ -19,6 +19,7 @@
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
 #include <unseen/session/observer.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "measured.h"
 #include "oracle.h"

@@ -12,6 +12,7 @@
 
 #include <unseen/calibration/light_rig.h>
 #include <unseen/perception/judge.h>
+#include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
 #include <unseen/session_gpu/scene_renderer.h>
 

@@ -10,9 +10,10 @@
 #include <gmock/gmock.h>
 
 #include <unseen/perception/judge_tables.h>
-#include <unseen/render/elevation.h>
+#include <unseen/render/internal/elevation.h>
 #include <unseen/render/target.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/internal/pass_tables.h>
 
 #include "gl_test.h"
 #include "luminance_images.h"

@@ -1,5 +1,5 @@
 // Fits of displays: matches by eye, and photometers' tables.
-#include <unseen/calibration/display_fit.h>
+#include <unseen/calibration/display_profile.h>
 
 #include <cmath>
 

@@ -46,7 +46,6 @@ TEST_F(LightRigTest, PutsLightsWhereTheyAreAtATime) {
     const auto rig = LightRig::read(write(good));
     ASSERT_TRUE(rig) << rig.error().message;
     EXPECT_TRUE(rig->moves());
-    EXPECT_TRUE(rig->follows_camera());
     EXPECT_EQ(rig->description(), "1 directional, 1 headlight, 1 point, 1 spot, ambient 0.1, highlights of 0.05");
     const vdtree::Lighting first = at(*rig, 0), second = at(*rig, 1), last = at(*rig, 100);
     ASSERT_EQ(first.lights.size(), 4u);

@@ -1,5 +1,5 @@
 // The observers of <unseen/perception/person.h> against what people were measured to see.
-#include <unseen/calibration/people.h>
+#include <unseen/calibration/internal/people.h>
 
 #include <algorithm>
 #include <cmath>

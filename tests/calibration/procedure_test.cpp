@@ -1,7 +1,7 @@
 // The procedure with simulated observers: how near it comes to the truth, that it repeats and resumes, and what it
 // refuses.
+#include <unseen/calibration/internal/simulated_observer.h>
 #include <unseen/calibration/procedure.h>
-#include <unseen/calibration/simulated_observer.h>
 
 #include <cmath>
 #include <limits>

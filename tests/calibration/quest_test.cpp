@@ -1,6 +1,6 @@
 // QUEST+: the psychometric function and posteriors against reference figures, and the choice of stimuli against its
 // definition.
-#include <unseen/calibration/quest.h>
+#include <unseen/calibration/internal/quest.h>
 
 #include <cmath>
 #include <limits>

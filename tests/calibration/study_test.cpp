@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unseen/calibration/picture_observer.h>
+#include <unseen/calibration/internal/picture_observer.h>
 #include <unseen/perception/judge.h>
 
 #include "temp_folder.h"

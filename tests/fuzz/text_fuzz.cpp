@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <unseen/calibration/calibration.h>
+#include <unseen/calibration/internal/people.h>
 #include <unseen/perception/gaze.h>
 
 #include "camera_path.h"

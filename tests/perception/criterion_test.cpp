@@ -13,6 +13,8 @@
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "extra_meshes.h"

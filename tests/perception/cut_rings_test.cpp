@@ -9,6 +9,7 @@
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -19,6 +19,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/conserve_light.h>
 #include <unseen/vdtree/tree_io.h>
 #include <unseen/vdtree/view.h>
 

@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "built.h"

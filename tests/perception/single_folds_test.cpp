@@ -17,7 +17,7 @@
 #include <unseen/perception/cut_rings.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "shapes.h"
 #include "sound.h"

@@ -9,7 +9,8 @@
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
+#include <unseen/vdtree/mesh.h>
 
 #include "built.h"
 #include "shapes.h"

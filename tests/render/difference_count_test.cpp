@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include <unseen/render/difference_count.h>
-#include <unseen/render/stage_times.h>
+#include <unseen/render/internal/difference_count.h>
+#include <unseen/render/internal/stage_times.h>
 
 namespace difference_count_test {
 

@@ -12,6 +12,7 @@
 #include <unseen/perception/judge.h>
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "built.h"
 #include "oracle.h"

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include <unseen/render/draw.h>
+#include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/shadows.h>
-#include <unseen/render/visibility.h>
 
 #include "gl_test.h"
 #include "one_band.h"
@@ -67,54 +67,6 @@ TEST_F(Numerics, ShadowMapsAtGrazingLight) {
         }
     }
     EXPECT_GE(naive_hidden, 6);
-}
-
-// As halves keep it: 11 bits, from 2^-24 to 65504.
-float naive_half(double x) {
-    if (!(x < 65520)) return std::numeric_limits<float>::infinity();
-    if (x < 0x1p-25) return 0;
-    const double step = std::exp2(std::max(std::floor(std::log2(x)), -14.0) - 10);
-    return static_cast<float>(std::round(x / step) * step);
-}
-
-TEST_F(Numerics, MaskingExponentsIn16Bits) {
-    EXPECT_TRUE(std::isinf(naive_half(300.0 * 300.0))) << "the energy of 300 thresholds";
-    EXPECT_TRUE(std::isinf(naive_half(std::pow(100.0, 2.8)))) << "what a masker of 100 thresholds comes to";
-    EXPECT_EQ(naive_half(1e-4 * 1e-4), 0);
-    constexpr double bound = 0.01; // of V, from 0.1 to 5,000
-    constexpr int side = 16;
-    std::vector<float> textured(side * side); // masks by some fifty thresholds
-    for (int i = 0; i < side * side; ++i) textured[static_cast<std::size_t>(i)] = (i + i / side) % 2 ? 1.f : 199.f;
-    const auto texture = LuminanceImage::create(context(), side, side, textured);
-    ASSERT_TRUE(texture);
-    const auto plain = testing::picture(context(), side, side, 10);
-    for (const bool masks : {false, true}) {
-        const LuminanceTexture reference = masks ? texture->texture() : plain.texture();
-        auto in_full = VisibilityPasses::create(context(), testing::tables(side, side), reference);
-        auto in_half =
-            VisibilityPasses::create(context(), testing::tables(side, side), reference, VisibilityPrecision::half);
-        ASSERT_TRUE(in_full && in_half);
-        for (const float difference : {0.1f, 1.f, 30.f, 1e3f, 4e3f, 1e9f}) {
-            std::vector<float> values(side * side);
-            for (std::size_t i = 0; i < values.size(); ++i) values[i] = (masks ? textured[i] : 10.f) + difference;
-            const auto test = LuminanceImage::create(context(), side, side, values);
-            ASSERT_TRUE(test);
-            ASSERT_TRUE(in_full->judge(test->texture()));
-            ASSERT_TRUE(in_half->judge(test->texture()));
-            const auto expected = in_full->read_visibility(), found = in_half->read_visibility();
-            ASSERT_TRUE(expected && found);
-            for (std::size_t i = 0; i < found->size(); ++i) {
-                const float v = (*expected)[i];
-                ASSERT_TRUE(std::isfinite((*found)[i])) << difference;
-                if (v >= 0.1f && v <= 5e3f) {
-                    ASSERT_NEAR((*found)[i], v, bound * v) << difference;
-                }
-                if (v > 5e3f) {
-                    ASSERT_GT((*found)[i], 4.9e3f) << difference;
-                }
-            }
-        }
-    }
 }
 
 } // namespace

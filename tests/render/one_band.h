@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <unseen/render/context.h>
-#include <unseen/render/visibility.h>
+#include <unseen/render/internal/visibility_passes.h>
 
 namespace unseen::render::testing {
 

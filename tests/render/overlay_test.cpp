@@ -9,7 +9,7 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <unseen/render/overlay.h>
+#include <unseen/render/internal/overlay.h>
 #include <unseen/render/renderer.h>
 
 namespace overlay_test {

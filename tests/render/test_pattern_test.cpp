@@ -7,7 +7,7 @@
 
 #include <gmock/gmock.h>
 
-#include <unseen/render/test_pattern.h>
+#include <unseen/render/internal/test_pattern.h>
 
 namespace test_pattern_test {
 

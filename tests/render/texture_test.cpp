@@ -11,6 +11,8 @@
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
 #include <unseen/vdtree/geomorph.h>
+#include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 
 #include "built.h"
 #include "shapes.h"

@@ -13,7 +13,7 @@
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/person.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 namespace unseen::support {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/conserve_light.h>
 
 #include "built.h"
 

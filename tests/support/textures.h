@@ -8,7 +8,6 @@
 #include <random>
 
 #include <unseen/vdtree/mesh.h>
-#include <unseen/vdtree/texture.h>
 
 #include "shapes.h"
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "shapes.h"

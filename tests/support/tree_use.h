@@ -4,12 +4,13 @@
 
 #include <vector>
 
-#include <unseen/vdtree/conserve_light.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/geomorph.h>
+#include <unseen/vdtree/internal/conserve_light.h>
+#include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/lighting.h>
-#include <unseen/vdtree/occluders.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::support {
@@ -50,11 +51,10 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
             .follow(*displacement, {.eye = eye_in_tree(tree, view, {})}, {.triangle_budget = tree.triangle_count() / 2})
             .has_value();
     extract();
-    const FrustumVisibility frustum(tree, view);
     const auto bright_ones = [](const VertexTree& of, std::span<const NodeId> nodes, std::span<float> costs) {
         for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = 4 * of.luminance()[nodes[i]];
     };
-    cut.adjust(bright_ones, {.visibility = frustum});
+    cut.adjust(bright_ones);
     extract();
     cut.adjust(bright_ones, {.triangle_budget = tree.triangle_count() / 2});
     extract();

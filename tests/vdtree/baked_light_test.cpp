@@ -1,5 +1,5 @@
 // Light in colours: found where it was baked in, and not where it was not.
-#include <unseen/vdtree/baked_light.h>
+#include <unseen/vdtree/internal/baked_light.h>
 
 #include <algorithm>
 #include <cmath>

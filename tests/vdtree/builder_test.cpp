@@ -20,6 +20,7 @@
 #include <gtest/gtest.h>
 
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "exact.h"
 #include "shapes.h"
@@ -36,7 +37,7 @@ using testing::HasSubstr;
 constexpr double direction_rounding = 1e-7;
 // Luminance goes through a few float operations.
 constexpr float luminance_rounding = 1.0f / 65535; // one step of a stored luminance
-constexpr float packed_normal_error = 6.6e-5f;     // length; see <unseen/vdtree/packed.h>
+constexpr float packed_normal_error = 6.6e-5f;     // length; see <unseen/vdtree/vertex_tree.h>
 
 struct Case {
     std::string shape;

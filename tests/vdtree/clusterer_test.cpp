@@ -19,7 +19,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <unseen/vdtree/team.h>
+#include <unseen/vdtree/internal/team.h>
 
 #include "build/help_cluster.h"
 #include "build/quadric_contraction.h"

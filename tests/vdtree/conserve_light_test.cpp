@@ -1,5 +1,5 @@
 // Proxies that conserve light: what curved surfaces radiate, and bounds that hold.
-#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/conserve_light.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,6 @@
 
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/distance_criterion.h>
 #include <unseen/vdtree/view.h>
 
 #include "built.h"

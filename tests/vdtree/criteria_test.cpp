@@ -16,7 +16,8 @@
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/footprint.h>
+#include <unseen/vdtree/depth_picture.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "shapes.h"
 #include "sound.h"
@@ -35,12 +36,6 @@ VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) 
     Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
     if (!tree) throw std::runtime_error(tree.error().message);
     return std::move(*tree);
-}
-
-std::vector<NodeId> all_nodes(const VertexTree& tree) {
-    std::vector<NodeId> nodes(tree.interior_count());
-    for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
-    return nodes;
 }
 
 using MakeCriterion = Result<DistanceCriterion> (*)(const VertexTree&, const View&, double tolerance_pixels);
@@ -68,9 +63,14 @@ double displacement_pixels(float cost, const View& view, double tolerance) {
 // Tolerances of half a turn and more fold whatever the eye is not in.
 bool is_less_than_a_turn(const View& view, double tolerance) { return tolerance / pixels_per_radian(view) < 3; }
 
-std::vector<Visibility> seen_of(const VertexTree& tree, const FrustumVisibility& frustum) {
-    std::vector<Visibility> seen(tree.interior_count());
-    frustum(tree, all_nodes(tree), seen);
+// By node: whether the view's frustum leaves it unfolded under a criterion that folds nothing else.
+std::vector<bool> seen_of(const VertexTree& tree, const View& view, const Similarity& placement = {}) {
+    const auto criterion = DistanceCriterion::create(
+        tree, {.lengths = std::vector<float>(tree.interior_count(), 1.0f),
+               .switch_distance = {DistanceCriterion::always_visible}});
+    const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, placement));
+    std::vector<bool> seen;
+    for (NodeId node = 0; node < tree.interior_count(); ++node) seen.push_back((*bits)[node / 64] >> (node % 64) & 1);
     return seen;
 }
 
@@ -348,8 +348,7 @@ TEST(Criteria, StayTheSameWhenEyeAndTreeMoveTogether) {
             };
             for (const MakeCriterion make : {&extent_criterion, &displacement_criterion})
                 compare(costs_of(make, tree, view, 2), costs_of(make, tree, there, 2, s));
-            const auto here = seen_of(tree, FrustumVisibility(tree, view)),
-                       elsewhere = seen_of(tree, FrustumVisibility(tree, there, s));
+            const auto here = seen_of(tree, view), elsewhere = seen_of(tree, there, s);
             int different = 0;
             for (std::size_t i = 0; i < here.size(); ++i) different += here[i] != elsewhere[i];
             ASSERT_LE(different, 1); // a sphere that touches a plane may fall to either side
@@ -545,30 +544,26 @@ bool in_window(const VertexTree& tree, const View& view, glm::dvec3 p, double pl
 
 TEST(Frustum, AgreesWithPointsOfTheSpheres) {
     std::mt19937_64 random(9);
-    int counts[3] = {0, 0, 0};
+    int counts[2] = {0, 0};
     for (const shapes::Named& named : meshes()) {
         SCOPED_TRACE(named.name);
         const VertexTree tree = built(named.mesh);
         for (int round = 0; round < 30; ++round) {
             const View view = random_view(random, tree);
-            const auto seen = seen_of(tree, FrustumVisibility(tree, view));
+            const auto seen = seen_of(tree, view);
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
-                ++counts[static_cast<int>(seen[node])];
+                ++counts[seen[node]];
+                if (seen[node]) continue;
                 const Sphere s = tree.bounds()[node].ring;
                 for (int i = 0; i < 10; ++i) {
                     const glm::dvec3 p =
                         glm::dvec3(s.centre) + s.radius * (i == 0 ? 0.0 : 1.0) * random_direction(random);
-                    if (seen[node] == Visibility::out) {
-                        ASSERT_FALSE(in_window(tree, view, p, -1e-9)) << "node " << node;
-                    }
-                    if (seen[node] == Visibility::wholly_in) {
-                        ASSERT_TRUE(in_window(tree, view, p, 1e-9)) << "node " << node;
-                    }
+                    ASSERT_FALSE(in_window(tree, view, p, -1e-9)) << "node " << node;
                 }
             }
         }
     }
-    for (const int count : counts) EXPECT_GT(count, 1000); // all three happen
+    for (const int count : counts) EXPECT_GT(count, 1000); // both happen
 }
 
 TEST(Frustum, IsTightForSmallSpheres) {
@@ -578,7 +573,7 @@ TEST(Frustum, IsTightForSmallSpheres) {
     for (int round = 0; round < 60; ++round) {
         View view = random_view(random, tree);
         if (round % 2) view.target += 3.0 * random_direction(random); // past the model
-        const auto seen = seen_of(tree, FrustumVisibility(tree, view));
+        const auto seen = seen_of(tree, view);
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             // A sphere that is small, as seen from the eye, and whose centre is far from the window's edges, is
             // decided.
@@ -586,10 +581,10 @@ TEST(Frustum, IsTightForSmallSpheres) {
             const double distance = glm::distance(tree.origin() + glm::dvec3(s.centre), view.eye);
             if (distance < 1e-6 || s.radius > 0.02 * distance) continue;
             if (in_window(tree, view, glm::dvec3(s.centre), -0.05)) {
-                ASSERT_EQ(seen[node], Visibility::wholly_in);
+                ASSERT_TRUE(seen[node]);
                 ++in;
             } else if (!in_window(tree, view, glm::dvec3(s.centre), 0.05)) {
-                ASSERT_EQ(seen[node], Visibility::out);
+                ASSERT_FALSE(seen[node]);
                 ++out;
             }
         }
@@ -603,28 +598,17 @@ TEST(Frustum, NestsUpTheTree) {
     for (const shapes::Named& named : meshes()) {
         const VertexTree tree = built(named.mesh);
         for (int round = 0; round < 100; ++round) {
-            const auto seen = seen_of(tree, FrustumVisibility(tree, random_view(random, tree)));
-            for (NodeId node = 1; node < tree.interior_count(); ++node) {
-                const Visibility above = seen[support::sound(tree).parents()[node]];
-                if (above != Visibility::partly) {
-                    ASSERT_EQ(seen[node], above) << named.name << ", node " << node;
-                }
-            }
+            const auto seen = seen_of(tree, random_view(random, tree));
+            for (NodeId node = 1; node < tree.interior_count(); ++node)
+                ASSERT_TRUE(!seen[node] || seen[support::sound(tree).parents()[node]]) << named.name << ", " << node;
         }
     }
 }
 
 TEST(Frustum, FoldsWhatIsBehindTheEye) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
-    const View view{.eye = {0, 0, 5}, .target = {0, 0, 9}};
-    Cut cut(tree);
-    const auto everything = [](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
-        std::fill_n(costs.begin(), nodes.size(), 2.0f);
-    };
-    const FrustumVisibility frustum(tree, view);
-    cut.unfold_all();
-    EXPECT_EQ(cut.adjust(everything, {.visibility = frustum}).triangles, 0u);
-    EXPECT_GT(cut.adjust(everything).triangles, 0u);
+    for (const bool seen : seen_of(tree, {.eye = {0, 0, 5}, .target = {0, 0, 9}})) EXPECT_FALSE(seen);
+    EXPECT_TRUE(seen_of(tree, {.eye = {0, 0, 5}})[VertexTree::root()]);
 }
 
 // ---- windows off centre, orthographic views, pairs

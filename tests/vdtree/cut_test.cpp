@@ -429,12 +429,12 @@ TEST(Visibility, FoldsWhatIsOutAtNoCost) {
         criterion(t, nodes, out);
     };
     // What lies wholly beyond x = 0.1 cannot be seen.
-    const auto left_half = [](const VertexTree& t, std::span<const NodeId> nodes, std::span<Visibility> seen) {
+    const auto left_half = [](const VertexTree& t, std::span<const NodeId> nodes, std::span<RingVisibility> seen) {
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             const Sphere s = t.bounds()[nodes[i]].ring;
-            seen[i] = s.centre.x - s.radius > 0.1f   ? Visibility::out
-                      : s.centre.x + s.radius < 0.1f ? Visibility::wholly_in
-                                                     : Visibility::partly;
+            seen[i] = s.centre.x - s.radius > 0.1f   ? RingVisibility::out
+                      : s.centre.x + s.radius < 0.1f ? RingVisibility::wholly_in
+                                                     : RingVisibility::partly;
         }
     };
     Cut cut(tree);
@@ -500,7 +500,7 @@ TEST(Cuts, ShareOneTreeBetweenThreads) {
     EXPECT_EQ(states[1], states[3]);
 }
 
-constexpr float packed_normal_error = 6.6e-5f; // length; see <unseen/vdtree/packed.h>
+constexpr float packed_normal_error = 6.6e-5f; // length; see <unseen/vdtree/vertex_tree.h>
 
 TEST(ExtractMesh, GivesTheVerticesInUseInDoublePrecision) {
     const Mesh mesh =

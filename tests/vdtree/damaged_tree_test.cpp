@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/tree_io.h>
 

@@ -14,6 +14,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "cut/kernel/lit_kernel.h"
 #include "shapes.h"

@@ -1,5 +1,5 @@
 // Normal masks and slabs against brute force: every answer must hold for every normal, seen from every point.
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include <array>
 #include <bit>

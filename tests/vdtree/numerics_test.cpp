@@ -14,8 +14,8 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/footprint.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/depth_picture.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "build/bounding_sphere.h"
 #include "build/quadric.h"
@@ -97,20 +97,18 @@ TEST(Numerics, NodesBehindTheEye) {
     EXPECT_EQ(seen_from(view), 0);
     // A corner of a node is in the window: the node is not out, wherever its middle is.
     std::mt19937_64 random(1);
-    std::vector<NodeId> nodes(tree.interior_count());
-    for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
-    std::vector<Visibility> seen(nodes.size());
     constexpr double fields[] = {1, 90, 120, 179.9};
     for (int round = 0; round < 80; ++round) {
         view.fov_y_degrees = fields[round % 4];
         view.eye = random_direction(random) * random_between(random, 0.5, 1.5);
         view.target = view.eye + random_direction(random);
-        FrustumVisibility(tree, view)(tree, nodes, seen);
+        const auto costs = costs_from(
+            tree, criterion, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}});
         const Projector project(view);
-        for (const NodeId node : nodes) {
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
             const Footprint at = project(tree.origin() + glm::dvec3(tree.positions()[node]));
             if (at.nearest > 0 && at.left > 0 && at.left < view.width && at.top > 0 && at.top < view.height) {
-                ASSERT_NE(seen[node], Visibility::out) << node;
+                ASSERT_GT(costs[node], 0) << node;
             }
         }
     }
@@ -133,10 +131,7 @@ TEST(Numerics, NodesBeyondTheFarPlane) {
         };
         EXPECT_NEAR(cost(far) / cost(farther) / ((farther - radius) / (far - radius)), 1, bound) << far;
         const View from_there{.eye = {0, 0, far}};
-        std::vector<Visibility> seen(1);
-        const NodeId root = VertexTree::root();
-        FrustumVisibility(tree, from_there)(tree, {&root, 1}, seen);
-        EXPECT_EQ(seen[0], Visibility::wholly_in) << far;
+        EXPECT_GT(costs_from(tree, criterion, viewpoint_of(tree, from_there))[VertexTree::root()], 0) << far;
     }
 }
 

@@ -20,7 +20,7 @@
 
 #include "built.h"
 #include "cut/budget.h"
-#include "cut/deadlines.h"
+#include "cut/cut_front.h"
 #include "cut/kernel/fold_tester.h"
 #include "shapes.h"
 #include "sound.h"

@@ -1,5 +1,5 @@
 // Spheres inside of solids, and what they hide.
-#include <unseen/vdtree/occluders.h>
+#include <unseen/vdtree/criteria.h>
 
 #include <cmath>
 #include <limits>
@@ -11,7 +11,6 @@
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/distance_criterion.h>
 
 #include "built.h"
 #include "shapes.h"

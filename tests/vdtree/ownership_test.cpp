@@ -55,9 +55,9 @@ TEST(OptionsOwn, TheirVisibilityTest) {
     ASSERT_TRUE(tree) << tree.error().message;
     AdjustOptions options;
     auto calls = std::make_shared<int>(0);
-    options.visibility = [calls](const VertexTree&, std::span<const NodeId>, std::span<Visibility> seen) {
+    options.visibility = [calls](const VertexTree&, std::span<const NodeId>, std::span<RingVisibility> seen) {
         ++*calls;
-        std::fill(seen.begin(), seen.end(), Visibility::out);
+        std::fill(seen.begin(), seen.end(), RingVisibility::out);
     };
     EXPECT_EQ(calls.use_count(), 2);
     Cut cut(*tree);

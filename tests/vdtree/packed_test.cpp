@@ -7,7 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include <unseen/vdtree/packed.h>
+#include <unseen/vdtree/internal/normal_mask.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "shapes.h"
 #include "tree/mask_pool.h"

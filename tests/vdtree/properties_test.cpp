@@ -11,7 +11,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "any_number.h"
 #include "build/bounding_sphere.h"

@@ -1,5 +1,5 @@
 // Textures: what pyramids say of them against every texel, and what trees with textures promise.
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/mesh.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,9 @@
 #include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
-#include <unseen/vdtree/conserve_light.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/conserve_light.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "built.h"

@@ -14,7 +14,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <gtest/gtest.h>
 
-#include <unseen/vdtree/footprint.h>
+#include <unseen/vdtree/depth_picture.h>
 
 #include "shapes.h"
 

@@ -9,6 +9,7 @@
 
 #include <unseen/perception/motion.h>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/number_format.h>
 
 namespace unseen::session {

@@ -8,6 +8,7 @@
 
 #include <unseen/perception/motion.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include <glm/geometric.hpp>
 

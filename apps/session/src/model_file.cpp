@@ -5,9 +5,9 @@
 #include <string_view>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/vdtree/baked_light.h>
 #include <unseen/vdtree/builder.h>
-#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/baked_light.h>
+#include <unseen/vdtree/internal/conserve_light.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>

@@ -12,9 +12,10 @@
 #include <unseen/perception/gaze.h>
 #include <unseen/perception/motion.h>
 #include <unseen/session/follower.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/number_text.h>
-#include <unseen/vdtree/occluders.h>
 
 #include "loaded_tree.h"
 #include "session_state.h"

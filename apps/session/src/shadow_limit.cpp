@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/normal_mask.h>
+
 namespace unseen::session {
 namespace {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <unseen/session/scene.h>
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -11,6 +11,9 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/normal_mask.h>
+#include <unseen/vdtree/internal/light_bounds.h>
+
 namespace unseen::session {
 namespace {
 

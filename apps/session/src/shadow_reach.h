@@ -13,7 +13,8 @@
 #include <unseen/perception/shadow_edges.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/session.h>
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/vertex_tree.h>
 

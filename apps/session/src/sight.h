@@ -12,6 +12,7 @@
 #include <unseen/session/observer.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/session.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "shadow_reach.h"
 

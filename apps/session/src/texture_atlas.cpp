@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <numeric>
 
+#include <unseen/vdtree/internal/texture_pyramid.h>
+
 namespace unseen::session {
 namespace {
 

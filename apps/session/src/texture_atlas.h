@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::session {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string_view>
 
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::session {
 

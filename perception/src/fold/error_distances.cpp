@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/shadow_edges.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "fold/error_distances.h"
 #include "fold/fold_screen.h"

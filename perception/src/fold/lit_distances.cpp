@@ -9,6 +9,7 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "fold/fold_screen.h"
 #include "fold/largest_extents.h"

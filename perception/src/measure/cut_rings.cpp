@@ -15,6 +15,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/texture_fit.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

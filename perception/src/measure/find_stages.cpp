@@ -16,6 +16,7 @@
 #include "measure/lit_stages.h"
 #include "measure/luminance_bias.h"
 #include "measure/pyramid.h"
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/lighting.h>

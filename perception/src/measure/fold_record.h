@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/fold_stages.h"
 #include "measure/measurement.h"

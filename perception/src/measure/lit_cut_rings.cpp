@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

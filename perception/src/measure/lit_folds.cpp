@@ -15,6 +15,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/spot_share.h>
 

@@ -19,6 +19,7 @@
 #include <unseen/vdtree/internal/scaled_geometry.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

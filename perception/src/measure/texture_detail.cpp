@@ -6,6 +6,7 @@
 #include <unseen/vdtree/colour.h>
 
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 
 #include "measure/fold_stages.h"
 

@@ -9,7 +9,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
+#include <unseen/vdtree/mesh.h>
 
 namespace unseen::perception {
 

@@ -11,6 +11,8 @@
 
 #include <CGAL/Exact_rational.h>
 
+#include <unseen/vdtree/internal/normal_mask.h>
+
 namespace unseen::exact {
 
 namespace {
@@ -75,7 +77,7 @@ public:
     bool is_sure() const { return is_sure_; }
     glm::dvec3 direction() const { return direction_; }
 
-    // Of any length.
+    // The exact normal, of any length.
     const Vector& exact() {
         if (!exact_) {
             const Vector a = exactly(corners_[0]);

@@ -8,6 +8,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -124,10 +125,14 @@ private:
         vdtree::drop_degenerate_triangles(mesh_);
     }
 
+    using Edges = std::map<std::pair<Index, Index>, int>; // by two places, the lower one first: how many triangles
+
     // Moves vertices of borders to the first one within the gap that no edge leads to.
     void close_cracks() {
+        const double gap = options_.gap * diagonal_;
+        if (!(gap > 0)) return;
         const Places places(mesh_.positions);
-        std::map<std::pair<Index, Index>, int> uses;
+        Edges uses;
         for (const Triangle& t : mesh_.triangles) {
             const Triangle at = places.of(t);
             if (uses_a_vertex_twice(at)) continue;
@@ -136,13 +141,20 @@ private:
         std::vector<std::uint8_t> is_border(places.points.size(), 0);
         for (const auto& [edge, count] : uses)
             if (count == 1) is_border[edge.first] = is_border[edge.second] = 1;
+        std::vector<glm::dvec3> positions;
+        for (const Point& p : places.points) positions.emplace_back(p.x(), p.y(), p.z());
+        const std::vector<Index> target = find_targets(positions, is_border, uses, gap);
+        for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
+            const Index place = places.of_vertex[v];
+            if (target[place] == place) continue;
+            mesh_.positions[v] = positions[target[place]];
+            ++report_.moved_vertices;
+        }
+    }
 
-        const double gap = options_.gap * diagonal_;
-        if (!(gap > 0)) return;
-        const auto position = [&](Index place) {
-            const Point& p = places.points[place];
-            return glm::dvec3(p.x(), p.y(), p.z());
-        };
+    // By place: the place that it moves to, which stays where it is. Places lie in cells as large as the gap.
+    static std::vector<Index> find_targets(std::span<const glm::dvec3> positions,
+                                           std::span<const std::uint8_t> is_border, const Edges& uses, double gap) {
         using Cell = std::array<std::int64_t, 3>;
         struct CellHash {
             std::size_t operator()(const Cell& c) const noexcept {
@@ -152,17 +164,17 @@ private:
             }
         };
         glm::dvec3 low(std::numeric_limits<double>::infinity());
-        for (const glm::dvec3& p : mesh_.positions) low = glm::min(low, p);
+        for (const glm::dvec3& p : positions) low = glm::min(low, p);
         const auto cell_of = [&](glm::dvec3 p) { // at most 1 / gap cells a side: fits, for gaps are no smaller
             const glm::dvec3 c = glm::floor((p - low) / gap);
             return Cell{static_cast<std::int64_t>(c.x), static_cast<std::int64_t>(c.y), static_cast<std::int64_t>(c.z)};
         };
         std::unordered_map<Cell, std::vector<Index>, CellHash> kept; // places that others move to
-        std::vector<Index> target(places.points.size());
+        std::vector<Index> target(positions.size());
         std::iota(target.begin(), target.end(), Index{0});
         for (Index place = 0; place < target.size(); ++place) {
             if (!is_border[place]) continue;
-            const glm::dvec3 p = position(place);
+            const glm::dvec3 p = positions[place];
             const Cell cell = cell_of(p);
             Index nearest = place;
             double distance = gap;
@@ -170,7 +182,7 @@ private:
                 const auto there = kept.find(Cell{cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1});
                 if (there == kept.end()) continue;
                 for (const Index other : there->second) {
-                    const double d = glm::distance(p, position(other));
+                    const double d = glm::distance(p, positions[other]);
                     if (!(d <= distance) || uses.contains(std::minmax(place, other))) continue;
                     nearest = other;
                     distance = d;
@@ -179,12 +191,7 @@ private:
             target[place] = nearest;
             if (nearest == place) kept[cell].push_back(place);
         }
-        for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
-            const Index place = places.of_vertex[v];
-            if (target[place] == place) continue;
-            mesh_.positions[v] = position(target[place]);
-            ++report_.moved_vertices;
-        }
+        return target;
     }
 
     // Those with three places, which surfaces are made of.

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
@@ -128,7 +129,7 @@ private:
         step_from(node, step);
         return step;
     }
-    // Of an interior node of the part.
+    // Precondition: an interior node of the part.
     Step step_of(NodeId node) const { return is_top_ ? step_from(node) : steps_[node - part_.begin]; }
 
     // A triangle with all three corners in the part. A step that comes too late, for two corners have met, may use the
@@ -209,7 +210,7 @@ private:
             c.current[k] = false;
             c.next[k] = never;
             if (!is_top_ || !in_.parts.is_top(0)) continue;
-            // Of the nodes above the other parts, the first is looked for.
+            // Finds the first of the nodes above the other parts.
             c.above[k] = ancestors_.lowest(c.above[k], [&](NodeId node) { return in_.parts.is_top(node); });
             c.next[k] = in_.shape.made[c.above[k]];
         }

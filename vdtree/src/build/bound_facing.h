@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include <unseen/vdtree/internal/normal_mask.h>
+
 #include "build/bound_spheres.h"
 #include "build/parallel_array.h"
 #include "tree/directions.h"

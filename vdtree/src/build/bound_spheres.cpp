@@ -21,8 +21,8 @@ constexpr Index most_measured_leaves = 4096;
 // So many leaves are looked at one by one sooner than their nodes.
 constexpr Index few_leaves = 12;
 
-// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the
-// spheres of children add is more.
+// Share of the radius: spheres that stick out by less do not move the centre any more. A smaller share would not pay,
+// because the spheres of children add more.
 constexpr double node_slack = 1e-3;
 
 // Bounds the nodes of a part, children first, several at a time. Leaves are seen as points, interior children as their

@@ -22,9 +22,9 @@ namespace {
 
 // A point counts as contained up to this share of the radius, so that rounding does not change the basis for ever.
 constexpr double containment_slack = 1e-12;
-// The growth of a basis is given up after so many rounds, far more than it takes; the radius is then what it has to be.
+// A basis stops growing after this many rounds, far more than needed; the radius then grows to contain everything.
 constexpr int most_rounds = 64;
-// Of the product of lengths: points flatter than this have no circumsphere worth calling so.
+// Share of the product of lengths: flatter points have no meaningful circumsphere.
 constexpr double least_flatness = 1e-14;
 
 double squared(glm::dvec3 v) { return glm::dot(v, v); }
@@ -55,7 +55,7 @@ public:
         }
     }
 
-    // Of what is on the sphere, which is the smallest around it; with no points, a single ball.
+    // `points`: on the sphere, which is the smallest around them. Without points: a single ball.
     Basis(std::span<const glm::dvec3> points, const DSphere& sphere)
         : count_(static_cast<int>(points.size())), sphere_(sphere) {
         std::copy(points.begin(), points.end(), points_.begin());
@@ -274,7 +274,7 @@ struct Sets {
     std::span<const BallRow> spheres;
 };
 
-// Of each lane, what reaches farthest from somewhere.
+// The ball of each lane that reaches farthest from a place.
 struct FarthestOfLanes {
     BallRow ball;      // the first point of those that are farthest, or a sphere that reaches farther
     Lane squared;      // the distance of that point

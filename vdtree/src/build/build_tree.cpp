@@ -21,6 +21,7 @@
 #include "build/place_proxies.h"
 #include "build/surface.h"
 #include "tree/mask_pool.h"
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
@@ -37,7 +38,7 @@ constexpr double clustering_begins = 0.1, clustering_ends = 0.7;
 // Positions beyond this, relative to the origin, leave no room for spheres around them in floats.
 constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
 
-// Of a mesh, mesh units: floats, which end at 1.4e-45, place what is smaller more coarsely than what is larger.
+// The smallest size of a mesh, in mesh units: floats end at 1.4e-45 and would place smaller meshes too coarsely.
 constexpr double smallest_size = 1e-36;
 
 // Places that doubles tell apart along the mesh, at least: fewer, far away from the origin, leave no surface.

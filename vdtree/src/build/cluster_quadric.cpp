@@ -21,7 +21,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/team.h>
+#include <unseen/vdtree/internal/team.h>
 
 #include "build/help_cluster.h"
 #include "build/progress_counter.h"
@@ -34,9 +34,9 @@ namespace unseen::vdtree {
 
 namespace {
 
-// A part has at most so many welded vertices. Its quadrics then fit a core's cache.
+// Largest number of welded vertices in a part, so that its quadrics fit a core's cache.
 constexpr Index largest_part = 1 << 15;
-// Parts, and joined parts, are contracted to at most so many clusters: one in 32 of a full part. Few enough that
+// Parts, and joined parts, are contracted to at most this many clusters: one in 32 of a full part. Few enough that
 // joining costs next to nothing, many enough that those along the border of the part, which had fewer partners to
 // choose from, are a small share.
 constexpr Index part_target = largest_part / 32;
@@ -57,7 +57,7 @@ constexpr double largest_value = 1e3;
 
 // ---- numbering of the welded vertices by space
 
-// Where part i of so many begins.
+// The begin of part `part` of `parts`.
 Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
     return static_cast<Index>(static_cast<std::uint64_t>(part) * slots / parts);
 }
@@ -183,7 +183,7 @@ struct Members {
     std::size_t rank() const { return team ? static_cast<std::size_t>(team->rank()) : 0; }
     bool has_part() const { return rank() < count(); } // there may be more members than parts
     std::size_t first_part(std::size_t member) const { return member * parts / count(); }
-    // Of node `i` of the level of so many of the kd-tree: the member that has its first part.
+    // The member that has the first part of node `i` of a level of the kd-tree with `level` nodes.
     std::size_t owner(std::size_t i, std::size_t level) const {
         return ((i * (parts / level) + 1) * count() - 1) / parts;
     }

@@ -27,7 +27,7 @@ struct ClusterPlace {
 
 constexpr Index never = std::numeric_limits<Index>::max();
 
-// Parents lie anywhere: they are asked for so many clusters before they are needed.
+// Parents lie anywhere in memory: prefetch them this many clusters ahead.
 constexpr Index ahead = 16;
 
 } // namespace
@@ -188,7 +188,7 @@ void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes,
         const Index a = nodes.leaf_of_vertex[t[0]], b = nodes.leaf_of_vertex[t[1]], c = nodes.leaf_of_vertex[t[2]];
         low[i] = std::min({a, b, c});
         high[i] = std::max({a, b, c});
-        // Of three leaves, the middle one merges first with another.
+        // The middle one of three leaves merges first with another.
         at[i] = shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low[i] ^ high[i])];
         left[i] = static_cast<std::uint8_t>(i);
     }

@@ -14,7 +14,7 @@ namespace {
 // Every vertex counts a little, so that vertices without an area have a mean too: share of the largest vertex area.
 constexpr double least_weight = 1e-6;
 
-// Sources lie anywhere: they are asked for so many leaves before they are needed.
+// Sources lie anywhere in memory: prefetch them this many leaves ahead.
 constexpr Index ahead = 16;
 
 // Weighted sums of positions and normals, and their weight.

@@ -38,7 +38,7 @@ constexpr double least_weight = 1e-6; // share of the largest vertex area
 // A round that contracts a smaller share of the clusters takes other than mutually best pairs too: errors that grow
 // along a chain would otherwise contract one pair a round.
 constexpr std::size_t least_round_share = 16; // one in so many
-// Clusters that no edge reaches are paired with so many neighbours each way along a Morton curve.
+// Clusters that no edge reaches are paired with this many neighbours each way along a Morton curve.
 constexpr std::size_t curve_neighbours = 3;
 
 // Rounds in which a component that is released becomes a single vertex and is taken up by a neighbour.
@@ -365,8 +365,7 @@ private:
         return x;
     }
 
-    // Of two held components that are each other's nearest, one is released, and so is each that is near something
-    // larger.
+    // Releases one of two held components that are each other's nearest, and each that is near something larger.
     void release_components() {
         const Index count = static_cast<Index>(live_.size());
         bool any = false;
@@ -517,7 +516,7 @@ private:
         return gap_weight * (a * b / (a + b)) * glm::dot(d, d);
     }
 
-    // Of pairs whose clusters are what they were in the last round, the error is known.
+    // Keeps the errors of pairs whose clusters have not changed since the last round.
     void update_errors(std::size_t first) {
         pair_errors_.resize(c_.pairs.size(), unknown_error);
         unknown_.clear();
@@ -796,8 +795,8 @@ private:
         Index cluster;
         float error;
     };
-    // By cluster: its number after the round, and whether it was made in it. (Never so many clusters are live that they
-    // need the bit.)
+    // By cluster: its number after the round, and whether it was made in it. (Live clusters are too
+    // few to need the bit.)
     static constexpr Index is_new = Index{1} << 31;
     std::vector<Index> new_number_, start_, marks_;
     std::vector<Partner> partners_;

@@ -45,7 +45,7 @@ struct LiveClusters {
     std::vector<glm::dvec3> places;
     std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
     std::vector<float> deviations; // by cluster, see Contraction
-    // Merges, known by the cluster that they joined; no_merge where there is none. `made_by`: the one that made the
+    // Merges, known by the cluster that they joined; or no_merge. `made_by`: the one that made the
     // cluster. `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that
     // were joined across gaps, of the part that is to stay longest.
     std::vector<Index> made_by, vanishing;

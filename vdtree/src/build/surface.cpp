@@ -140,7 +140,7 @@ public:
     Triangle of(const Triangle& t) const {
         return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t;
     }
-    // Of triangles that use no vertex twice.
+    // Precondition: the triangle uses no vertex twice.
     bool degenerates(const Triangle& t) const {
         if (!any_) return false;
         const Triangle w = of(t);
@@ -159,7 +159,7 @@ struct VertexRange {
     bool has(std::size_t v) const { return v - begin < size(); }
 };
 
-// Of a triangle at a place: the other corners, as they follow it and precede it.
+// The other corners of a triangle at a place: the following and the preceding one.
 struct Wedge {
     Index following, preceding;
 };

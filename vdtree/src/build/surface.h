@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/mesh.h>
-#include <unseen/vdtree/team.h>
 
 namespace unseen::vdtree {
 

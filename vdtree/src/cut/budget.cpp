@@ -22,10 +22,10 @@ namespace {
 constexpr unsigned bucket_shift = 19;
 constexpr std::size_t bucket_count = (0x7f800000u >> bucket_shift) + 1; // infinity's is the last
 
-// The threshold is guessed from so many nodes of all trees together, so that the triangles of those that unfold are
-// found to a few percent.
+// The threshold is guessed from this many nodes of all trees together, which gives the number of triangles to a few
+// percent.
 constexpr std::size_t samples = 6144;
-// A guess leaves room for so many standard deviations of what it is a guess of, and for a share besides.
+// A guess leaves room for this many of its standard deviations, and for a share besides.
 constexpr double guess_deviations = 2.5, guess_share = 0.01;
 // Decisions and costs are rounded differently: a dozen roundings of floats.
 constexpr float decision_rounding = 1e-5f;
@@ -93,7 +93,7 @@ private:
 
     // ---- a guess
 
-    // Of nodes that nest, a node unfolds whatever the others do; so a sample of all tells what unfolds at a threshold.
+    // Nodes nest, so each unfolds whatever the others do: a sample tells how many unfold at a threshold.
     float guess() {
         std::size_t nodes = 0;
         for (const VertexTree* tree : trees_) nodes += tree->interior_count();
@@ -128,7 +128,7 @@ private:
         TreeDecider decider;
         bool is_damaged = false;
         far_bucket_ = bucket_of(threshold / far_factor);
-        // What would unfold as an outline, but did not, is none.
+        // A node that would unfold as an outline, but did not, is not an outline.
         const float unfolding = threshold * (1 + decision_rounding);
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
             const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) {

@@ -7,8 +7,8 @@
 
 #include "cut/budget.h"
 #include "cut/cut_follower.h"
+#include "cut/cut_state.h"
 #include "cut/decide_tree.h"
-#include "cut/state.h"
 #include "tree/unchecked_links.h"
 #include <unseen/vdtree/internal/finite.h>
 
@@ -20,8 +20,7 @@ namespace {
 // first-level cache.
 constexpr std::size_t batch_size = 1024;
 
-// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is
-// infinite.
+// Costs of the caller's own criterion: 0 for invisible nodes; NaN counts as infinite.
 class CallbackCosts final : public CostSource {
 public:
     CallbackCosts(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
@@ -50,16 +49,16 @@ private:
             tests_ += nodes.size();
             return;
         }
-        seen_.assign(nodes.size(), Visibility::partly);
+        seen_.assign(nodes.size(), RingVisibility::partly);
         visibility_(tree_, nodes, seen_);
         visible_.clear();
         for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (seen_[i] != Visibility::out) visible_.push_back(nodes[i]);
+            if (seen_[i] != RingVisibility::out) visible_.push_back(nodes[i]);
         visible_costs_.assign(visible_.size(), 0.0f);
         criterion_(tree_, visible_, visible_costs_);
         tests_ += visible_.size();
         for (std::size_t i = 0, j = 0; i < nodes.size(); ++i)
-            if (seen_[i] != Visibility::out) costs[i] = visible_costs_[j++];
+            if (seen_[i] != RingVisibility::out) costs[i] = visible_costs_[j++];
     }
 
     const VertexTree& tree_;
@@ -67,7 +66,7 @@ private:
     const VisibilityTest& visibility_;
     mutable std::vector<float> visible_costs_; // scratch
     mutable std::vector<NodeId> visible_;
-    mutable std::vector<Visibility> seen_;
+    mutable std::vector<RingVisibility> seen_;
     mutable std::uint64_t tests_ = 0;
 };
 

@@ -8,10 +8,10 @@
 
 #include <unseen/vdtree/cut.h>
 
+#include "cut/cut_settler.h"
+#include "cut/cut_state.h"
 #include "cut/decide_tree.h"
 #include "cut/kernel/fold_tester.h"
-#include "cut/settle.h"
-#include "cut/state.h"
 
 namespace unseen::vdtree {
 

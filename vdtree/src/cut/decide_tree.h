@@ -47,7 +47,7 @@ public:
     }
 
 private:
-    // The piece by its bits. Nobody could foretell these, so nothing branches on them; likewise below.
+    // The piece by its bits. They are unpredictable, so branch-free; likewise below.
     void part() {
         unfolding_.resize(piece_.size());
         folded_.resize(piece_.size());

@@ -16,7 +16,7 @@ namespace {
 constexpr double depth_rounding = 1e-5;
 // Pixels around what a node covers: outlines move by less than a pixel without being seen.
 constexpr int margin_px = 1;
-// A question looks at so many texels along each axis at most.
+// A query reads at most this many texels along each axis.
 constexpr int texels_a_side = 3;
 int to_pixel(double px, int size) {
     return static_cast<int>(std::clamp(std::floor(px), -1.0, static_cast<double>(size)));

@@ -1,4 +1,4 @@
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 
 #include <algorithm>
 #include <atomic>
@@ -10,9 +10,9 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "cut/kernel/fold_kernel.h"
 #include "cut/orthographic.h"
@@ -190,7 +190,7 @@ Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Part
 
 namespace {
 
-// Of an orthographic window, whose sides are parallel to the line of sight.
+// The sides of an orthographic window are parallel to the line of sight.
 Frustum orthographic_frustum(const VertexTree& tree, const View& view, const Similarity& placement) {
     const CameraFrame frame = camera_frame(view);
     const double half_up = *view.orthographic_height / 2 / placement.scale,

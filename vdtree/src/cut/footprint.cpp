@@ -1,4 +1,4 @@
-#include <unseen/vdtree/footprint.h>
+#include <unseen/vdtree/depth_picture.h>
 
 #include <algorithm>
 #include <cmath>

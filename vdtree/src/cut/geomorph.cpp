@@ -12,7 +12,7 @@
 
 #include <glm/common.hpp>
 
-#include "cut/state.h"
+#include "cut/cut_state.h"
 #include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {

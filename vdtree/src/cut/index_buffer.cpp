@@ -30,8 +30,7 @@ void IndexBuffer::find_leaves(std::span<const std::uint64_t> unfolded, Index tri
     const auto corners = links.triangles;
     shown_by_.resize(unfolded.size()); // by none before the first time
     places_.resize(unfolded.size() + 1);
-    // First which triangles come: most nodes have two or less, and nobody could foretell how many, so nothing branches
-    // on that.
+    // First the triangles that come. Most nodes have at most two; their number is unpredictable, so branch-free.
     constexpr Index mostly = 2;
     coming_.resize(std::size_t{triangles} + mostly);
     runs_.clear();
@@ -194,7 +193,7 @@ void IndexBuffer::append(NodeId node, Entry entry) {
     ++entries(block)->leaf;
 }
 
-// Of nodes that fold has taken the list of, nothing is left to remove.
+// Does nothing for nodes whose list a fold has taken.
 void IndexBuffer::remove(NodeId node, Index corner) {
     const Block block = block_of_node_[node];
     const auto shown = list(block);
@@ -246,7 +245,7 @@ void IndexBuffer::give(NodeId node, std::span<const Entry> shown) {
     block_of_node_[node] = block;
 }
 
-// Nobody could foretell which triangles vanish, and which corners are whose: nothing branches on that, here and below.
+// Which triangles vanish, and which corners are whose, is unpredictable: branch-free, here and below.
 void IndexBuffer::fold(NodeId node, std::span<const NodeId> children) {
     std::size_t most = 0;
     for (const NodeId child : children) most += list(block_of_node_[child]).size();

@@ -87,8 +87,8 @@ private:
     std::vector<Index> holes_;           // triangles without corners
     std::vector<IndexWrite>
         removals_; // what such triangles showed, still in its list until all of these are done at once
-    // Of the last gathering: the leaves at the corners, in the buffer's order, the nodes whose triangles these are, a
-    // bit each, and where the triangles of each word of them begin.
+    // From the last gathering: the leaves at the corners, in the buffer's order; the nodes whose triangles these are, one
+    // bit each; and where the triangles of each word of these begin.
     std::vector<Triangle> leaves_;
     std::vector<std::uint64_t> shown_by_;
     std::vector<Index> places_;

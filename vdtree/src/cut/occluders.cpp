@@ -1,7 +1,7 @@
 // A grid over the mesh: the cells that the surface touches, the others parted into connected rooms, each of which lies
 // inside or outside as a whole. Then every inner cell's distance from the nearest cell that is not, and the largest
 // spheres that lie apart.
-#include <unseen/vdtree/occluders.h>
+#include <unseen/vdtree/criteria.h>
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ constexpr int border = 2; // free cells around the mesh
 // Columns are counted through points a little off their middles, in cells: meshes are often made on grids, and a line
 // through an edge counts nothing.
 constexpr double off_middle_y = 0.0131, off_middle_z = -0.0217;
-// A room lies inside where so many of its columns say so. (All should; a line may pass through an edge.)
+// A room lies inside if this share of its columns says so. (All should, but a line may pass through an edge.)
 constexpr double most_of_a_room = 0.9;
 constexpr int least_radius = 1; // cells
 // Spheres whose middles lie in a larger one, or nearly, hide little more.
@@ -149,13 +149,13 @@ private:
         }
     }
 
-    // Of the cells' middles from the nearest cell that is not an inner one, squared, in half cells: the squares add up
-    // axis by axis.
+    // Squared distances of the cells' middles from the nearest cell that is not an inner one, in half cells. The squares
+    // add up axis by axis.
     void find_distances(const std::vector<std::uint8_t>& is_inner) {
         squared_.resize(is_inner.size());
         for (std::size_t row = 0; row < is_inner.size(); row += side()) {
             const auto sweep = [&](auto at) {
-                std::int32_t cells = 0; // since the last that is no inner one; the grid's border is none
+                std::int32_t cells = 0; // since the last cell that is not an inner one, such as the grid's border
                 for (std::size_t x = 0; x < side(); ++x) {
                     cells = is_inner[row + at(x)] ? cells + 1 : 0;
                     const std::int32_t way = std::max(2 * cells - 1, 0);
@@ -171,7 +171,7 @@ private:
         for (std::size_t i = 0; i < side(); ++i) join_rows(i * side(), side() * side());
     }
 
-    // Of rows along x that begin at equal steps. From each row outwards, until no row is near enough to change anything.
+    // Joins rows along x that begin at equal steps: from each row outwards, until no row is near enough to matter.
     void join_rows(std::size_t first, std::size_t step) {
         std::vector<std::int32_t> before(side() * side());
         for (std::size_t row = 0; row < side(); ++row)

@@ -10,9 +10,9 @@
 
 namespace unseen::vdtree {
 
-// Of the eye that stands for the view, from the tree's far side, in heights of the window. Larger makes sizes more alike
-// over the tree's depth and the spread's share of them less: both keep a thousandth more of a tree that fills the window.
-// Smaller leaves floats more digits for what lies at the window's edge.
+// Distance from the tree's far side to the eye that replaces the view, in heights of the window. A larger one makes sizes
+// more alike over the tree's depth and the spread's share of them smaller: both keep a thousandth more of a tree that
+// fills the window. A smaller one leaves floats more digits at the window's edge.
 inline constexpr double orthographic_distance = 2000;
 
 // Around all that a tree shows in any cut; its own frame.

@@ -12,9 +12,9 @@
 
 namespace unseen::vdtree {
 
-// A deadline for every slot of every block, and the earliest ones of each block: of the slots whose verdict is that
-// they unfold, and of the others. The clock starts at 0; deadlines are what it may run to, and are infinite where there
-// are none. What is not in use has no blocks.
+// A deadline for every slot of every block, and the earliest ones of each block: of the slots whose verdict is to unfold,
+// and of the others. The clock starts at 0 and may run to the deadline, which may be infinite. An unused clock has no
+// blocks.
 class SideDeadlines {
 public:
     static constexpr float never = std::numeric_limits<float>::infinity();

@@ -1,4 +1,4 @@
-#include <unseen/vdtree/baked_light.h>
+#include <unseen/vdtree/internal/baked_light.h>
 
 #include <algorithm>
 #include <bitset>
@@ -9,6 +9,9 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/normal_mask.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/lighting.h>
 
 namespace unseen::vdtree {

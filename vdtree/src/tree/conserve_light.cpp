@@ -1,4 +1,4 @@
-#include <unseen/vdtree/conserve_light.h>
+#include <unseen/vdtree/internal/conserve_light.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Of the area around a proxy that must face the same way; where less does, its luminance has no sure effect.
+// Share of the area around a proxy that must face the same way; with less, its luminance has no sure effect.
 constexpr float least_facing = 0.2f;
 
 class Conservation {

@@ -12,7 +12,7 @@ namespace {
 constexpr float units = 127;    // of NormalSlabs in 1
 constexpr float margin = 2e-4f; // units; covers the rounding of unit vectors in floats, here and in what checks them
 
-// The slabs' axes, as NormalSlabs has them; the last one is none.
+// The slabs' axes, in the order of NormalSlabs; the last one is unused.
 constexpr float s = 0.57735026918962576f;
 constexpr Float8 axis_x = {1, 0, 0, s, -s, s, s, 0};
 constexpr Float8 axis_y = {0, 1, 0, s, s, -s, s, 0};

@@ -11,7 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 namespace unseen::vdtree {
 
@@ -105,7 +105,7 @@ struct alignas(64) Directions {
         return out;
     }
 
-    // A mark that unions keep, for whoever collects directions to have one fact more with them.
+    // A mark that unions keep: one more fact for the code that collects directions.
     void mark(bool marked) noexcept { reach[mark_byte] = marked ? 1 : 0; }
     bool marked() const noexcept { return reach[mark_byte] != 0; }
 

@@ -11,6 +11,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 
@@ -18,7 +19,7 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Nodes with at most so many leaves look at each normal; larger ones at their children's cones.
+// Nodes with at most this many leaves use each normal; larger ones use their children's cones.
 constexpr Index looked_at_each = 32;
 constexpr float widest_box = 1; // radians; beyond, a cone holds little that its box does not
 // Radians: normals and axes in floats, and the angle's own way there.

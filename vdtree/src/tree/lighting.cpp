@@ -8,6 +8,7 @@
 
 #include "tree/unchecked_links.h"
 #include "tree/unit_vector.h"
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/spot_share.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <utility>
 
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {

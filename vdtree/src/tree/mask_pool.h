@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "tree/directions.h"

@@ -29,7 +29,7 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l);
 
 class NodeChecks {
 public:
-    // Of a file's arrays, which are to stay where they are.
+    // Checks the arrays of a file, which must stay in place.
     NodeChecks(const TreeGeometry& g, const TreeLuminance& l);
 
     // Whether the links of an interior node and the values of its children can be used. Looks at them the first time.

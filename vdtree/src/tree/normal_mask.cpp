@@ -1,4 +1,4 @@
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include <unseen/vdtree/packed.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // Pyramids of the least, the largest and the mean luminance of textures.
-#include <unseen/vdtree/texture.h>
+#include <unseen/vdtree/mesh.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +9,7 @@
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 
 namespace unseen::vdtree {
 
@@ -27,9 +28,9 @@ const std::array<double, 256>& linear_of_code() {
 constexpr double placing_slack = 1.0 / 64;    // texels
 constexpr double float_slack = 4e-7;          // of a coordinate: a few roundings of its float on the way to the texel
 constexpr double decoding_slack = 1.0 / 4096; // of a luminance, and of 1/16 at least
-// Ranges are looked up in boxes of up to so many cells a side: less than a seventh of it is looked up too much.
+// Ranges are looked up in boxes of up to this many cells a side, which exceed the asked box by less than a seventh.
 constexpr std::int64_t most_cells = 16;
-// Beyond, a coordinate in float has no texel of its own any more.
+// Beyond this, floats cannot tell texels apart.
 constexpr double farthest_coordinate = 1 << 23; // texels
 
 Unorm16 rounded_down(double y) {

@@ -1,6 +1,7 @@
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 
 #include <algorithm>
 #include <cmath>

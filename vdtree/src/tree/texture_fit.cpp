@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 
 namespace unseen::vdtree {
 

@@ -7,7 +7,9 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
@@ -139,7 +141,7 @@ private:
         }
     }
 
-    // Of the texture over the box of these vertices, and of what it is multiplied with there.
+    // Luminance ranges of the texture over the box of these vertices, and of the vertices themselves.
     PackedRange texture_of(std::initializer_list<NodeId> nodes) const {
         UvBox box;
         for (const NodeId node : nodes) box.include(g_.uvs[node]);

@@ -10,6 +10,7 @@
 
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/packed_range.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/tree_parts.h>
@@ -36,8 +37,8 @@ PackedRange shortened(PackedRange ring, PackedRange spread) {
     return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
 }
 
-// By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double
-// against overflow at extreme scales. And the luminance of all corners.
+// By leaf: the luminance of the triangles around it (of itself without any), and a third of their area, in double against
+// overflow at extreme scales. And the luminance of all corners.
 struct LeafSurroundings {
     std::vector<PackedRange> ring;
     std::vector<double> areas;
@@ -160,6 +161,77 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
     return std::max(0.0f, std::min(1.0f, albedo * lit));
 }
 
+// Luminances and their ranges of interior nodes, from those of their children.
+struct InteriorShader {
+    const TreeGeometry& g;
+    const TreeLinks& tree;
+    const Shades& shades;
+    const LeafSurroundings& leaf;
+    const RunningSums& sums;
+    std::span<const std::uint8_t> moves_texture; // by node; empty without a texture
+    bool has_given;                              // luminances of proxies are the caller's
+    LuminanceArrays<Vector>& out;
+    std::vector<PackedRange>& of_vertices; // the rings' ranges without the texture; empty without one
+
+    struct Ranges {
+        PackedRange support = empty_range, ring = empty_range;
+        // Rings of coincident children, which may be several nodes deep, as they are stored: shortened.
+        PackedRange shortened_rings = empty_range, shortened_vertices = empty_range;
+        Unorm16 adaptation;
+    };
+
+    Ranges collect(NodeId node) const {
+        const bool textured = !of_vertices.empty();
+        Ranges all;
+        tree.for_each_child(
+            node,
+            [&](NodeId child) {
+                all.support = unite(all.support, out.support_range[child]);
+                all.ring = unite(all.ring, textured ? of_vertices[child] : out.ring_range[child]);
+                if (is_coincident(g, child)) { // its ring_range is narrower than its ring
+                    for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l)
+                        all.ring = unite(all.ring, leaf.ring[l]);
+                    all.shortened_rings = unite(all.shortened_rings, out.ring_range[child]);
+                    if (textured) all.shortened_vertices = unite(all.shortened_vertices, of_vertices[child]);
+                }
+                all.adaptation = std::max(all.adaptation, out.adaptation[child]);
+            },
+            [&](Index l) {
+                all.support = unite(all.support, out.luminance[tree.interior() + l]);
+                all.ring = unite(all.ring, leaf.ring[l]);
+            });
+        return all;
+    }
+
+    void operator()(NodeId node) const {
+        const bool textured = !of_vertices.empty();
+        auto [support, ring, shortened_rings, shortened_vertices, adaptation] = collect(node);
+        // The mean lies within the leaves' range except for rounding.
+        const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
+        const Unorm16 y = has_given ? out.luminance[node]
+                                    : std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
+        out.luminance[node] = y;
+        support = unite(support, y);
+        ring = unite(ring, shades[node]);
+        if (is_coincident(g, node) && !(textured && moves_texture[node])) {
+            // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The contrast
+            // of that is largest on the ring's darkest luminance.
+            ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
+            ring = unite(ring, textured ? shortened_vertices : shortened_rings);
+        }
+        out.support_range[node] = support;
+        if (textured) {
+            of_vertices[node] = ring;
+            PackedRange texture = g.ring_texture[node];
+            if (is_coincident(g, node) && !moves_texture[node])
+                texture.lo = texture.hi; // the brightest shows the spread best
+            ring = unite(product(ring, texture), shortened_rings);
+        }
+        out.ring_range[node] = ring;
+        out.adaptation[node] = std::max(adaptation, middle(ring));
+    }
+};
+
 TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit,
                                bool textured, const FunctionRef<float(NodeId)>* given) {
     textured = textured && !g.texels.empty();
@@ -178,66 +250,20 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
     const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
 
-    std::vector<PackedRange> of_vertices(textured ? interior : 0); // the rings, without the texture
+    std::vector<PackedRange> of_vertices(textured ? interior : 0);
     const std::vector<std::uint8_t> moves_texture =
         textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
-    parts.bottom_up([&] {
-        return [&](NodeId node) {
-            PackedRange support = empty_range, ring = empty_range;
-            // Of children at one point, as they are: what floats round to one point, may be several nodes deep.
-            PackedRange shortened_rings = empty_range, shortened_vertices = empty_range;
-            Unorm16 adaptation;
-            tree.for_each_child(
-                node,
-                [&](NodeId child) {
-                    support = unite(support, out.support_range[child]);
-                    ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
-                    if (is_coincident(g, child)) { // its ring_range is narrower than its ring
-                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l)
-                            ring = unite(ring, leaf.ring[l]);
-                        shortened_rings = unite(shortened_rings, out.ring_range[child]);
-                        if (textured) shortened_vertices = unite(shortened_vertices, of_vertices[child]);
-                    }
-                    adaptation = std::max(adaptation, out.adaptation[child]);
-                },
-                [&](Index l) {
-                    support = unite(support, out.luminance[interior + l]);
-                    ring = unite(ring, leaf.ring[l]);
-                });
-            // The mean lies within the leaves' range but for rounding.
-            const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
-            const Unorm16 y = given ? out.luminance[node]
-                                    : std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
-            out.luminance[node] = y;
-            support = unite(support, y);
-            ring = unite(ring, shades[node]);
-            if (is_coincident(g, node) && !(textured && moves_texture[node])) {
-                // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
-                // contrast of that is largest on the ring's darkest luminance.
-                ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
-                ring = unite(ring, textured ? shortened_vertices : shortened_rings);
-            }
-            out.support_range[node] = support;
-            if (textured) {
-                of_vertices[node] = ring;
-                PackedRange texture = g.ring_texture[node];
-                if (is_coincident(g, node) && !moves_texture[node])
-                    texture.lo = texture.hi; // the brightest shows the spread best
-                ring = unite(product(ring, texture), shortened_rings);
-            }
-            out.ring_range[node] = ring;
-            out.adaptation[node] = std::max(adaptation, middle(ring));
-        };
-    });
+    const InteriorShader shade{g, tree, shades, leaf, sums, moves_texture, given != nullptr, out, of_vertices};
+    parts.bottom_up([&] { return [&](NodeId node) { shade(node); }; });
+
     PackedRange drawn = leaf.corners;
     if (given && interior > 0) drawn = unite(drawn, out.support_range[VertexTree::root()]); // proxies may go beyond
-    TreeLuminance done{
+    return {
         {std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range), std::move(out.adaptation)},
         light,
         prelit,
         textured,
         textured ? product(drawn, g.ring_texture[VertexTree::root()]) : drawn};
-    return done;
 }
 
 TreeLuminance copy_of(const TreeLuminance& light) {

@@ -24,7 +24,7 @@ constexpr double largest_shift = 1e3;
 
 // How far entries of a client's matrices, which mostly were floats, may be off: shares of the largest.
 constexpr double matrix_rounding = 1e-4;
-// Of the sides of pixels that are taken for square; floats are good to a hundredth of that.
+// Pixels count as square if their sides differ by less than this share; floats are a hundred times more exact.
 constexpr double pixel_rounding = 1e-5;
 // Below this share of the largest entry, one that must not be 0 is.
 constexpr double least_share = 1e-12;

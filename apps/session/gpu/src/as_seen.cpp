@@ -5,7 +5,7 @@
 #include <utility>
 
 #include <unseen/perception/motion.h>
-#include <unseen/render/depth.h>
+#include <unseen/render/internal/depth.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 

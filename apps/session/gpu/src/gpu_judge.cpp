@@ -1,7 +1,12 @@
 #include <unseen/session_gpu/gpu_judge.h>
 
 #include <algorithm>
+#include <optional>
 #include <string>
+#include <utility>
+
+#include <unseen/render/internal/visibility_passes.h>
+#include <unseen/session_gpu/internal/pass_tables.h>
 
 namespace unseen::session {
 namespace {
@@ -67,59 +72,77 @@ render::ElevationTables elevation_tables(const perception::Rpg99Tables& t) {
             .log2_csf = t.log2_csf};
 }
 
+struct GpuJudge::Impl {
+    render::Context context;
+    render::VisibilityPasses passes;
+    int width, height;
+    std::optional<render::LuminanceImage> test; // made for the first uploaded picture
+};
+
+GpuJudge::GpuJudge(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+GpuJudge::GpuJudge(GpuJudge&&) noexcept = default;
+GpuJudge& GpuJudge::operator=(GpuJudge&&) noexcept = default;
+GpuJudge::~GpuJudge() = default;
+
 Result<GpuJudge> GpuJudge::create(const render::Context& context, const perception::Image& reference,
-                                  const perception::JudgeOptions& options, render::VisibilityPrecision precision) {
+                                  const perception::JudgeOptions& options) {
     const auto uploaded = upload(context, reference, "reference");
     if (!uploaded) return uploaded.error();
-    return create(context, uploaded->texture(), options, precision);
+    return create(context, uploaded->texture(), options);
 }
 
 Result<GpuJudge> GpuJudge::create(const render::Context& context, const render::LuminanceTexture& reference,
-                                  const perception::JudgeOptions& options, render::VisibilityPrecision precision) {
+                                  const perception::JudgeOptions& options) {
     const auto extent = render::luminance_extent(context, reference, "reference");
     if (!extent) return extent.error();
     const auto tables =
         perception::judge_tables(reference.width, reference.height, extent->least, extent->largest, options);
     if (!tables) return tables.error();
-    auto passes = render::VisibilityPasses::create(context, visibility_tables(*tables), reference, precision);
+    auto passes = render::VisibilityPasses::create(context, visibility_tables(*tables), reference);
     if (!passes) return passes.error();
-    return GpuJudge(context, std::move(*passes), reference.width, reference.height);
+    return GpuJudge(
+        std::make_unique<Impl>(Impl{context, std::move(*passes), reference.width, reference.height, std::nullopt}));
 }
 
-Result<perception::Judgement> GpuJudge::judge(const perception::Image& test) {
-    if (auto ok = check_shape(test, "test"); !ok) return ok.error();
-    if (test.width != width_ || test.height != height_ || !test_) { // another size is an error of the passes'
-        auto uploaded = upload(context_, test, "test");
+Result<perception::Judgement> GpuJudge::judge(const perception::Image& image) {
+    if (auto ok = check_shape(image, "test"); !ok) return ok.error();
+    auto& test = impl_->test;
+    if (image.width != impl_->width || image.height != impl_->height || !test) { // the passes refuse another size
+        auto uploaded = upload(impl_->context, image, "test");
         if (!uploaded) return uploaded.error();
-        test_ = std::move(*uploaded);
-    } else if (auto ok = test_->set(test.values); !ok) {
+        test = std::move(*uploaded);
+    } else if (auto ok = test->set(image.values); !ok) {
         return ok.error();
     }
-    const auto summary = judge(test_->texture());
+    const auto summary = judge(test->texture());
     if (!summary) {
-        test_.reset();
+        test.reset();
         return summary.error();
     }
-    auto visibility = passes_.read_visibility();
+    auto visibility = impl_->passes.read_visibility();
     if (!visibility) return visibility.error();
     perception::Judgement judgement;
     judgement.pixels = visibility->size();
     judgement.visible_pixels = summary->visible_pixels;
     judgement.max_ratio = summary->largest;
-    judgement.visibility = {width_, height_, 1, std::move(*visibility)};
+    judgement.visibility = {impl_->width, impl_->height, 1, std::move(*visibility)};
     return judgement;
 }
 
-Result<render::VisibilitySummary> GpuJudge::judge(const render::LuminanceTexture& test) {
-    if (auto judged = passes_.judge(test); !judged) return judged.error();
-    return passes_.summary();
+Result<GpuJudge::Summary> GpuJudge::judge(const render::LuminanceTexture& test) {
+    if (auto judged = impl_->passes.judge(test); !judged) return judged.error();
+    const auto summary = impl_->passes.summary();
+    if (!summary) return summary.error();
+    return Summary{summary->largest, summary->visible_pixels};
 }
 
 Result<perception::Image> GpuJudge::threshold_map() {
-    if (auto mapped = passes_.map_thresholds(); !mapped) return mapped.error();
-    auto thresholds = passes_.read_thresholds();
+    if (auto mapped = impl_->passes.map_thresholds(); !mapped) return mapped.error();
+    auto thresholds = impl_->passes.read_thresholds();
     if (!thresholds) return thresholds.error();
-    return perception::Image{width_, height_, 1, std::move(*thresholds)};
+    return perception::Image{impl_->width, impl_->height, 1, std::move(*thresholds)};
 }
+
+render::VisibilityPasses& GpuJudge::passes() noexcept { return impl_->passes; }
 
 } // namespace unseen::session

@@ -13,14 +13,17 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/judge_tables.h>
-#include <unseen/render/difference_count.h>
-#include <unseen/render/elevation.h>
-#include <unseen/render/gpu_tree.h>
+#include <unseen/render/draw.h>
+#include <unseen/render/internal/difference_count.h>
+#include <unseen/render/internal/elevation.h>
+#include <unseen/render/internal/layers.h>
+#include <unseen/render/internal/stage_times.h>
+#include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/shadows.h>
-#include <unseen/render/stage_times.h>
-#include <unseen/render/visibility.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/internal/pass_tables.h>
 #include <unseen/session_gpu/level_pictures.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "shared_uploads.h"
 

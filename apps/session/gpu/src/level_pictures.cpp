@@ -9,7 +9,6 @@
 #include <glm/vec2.hpp>
 
 #include <unseen/render/draw.h>
-#include <unseen/render/gpu_tree.h>
 #include <unseen/render/sample_sum.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>

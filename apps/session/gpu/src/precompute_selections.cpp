@@ -12,6 +12,7 @@
 #include <unseen/session_gpu/level_pictures.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
+#include <unseen/vdtree/internal/team.h>
 
 namespace unseen::session {
 namespace {

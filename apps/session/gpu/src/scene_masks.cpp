@@ -7,6 +7,7 @@
 #include <unseen/perception/judge_tables.h>
 #include <unseen/render/sample_sum.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/internal/pass_tables.h>
 
 namespace unseen::session {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <unseen/perception/masking.h>
-#include <unseen/render/layers.h>
+#include <unseen/render/internal/layers.h>
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/scene_renderer.h>
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "shared_uploads.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <unseen/render/context.h>
-#include <unseen/render/gpu_tree.h>
+#include <unseen/render/draw.h>
 #include <unseen/session/level_chain.h>
 
 namespace unseen::session {

@@ -1,4 +1,4 @@
-// The lights of a scene as a JSON file describes them, and where they are at a time.
+// The lights of a scene, described by a JSON file, and their places over time.
 //
 //   {"ambient": 0.1, "material": {"specular": 0.04, "shininess": 40},
 //    "lights": [{"type": "directional", "direction": [0.4, 0.7, 0.6], "intensity": 0.7,
@@ -10,14 +10,14 @@
 //                "intensity": 1, "distance": 3},
 //               {"type": "headlight", "intensity": 0.3}]}
 //
-// "ambient" and "material" may be missing (0: no ambient light, no highlights); of a light everything is wanted that
-// its type has, but for "orbit" or "keyframes". Positions and distances in world units (metres); "direction" leads
-// towards a directional light, and to where a spot shines. "intensity" is the relative luminance of white that faces
-// the light: at "distance", where the light has a position. With "shadow": true it casts shadows; without, and headlights
-// always, it shines through everything. A headlight shines from the camera's direction. An orbit
-// turns position and direction about an axis through "centre" (default: the model's). Keyframes give any of position,
-// direction and intensity, all the same ones, at ascending times; in between, positions and intensities go straight and
-// directions along the shorter arc; before and after, they stay.
+// "ambient" and "material" are optional (default: no ambient light, no highlights). A light needs every key of its type;
+// "shadow", "orbit" and "keyframes" are optional. Positions and distances are in world units (metres). "direction" points
+// towards a directional light, but along a spot's beam. "intensity" is the relative luminance of white that faces the
+// light, at "distance" if the light has a position. Lights with "shadow": true cast shadows; others, and all headlights,
+// shine through everything. A headlight shines from the camera's direction. An orbit turns position and direction about
+// an axis through "centre" (default: the model's). Keyframes, at ascending times, give the same ones of position,
+// direction and intensity; between them positions and intensities are interpolated linearly, directions along the shorter
+// arc; before the first and after the last they stay.
 #pragma once
 
 #include <filesystem>
@@ -34,24 +34,23 @@ public:
     // Errors name the file and the key.
     static Result<LightRig> read(const std::filesystem::path& file);
 
-    // Lights that stand still, in the world: places and distances in world units. `file`: where they are from, for
-    // messages. Fails where vdtree::validate() does.
+    // Lights that stand still; positions and distances in world units. `file`: their source, for messages. Fails if
+    // vdtree::validate() fails.
     static Result<LightRig> of(vdtree::Lighting lighting, std::filesystem::path file);
 
-    // From now on all lights but headlights cast shadows, or none does. Fails on more that could than
-    // vdtree::most_shadow_lights; then all stays.
+    // Makes all lights except headlights cast shadows, or none. Fails, and changes nothing, if that would be more than
+    // vdtree::most_shadow_lights.
     Result<void> set_shadows(bool cast);
 
-    // Where the lights are, in the frame of a tree.
+    // The lights at a time, in the frame of a tree.
     vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                         const vdtree::Similarity& placement) const;
 
     std::size_t light_count() const noexcept { return lights_.size(); }
-    std::vector<std::size_t> casting() const; // the numbers of those that cast shadows
+    std::vector<std::size_t> casting() const; // the numbers of lights that cast shadows
 
     bool moves() const noexcept { return moves_; } // with time
-    bool follows_camera() const noexcept { return follows_camera_; }
-    // Whether they are the same at all times and from everywhere, but for highlights.
+    // Whether the lights are the same at all times and from everywhere; highlights still follow the eye.
     bool stands_still() const noexcept { return !moves_ && !follows_camera_; }
     std::string description() const; // for people: "1 directional and 2 point lights, ambient 0.1"
     const std::filesystem::path& file() const noexcept { return file_; }

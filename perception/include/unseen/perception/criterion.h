@@ -13,8 +13,11 @@
 #include <unseen/perception/display.h>
 #include <unseen/perception/fold_model.h>
 #include <unseen/vdtree/criteria.h>
-#include <unseen/vdtree/distance_criterion.h>
 #include <unseen/vdtree/lighting.h>
+
+namespace unseen::vdtree {
+class LightBounds;
+}
 
 namespace unseen::perception {
 

@@ -8,6 +8,10 @@
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 
+namespace unseen::vdtree {
+class LightBounds;
+}
+
 namespace unseen::perception {
 
 // By interior node. Of two nodes the one with the larger support sphere is the larger; of equal ones, the one of the

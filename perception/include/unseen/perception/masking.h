@@ -12,7 +12,7 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/units.h>
-#include <unseen/vdtree/footprint.h>
+#include <unseen/vdtree/depth_picture.h>
 #include <unseen/vdtree/vertex_tree.h>
 #include <unseen/vdtree/view.h>
 

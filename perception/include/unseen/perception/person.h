@@ -2,7 +2,7 @@
 //
 // castleCSF, with its law of area, is right for the median person: of 253 sensitivities that eight studies measured,
 // 65% lie above it, the median by 1.2 dB. People differ, and the same person does from study to study: the standard
-// deviation is 4.4 dB. So a person is castleCSF times a gain. The data: data/people; <unseen/calibration/people.h> compares them with any model.
+// deviation is 4.4 dB. So a person is castleCSF times a gain. The data: data/people; <unseen/calibration/internal/people.h> compares them with any model.
 #pragma once
 
 #include <array>

@@ -13,17 +13,8 @@
 #pragma once
 
 #include <unseen/render/context.h>
-#include <unseen/render/depth.h>
-#include <unseen/render/difference_count.h>
 #include <unseen/render/draw.h>
-#include <unseen/render/elevation.h>
-#include <unseen/render/gpu_tree.h>
-#include <unseen/render/layers.h>
-#include <unseen/render/overlay.h>
 #include <unseen/render/renderer.h>
 #include <unseen/render/sample_sum.h>
 #include <unseen/render/shadows.h>
-#include <unseen/render/stage_times.h>
 #include <unseen/render/target.h>
-#include <unseen/render/test_pattern.h>
-#include <unseen/render/visibility.h>

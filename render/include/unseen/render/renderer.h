@@ -1,4 +1,4 @@
-// The header to include first. Renderer draws one tree in a few lines; scenes are drawn by the headers below.
+// Renderer draws one tree in a few lines. For scenes, use draw() and SampleSum.
 #pragma once
 
 #include <memory>
@@ -7,8 +7,6 @@
 
 #include <unseen/render/context.h>
 #include <unseen/render/draw.h>
-#include <unseen/render/gpu_tree.h>
-#include <unseen/render/sample_sum.h>
 #include <unseen/render/target.h>
 
 namespace unseen::render {
@@ -16,7 +14,7 @@ namespace unseen::render {
 struct DrawOptions {
     Shading shading = Shading::smooth;
     bool wireframe = false;
-    int samples = 16; // as in Sampling, and the next two
+    int samples = 16; // the next three as in Sampling
     std::uint32_t seed = 1;
     float background = default_background;
     std::optional<vdtree::Lighting> lighting = {}; // as in Item
@@ -28,7 +26,7 @@ struct Frame {
     int height = 0;
     std::vector<float> luminance; // relative, linear, 0..1, background included
     std::vector<float> colour;    // linear RGB, three values a pixel
-    double draw_ms = 0;           // drawing of all samples and reading back, wall clock
+    double draw_ms = 0;           // wall-clock time of drawing all samples and reading back
 };
 
 // One tree, one cut at a time, one picture: a GpuTree, a GpuCut and a SampleSum. Move-only. Keeps handles to the
@@ -40,14 +38,13 @@ public:
     Renderer& operator=(Renderer&&) noexcept;
     ~Renderer();
 
-    // Draws off screen and reads back. Fails on an invalid view or lights, or when the GPU has too little memory, or on
-    // a GL error.
+    // Draws off screen and reads back. Fails on an invalid view or lights, if graphics memory runs out, and on a GL error.
     Result<Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
                        const vdtree::Similarity& placement = {});
     Result<Frame> draw(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options = {},
                        const vdtree::Similarity& placement = {});
 
-    // Draws to the window's framebuffer, one sample a pixel with hardware multisampling if it has any, encoded as sRGB.
+    // Draws to the window's framebuffer, encoded as sRGB, with the hardware's multisampling if it has any.
     Result<void> draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
                                 const vdtree::Similarity& placement = {});
     Result<void> draw_to_window(const vdtree::Geomorph& geomorph, const vdtree::View& view,

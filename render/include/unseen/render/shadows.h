@@ -1,13 +1,12 @@
-// Shadows: what the lights of a scene see, as maps of depth, and how much of each light comes where.
+// Shadow maps of a scene's lights.
 //
 //     auto shadows = render::Shadows::create(context);
 //     shadows->update(items);                                         // before the eye's draws
 //     render::draw(items, {.view = view, .shadows = &*shadows}, target);
 //
-// A directional light, or a spot of up to 60 degrees from its axis, has one map; another spot or a point light has six.
-// Maps are fitted to the ball around the scene, not to what the eye sees: their texels stand still in the world when the
-// eye moves, and so do the shadows' edges, which are three texels wide. Where no light casts a shadow, nothing is made
-// and nothing is drawn.
+// A directional light, or a spot of up to 60 degrees from its axis, has one map; wider spots and point lights have six. Maps
+// are fitted to the ball around the scene, not to the eye's view: their texels stand still in the world when the eye
+// moves, and so do the shadows' edges, which are three texels wide. Without shadow-casting lights this costs nothing.
 #pragma once
 
 #include <cstdint>
@@ -29,18 +28,19 @@ Ball ball_around(std::span<const Item> items);
 
 struct ShadowOptions {
     int size = 2048; // texels a side of a map, 16 or more
-    // What the maps reach over; default: the ball around the casters of each update. Give one where not all items are
-    // casters at all times, for the texels lie otherwise when it changes.
+    // The ball that the maps cover; default: around the casters of each update. Set it if not all items are casters at all
+    // times, because the texels shift when the ball changes.
     std::optional<Ball> bounds = {};
 };
 
-// As of the last update.
+// State after the last update.
 struct ShadowFacts {
-    int lights = 0, maps = 0;  // that cast shadows; layers
+    int lights = 0; // that cast shadows
+    int maps = 0;
     int size = 0;              // texels a side
     std::uint64_t bytes = 0;   // on the GPU
-    std::uint64_t redraws = 0; // of all maps, since they were made; those of single samples do not count
-    double draw_ms = 0;        // of the last one, on the GPU
+    std::uint64_t redraws = 0; // of all maps since they were made, except those for single samples
+    double draw_ms = 0;        // GPU time of the last one
 };
 
 // Move-only. Keeps a handle to its context, and to the cuts that it has drawn.
@@ -52,12 +52,11 @@ public:
     Shadows& operator=(Shadows&&) noexcept;
     ~Shadows();
 
-    // Draws the maps where the casters, their cuts or the lights are others than before; else does nothing. The lights
-    // are those of the items' lighting, which must be the same in the world for all that are lit. Fails where they are
-    // not, where draw() does, and where memory runs out.
+    // Redraws the maps if the casters, their cuts or the lights have changed. The lights are those of the items' lighting,
+    // which must be the same in the world for all lit items. Fails if they are not, like draw(), and if memory runs out.
     //
-    // `receivers`: the items that will be drawn with these shadows until the next update; default: any. The maps are drawn
-    // only where the receivers lie, which costs less. Other items would have wrong shadows.
+    // `receivers`: the only items that will be drawn with these shadows until the next update; default: any. The maps cover
+    // only the receivers, which costs less; other items would have wrong shadows.
     Result<void> update(std::span<const Item> casters,
                         const std::optional<std::span<const Item>>& receivers = std::nullopt);
 

@@ -1,4 +1,4 @@
-// What is drawn into, and how it is read back.
+// Targets: framebuffers to draw into and to read back.
 #pragma once
 
 #include <memory>
@@ -16,18 +16,18 @@ enum class ColourFormat {
     rgba32f, // linear RGB and relative luminance in a; 16 bytes a pixel
     rgba16f, // the same in half floats
     srgb8,   // for displays: encoded as sRGB, a is 1
-    shares8, // four numbers from 0 to 1, in steps of a 255th: for masks of shadows
+    shares8, // four numbers from 0 to 1 in steps of 1/255, for shadow masks
 };
 
 // 32-bit float depth is 1 at the near plane and 0 at infinity.
 struct TargetOptions {
-    std::vector<ColourFormat> colours = {ColourFormat::rgba32f}; // the attachments; none: depth only
+    std::vector<ColourFormat> colours = {ColourFormat::rgba32f}; // the attachments; may be empty
     bool depth = true;
-    int samples = 0; // a pixel, by the hardware; 0: exact pixels. Others are resolved before they are read.
+    int samples = 0; // hardware samples a pixel, to be resolved before reading; 0: no multisampling
     const char* label = "";
 };
 
-// A framebuffer of others, which stays theirs and must outlive the target.
+// A framebuffer of the caller's, which must outlive the target.
 struct ForeignFramebuffer {
     unsigned id = 0;            // 0: the window's
     bool is_for_display = true; // colours are encoded as sRGB, by the framebuffer or by the shaders; a is 1
@@ -39,13 +39,23 @@ struct PixelBox {
     int left = 0, top = 0, width = 0, height = 0;
 };
 
+// The luminance of a picture on the GPU, cd/m2: offset + scale * (a channel of a two-dimensional texture, floats or
+// normalised, whose first row is the picture's top). Example: {target.colour_texture(), width, height, 3, peak - black,
+// black}.
+struct LuminanceTexture {
+    unsigned id = 0; // GL name; the texture stays its owner's
+    int width = 0, height = 0;
+    int channel = 0; // 0 to 3
+    float scale = 1, offset = 0;
+};
+
 // Move-only. Owns its attachments and a handle to its context.
 class Target {
 public:
-    // Fails on a size below 1x1, on more than this GL can draw to, and when memory runs out.
+    // Fails on a size below 1x1 or beyond this GL's limits, and if memory runs out.
     static Result<Target> create(const Context& context, int width, int height, const TargetOptions& options = {});
 
-    // The window's back buffer, or another framebuffer. Makes nothing. Fails where it cannot be drawn to.
+    // Wraps the window's back buffer, or another framebuffer. Fails if it cannot be drawn to.
     static Result<Target> foreign(const Context& context, int width, int height,
                                   const ForeignFramebuffer& framebuffer = {});
 
@@ -56,7 +66,7 @@ public:
     int width() const noexcept;
     int height() const noexcept;
 
-    // GL names, for drawing of your own. 0 where there is none, or where it has samples.
+    // GL names, for drawing of your own. 0 if there is none, or if the target has samples.
     unsigned id() const noexcept;
     unsigned colour_texture(int attachment = 0) const noexcept;
     unsigned depth_texture() const noexcept;
@@ -69,19 +79,18 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-// The means of the hardware's samples, of all attachments. Both targets are of one size and format; `to` has no
-// samples.
+// Resolves the hardware's samples of all attachments. Both targets have the same size and format; `to` has no samples.
 Result<void> resolve(const Target& from, Target& to);
 
-// Row-major from the top left. They wait for the GPU. They fail on targets with samples, and where there is no such
-// attachment. `part`: lies in the target; none: all of it.
+// Read a target back, row-major from the top left; waits for the GPU. Fail on targets with samples, and without such an
+// attachment. `part`: a box within the target; default: all of it.
 Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment = 0,
                                            const std::optional<PixelBox>& part = {});
 Result<std::vector<float>> read_luminance(const Target& target, int attachment = 0); // not of targets for displays
 Result<std::vector<float>> read_colour(const Target& target, int attachment = 0);    // three values a pixel
 Result<std::vector<float>> read_depth(const Target& target, const std::optional<PixelBox>& part = {});
 
-// The largest window that this GL can draw to, in pixels a side. Needs a current context.
+// The largest size that this GL can draw to, pixels a side. Needs a current context.
 int largest_target_side();
 
 } // namespace unseen::render

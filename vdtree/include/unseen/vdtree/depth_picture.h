@@ -1,4 +1,4 @@
-// What one view hides, by how far away is what it shows at each pixel: for pictures of that view, nodes behind it fold.
+// Nodes that one view hides, found from the depth of each pixel. For pictures of that view alone, hidden nodes fold.
 #pragma once
 
 #include <cstdint>
@@ -6,28 +6,53 @@
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/distance_criterion.h>
-#include <unseen/vdtree/footprint.h>
+#include <glm/vec3.hpp>
+
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 #include <unseen/vdtree/view.h>
 
 namespace unseen::vdtree {
 
+// The part of the window that some points cover, and the nearest of them. The footprint of several points contains that of
+// every point between them.
+struct Footprint {
+    double left = 1e300, top = 1e300, right = -1e300, bottom = -1e300; // pixels
+    double nearest = 1e300; // along the view's axis, world units; 0 or less beside and behind the eye
+
+    void add(const Footprint& other) noexcept;
+};
+
+// Projects points of the world onto a view's window.
+class Projector {
+public:
+    explicit Projector(const View& view); // precondition: valid, and perspective
+    Footprint operator()(glm::dvec3 point) const noexcept;
+
+private:
+    glm::dvec3 eye_;
+    CameraFrame camera_;
+    double middle_x_, middle_y_, focal_px_; // where the line of sight meets the window, and tangents in pixels
+};
+
+// By interior node: the footprint of its ring before and after the fold, and of all nodes below it. It holds as long as the
+// neighbours are unfolded, or folded under the same rule. Fails if VertexTree::check() fails, and for orthographic views.
+// Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
+Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view);
+
 // Copies are cheap and share their data; any number of threads may ask at once.
 class DepthPicture {
 public:
-    // `depth`: by pixel of the view's window, row-major from the top left: how far along the view's axis, in world
-    // units, the farthest is that any sample of the pixel shows; infinite where it may show the background. Fails on
-    // an invalid view, another number of pixels, and depths that are NaN or not above 0. Cost: some nanoseconds and 6
-    // bytes a pixel.
+    // `depth`: by pixel of the view's window, row-major from the top left, the farthest depth that any sample of the pixel
+    // shows, along the view's axis in world units; infinite if it may show the background. Fails on an invalid view,
+    // another number of pixels, and depths that are NaN or not above 0. Cost: some nanoseconds and 6 bytes a pixel.
     static Result<DepthPicture> create(const View& view, std::span<const float> depth);
 
     const View& view() const noexcept { return levels_->view; }
 
-    // Whether nothing between these points can be seen: at all pixels that they cover, and a pixel around, what is shown
-    // is nearer than all of them. What is beside the window is not seen, either. A footprint that holds one that is seen
-    // is seen.
+    // Whether the footprint is hidden: all its pixels, and one pixel around, show something nearer. Outside the window
+    // everything is hidden. A footprint that contains a visible one is visible.
     bool hides(const Footprint& footprint) const noexcept;
 
 private:
@@ -45,13 +70,13 @@ private:
     std::shared_ptr<const Levels> levels_;
 };
 
-// Which interior nodes' folds the picture hides, a bit a node, the first node's lowest: those of whose footprints it
-// shows nothing (find_footprints()). Fails where VertexTree::check() does. Cost: some 50 ns a triangle, and 40 bytes a node meanwhile.
+// The interior nodes whose footprints the picture hides, one bit a node, lowest first. Fails like find_footprints(). Cost:
+// some 50 ns a triangle, and 40 bytes a node meanwhile.
 Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
                                                const DepthPicture& picture);
 
-// The same criterion but for these nodes, which cost nothing. For this tree, and views that see no more of it than the
-// picture's. Not of criteria with lights (invalid_argument). Cost: some nanoseconds and 4 bytes a node.
+// The criterion with these nodes folding at no cost. Valid for views that see no more of the tree than the picture's. Fails
+// for criteria with lights (invalid_argument). Cost: some nanoseconds and 4 bytes a node.
 Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
                                          std::span<const std::uint64_t> hidden);
 

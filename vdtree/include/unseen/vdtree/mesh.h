@@ -1,4 +1,4 @@
-// Triangle soups: what the readers return, what the builder takes and what a cut is written as.
+// Triangle soups: readers return them, the builder takes them, and cuts are written as them.
 #pragma once
 
 #include <array>
@@ -13,12 +13,40 @@
 #include <glm/vec4.hpp>
 
 #include <unseen/vdtree/result.h>
-#include <unseen/vdtree/texture.h>
 
 namespace unseen::vdtree {
 
 using Index = std::uint32_t;
 using Triangle = std::array<Index, 3>;
+
+// RGB encoded as sRGB, and alpha.
+using Texel = std::array<std::uint8_t, 4>;
+
+// What lies beyond the coordinates 0..1: the image again, its border, or the image mirrored at every border.
+enum class Wrap : std::uint32_t { repeat, clamp, mirror };
+
+// Rows of texels. Row 0 is at v = 0, and texel (x, y) covers u from x / width to (x + 1) / width, v likewise. Formats whose
+// v runs upward (OBJ, PLY) are stored from the bottom row, others (glTF) from the top.
+struct TextureView {
+    std::uint32_t width = 0, height = 0;
+    Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+    std::span<const Texel> texels = {};
+
+    bool empty() const noexcept { return texels.empty(); }
+};
+
+struct Texture {
+    std::uint32_t width = 0, height = 0;
+    Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+    std::vector<Texel> texels;
+
+    TextureView view() const { return {width, height, wrap_u, wrap_v, texels}; }
+};
+
+inline constexpr std::uint32_t largest_texture_side = 16384; // texels; what graphics processors take
+
+// An empty texture is valid. Otherwise sides must be 1 to largest_texture_side, and there must be width x height texels.
+Result<void> validate(const TextureView& texture);
 
 // A run of triangles that the file held together: an OBJ group or material, a glTF primitive.
 struct MeshRange {
@@ -38,8 +66,8 @@ struct MeshView {
     std::span<const glm::vec4> colours = {}; // linear RGB and alpha, 0..1
     std::span<const glm::vec2> uvs = {};
     std::span<const MeshRange> ranges = {}; // ordered by first_triangle; may overlap between kinds
-    TextureView texture = {};               // over the whole mesh by its UVs, multiplied with the colours; empty: none
-    std::span<const std::byte> document = {}; // what else its file said, for who wrote it here; trees keep it unread
+    TextureView texture = {};               // over the whole mesh by its UVs, multiplied with the colours; may be empty
+    std::span<const std::byte> document = {}; // the rest of its file, in the reader's own form; trees keep it unread
 };
 
 // A triangle soup that owns its arrays.
@@ -56,16 +84,15 @@ struct Mesh {
     MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document}; }
 };
 
-// Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the
-// positions, ranges within the triangles, a texture of as many texels as it says, with UVs. The error names the first
-// offender.
+// Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the positions, ranges
+// within the triangles, a valid texture, and UVs where there is one. The error names the first offender.
 Result<void> validate(const MeshView& mesh);
 
 // Removes the triangles that use a vertex twice, shrinks the ranges to match, and returns how many went.
 // Triangles of zero area with three different vertices stay.
 std::uint64_t drop_degenerate_triangles(Mesh& mesh);
 
-// What the surface is, found out and not assumed, after welding equal positions. Cost: a sort of the edges.
+// Whether a surface is closed, as measured after welding equal positions.
 enum class Closedness : std::uint8_t {
     open,           // a boundary, a non-manifold or an inconsistently oriented edge, or no volume
     closed_outward, // every edge has two faces that run it in opposite ways, and the volume is positive

@@ -1,27 +1,31 @@
 // The vertex tree: a hierarchical clustering of a mesh's vertices, with bounds for every fold.
 //
-// Nodes. Interior nodes are numbered 0 .. interior_count()-1 in depth-first pre-order (a parent before its
-// children, a subtree contiguous; 0 is the root), leaves follow: node interior_count() + k is leaf k. Leaves are
-// the mesh's vertices in depth-first order, so a node supports a contiguous range of leaves. Folding an interior
-// node replaces all leaves it supports by its proxy vertex.
+// Nodes. Interior nodes have the numbers 0 .. interior_count() - 1, in depth-first pre-order: a parent comes before its
+// children, a subtree is contiguous, and 0 is the root. Leaves follow: node interior_count() + k is leaf k. Leaves are
+// the mesh's vertices in depth-first order, so a node supports a contiguous range of leaves. Folding an interior node
+// replaces all leaves under it by its proxy vertex.
 //
-// Triangles are sorted by the node at which they vanish (the deepest node that supports two of their corners), so
-// those that a fold removes are a contiguous range, and so are those that a folded subtree removes. Corners are
-// leaf numbers.
+// Triangles are sorted by the node at which they vanish: the deepest node that supports two of their corners. So the
+// triangles that one fold removes are contiguous, and so are those that a folded subtree removes. Corners are leaf
+// numbers.
 //
-// Two regions per interior node: its *support* (the leaves under it) and its *ring* (all corners of all triangles
-// that touch the support). Everything stored about them nests: a parent's sphere contains its children's, its mask,
-// intervals and flags include theirs, so every fold criterion built on them is monotone up the tree.
+// Each interior node has two regions: its *support* (the leaves under it) and its *ring* (all corners of all triangles
+// that touch the support). Everything stored about them nests: a parent's sphere contains its children's, and its
+// intervals and flags include theirs. So every fold criterion built on them is monotone up the tree.
 //
-// Positions are floats relative to origin(); lengths are mesh units. Immutable once built; any number of cuts and
-// threads may read one tree.
+// Positions are floats relative to origin(); lengths are in mesh units. A tree never changes once it is built. Any
+// number of cuts and threads may read one tree.
 #pragma once
 
 #include <array>
+#include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -29,11 +33,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/vdtree/attribute.h>
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>
-#include <unseen/vdtree/normal_mask.h>
-#include <unseen/vdtree/packed.h>
 #include <unseen/vdtree/result.h>
 
 namespace unseen::vdtree {
@@ -42,6 +43,39 @@ class NodeChecks;
 
 using NodeId = std::uint32_t;
 inline constexpr NodeId no_node = 0xffffffffu;
+
+// ---- values that the tree stores
+
+// A number from 0 to 1 in 16 bits: value / 65535. As luminance, a step is a twentieth of the least step of an 8-bit sRGB
+// display, so drawing and judging are exact for the stored values.
+struct Unorm16 {
+    static constexpr int largest = 65535;
+    std::uint16_t value = 0;
+
+    // Rounds to the nearest step. Values below 0 become 0, values above 1 become 1, and NaN becomes 0.
+    static constexpr Unorm16 nearest(double x) noexcept {
+        if (!(x > 0)) return {0};
+        if (x >= 1) return {largest};
+        return {static_cast<std::uint16_t>(x * largest + 0.5)};
+    }
+    constexpr operator float() const noexcept { return value * (1.0f / largest); } // ascends with value, ends at 1
+    friend constexpr auto operator<=>(Unorm16, Unorm16) = default;
+};
+static_assert(static_cast<float>(Unorm16{Unorm16::largest}) == 1.0f);
+
+// A unit vector or zero in 4 bytes: octahedral coordinates in 1/32767 (Meyer, Suessmuth, Sussner, Stamminger and
+// Greiner 2010; Cigolle and others 2014). At most 6.5e-5 from the vector that was packed; the six axes are exact.
+struct PackedNormal {
+    static constexpr std::int16_t largest = 32767;
+    static constexpr std::int16_t none = -32768; // x and y of the zero vector
+
+    std::int16_t x = none, y = none;
+
+    // A direction of any length. Zero and non-finite vectors become zero.
+    static PackedNormal nearest(glm::vec3 direction) noexcept;
+    operator glm::vec3() const noexcept;
+    bool operator==(const PackedNormal&) const = default;
+};
 
 struct Sphere {
     glm::vec3 centre = glm::vec3(0); // relative to VertexTree::origin()
@@ -61,31 +95,119 @@ struct PackedRange {
     bool operator==(const PackedRange&) const = default;
 };
 
+// Bounds of a set of directions, in 14 bytes: the least and the largest coordinate along seven axes, in 1/127, rounded
+// outward. Unions are exact, so nothing is lost up the tree.
+struct NormalSlabs {
+    static constexpr int axis_count = 7; // x, y, z, then the diagonals (1,1,1), (-1,1,1), (1,-1,1), (1,1,-1)
+    std::array<std::int8_t, axis_count> lo{127, 127, 127, 127, 127, 127, 127};
+    std::array<std::int8_t, axis_count> hi{-127, -127, -127, -127, -127, -127, -127};
+
+    bool empty() const noexcept { return lo[0] > hi[0]; }
+    NormalSlabs& operator|=(const NormalSlabs& other) noexcept {
+        for (std::size_t i = 0; i < axis_count; ++i) {
+            lo[i] = lo[i] < other.lo[i] ? lo[i] : other.lo[i];
+            hi[i] = hi[i] > other.hi[i] ? hi[i] : other.hi[i];
+        }
+        return *this;
+    }
+    bool includes(const NormalSlabs& other) const noexcept {
+        NormalSlabs both = *this;
+        return (both |= other) == *this;
+    }
+    void insert(glm::dvec3 unit_normal) noexcept;
+    static NormalSlabs everything() noexcept {
+        NormalSlabs all;
+        all.lo.fill(-127);
+        all.hi.fill(127);
+        return all;
+    }
+    bool operator==(const NormalSlabs&) const = default;
+};
+
+// The cells that a set of directions lies in: 8 x 8 cells of equal angle on each of a cube's six faces, one bit each. After
+// Luebke and Hallen 2001, section 3.3, and Zhang and Hoff 1997.
+struct NormalMask {
+    std::array<std::uint64_t, 6> faces{};
+
+    void insert(int cell) noexcept { faces[static_cast<unsigned>(cell) >> 6] |= std::uint64_t{1} << (cell & 63); }
+    bool contains(int cell) const noexcept { return (faces[static_cast<unsigned>(cell) >> 6] >> (cell & 63)) & 1; }
+    bool empty() const noexcept { return (faces[0] | faces[1] | faces[2] | faces[3] | faces[4] | faces[5]) == 0; }
+    NormalMask& operator|=(const NormalMask& other) noexcept {
+        for (std::size_t i = 0; i < 6; ++i) faces[i] |= other.faces[i];
+        return *this;
+    }
+    bool includes(const NormalMask& other) const noexcept {
+        std::uint64_t missing = 0;
+        for (std::size_t i = 0; i < 6; ++i) missing |= other.faces[i] & ~faces[i];
+        return missing == 0;
+    }
+    bool operator==(const NormalMask&) const = default;
+};
+
+enum NodeFlags : std::uint8_t {
+    irregular_ring = 1,   // the ring has a boundary, non-manifold or inconsistently oriented edge
+    translucent_ring = 2, // a corner of the ring has an alpha below 1: anything behind it may show
+};
+
+// What a fold test reads of an interior node, in one cache line's half.
+struct alignas(32) NodeBounds {
+    Sphere ring;            // contains the ring, and the proxies of the subtree
+    NormalSlabs slabs;      // normals of the ring dilated by one more ring, before and after the fold
+    std::uint8_t flags = 0; // NodeFlags
+    std::uint8_t spare = 0;
+};
+static_assert(sizeof(NodeBounds) == 32);
+
 // One directional light, a weaker one from the opposite side, and ambient light, for meshes that are not pre-lit:
 // relative luminance = albedo * (ambient + (1 - ambient) * (max(0, n.direction) + fill * max(0, -n.direction))).
 struct Light {
     glm::vec3 direction = {0.39800623f, 0.69651091f, 0.59700935f}; // towards the light: (0.4, 0.7, 0.6) normalised
-    float ambient = 0.2f;                                          // share of the luminance that needs no light, 0..1
-    float fill = 0.25f; // of the light, from the opposite side, 0..1: what the light does not reach keeps its shape
+    float ambient = 0.2f;                                          // 0..1
+    float fill = 0.25f; // strength of the opposite light relative to the main one, 0..1
     bool operator==(const Light&) const = default;
 };
 
 // The albedo of surfaces without colours: 0.8, a light matt grey.
 inline constexpr float default_albedo = 0.8f;
 
-enum NodeFlags : std::uint8_t {
-    irregular_ring = 1,   // the ring has a boundary, non-manifold or inconsistently oriented edge
-    translucent_ring = 2, // a corner of the ring has an alpha below 1: anything behind may show there
+// ---- attributes: named values that others keep with a tree, such as measurements
+
+// What an attribute has one value for. Files store these numbers.
+enum class AttributeDomain : std::uint32_t {
+    tree = 1,          // the whole tree: any number of values
+    interior_node = 2, // each interior node
+    node = 3,          // each node, leaves included
 };
 
-// What a fold test reads of an interior node, in one piece.
-struct alignas(32) NodeBounds {
-    Sphere ring;            // the ring, and the proxies of the subtree
-    NormalSlabs slabs;      // of the same directions as the node's mask
-    std::uint8_t flags = 0; // NodeFlags
-    std::uint8_t spare = 0;
+inline constexpr std::size_t longest_attribute_name = 20; // characters
+inline constexpr std::size_t most_attributes = 32;        // per tree
+
+// The size of the numbers that a value consists of; all have one size. Hosts of the other byte order swap these in
+// files. A struct names the type of its numbers as `Component`.
+template <class T>
+constexpr std::uint32_t attribute_component_bytes() {
+    if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
+    else return attribute_component_bytes<typename T::Component>();
+}
+
+template <class T>
+constexpr bool is_attribute_value() {
+    return std::is_trivially_copyable_v<T> && alignof(T) <= 16 && sizeof(T) % attribute_component_bytes<T>() == 0;
+}
+
+struct AttributeInfo {
+    std::string name; // 1 to 20 printable ASCII characters without spaces
+    AttributeDomain domain = AttributeDomain::tree;
+    std::uint32_t element_bytes = 1, component_bytes = 1;
+    std::size_t count = 0; // of values
 };
-static_assert(sizeof(NodeBounds) == 32);
+
+struct Attribute : AttributeInfo {
+    std::shared_ptr<const void> owner; // of the bytes
+    std::span<const std::byte> bytes;  // aligned to 16 bytes at least
+};
+
+// ---- the tree
 
 class VertexTree {
 public:
@@ -93,7 +215,7 @@ public:
     VertexTree& operator=(VertexTree&&) noexcept;
     ~VertexTree();
 
-    // Sizes. A tree has at least three leaves and one triangle.
+    // A tree has at least three leaves and one triangle.
     NodeId node_count() const noexcept { return static_cast<NodeId>(links_.parents.size()); }
     NodeId interior_count() const noexcept { return static_cast<NodeId>(links_.first_leaf.size()); }
     NodeId leaf_count() const noexcept { return node_count() - interior_count(); }
@@ -101,24 +223,24 @@ public:
     bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
 
-    // Whether an interior node can be unfolded: its links, its triangles, and the positions and bounds of its children
-    // are in order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about,
-    // from the root down; a damaged node must stay folded, and has no children for for_each_child. Values that are read
-    // of mapped nodes of which this has not been asked may be anything; how nodes hang together is told by
-    // for_each_child and SoundTree only. Cost: one bit; the first time, the children and triangles.
+    // Whether an interior node can be unfolded: its links, its triangles, and its children's positions and bounds are
+    // valid. Always true except for trees from map_tree(), whose nodes are checked when first asked about, from the root
+    // down. A damaged node must stay folded, and for_each_child() gives it no children. Until this has been asked, a
+    // mapped node's values may be anything; only for_each_child() and SoundTree follow its links safely. Cost: one bit;
+    // the first time, the node's children and triangles.
     bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
-    NodeId first_damaged() const noexcept; // the first node for which is_sound was false, or no_node
+    NodeId first_damaged() const noexcept; // the first node for which is_sound() was false, or no_node
 
-    // Of trees from map_tree: looks at all that read_tree looks at, but for the checksums of pages: is_sound for all
-    // nodes, and every value's range. The error names a damaged node or section. Cost: the first time one pass over the
-    // whole file, in parallel; nothing once it has succeeded, and for other trees.
+    // For trees from map_tree(): checks all that read_tree() checks, except for the checksums of pages. The error names
+    // a damaged node or section. Cost: the first time one pass over the whole file, in parallel; nothing once it has
+    // succeeded, and for other trees.
     Result<void> check() const;
 
     // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
     template <class F>
     void for_each_child(NodeId node, F&& f) const;
 
-    // Proxy vertices, by node; a leaf's proxy is the input vertex. Attributes the mesh did not have are empty.
+    // Proxy vertices, by node; a leaf's proxy is the input vertex. Attributes that the mesh did not have are empty.
     glm::dvec3 origin() const noexcept;
     std::span<const glm::vec3> positions() const noexcept;
     std::span<const Unorm16> luminance() const noexcept;    // under light(); never empty
@@ -126,54 +248,50 @@ public:
     std::span<const glm::vec4> colours() const noexcept;    // linear; reflectance, unless is_prelit()
     std::span<const glm::vec2> uvs() const noexcept;
 
-    // What lies over the surface by uvs(), and is multiplied with the vertices' colours and luminance; empty: none.
+    // The image over the surface, placed by uvs(). It multiplies the vertices' colours and luminance. May be empty.
     TextureView texture() const noexcept;
 
     // Bounds, by interior node.
     std::span<const NodeBounds> bounds() const noexcept;
-    NormalMask mask(NodeId node) const noexcept;              // facing of the ring dilated by one more ring; unpacks it
-    std::span<const Sphere> support_spheres() const noexcept; // leaves and proxies of the subtree
+    NormalMask mask(NodeId node) const noexcept;                     // of the same normals as the slabs; unpacks it
+    std::span<const Sphere> support_spheres() const noexcept;        // leaves and proxies of the subtree
     std::span<const PackedRange> support_luminance() const noexcept; // of vertices, without the texture
     std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
-    std::span<const PackedRange> ring_texture() const noexcept; // the texture's own luminance there; empty without one
-    std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
+    std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance; empty without one
+    std::span<const Unorm16> adaptation_luminance() const noexcept;  // middle of ring_luminance, saturated up the tree
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
-    // The mesh. By leaf: the input vertex. The input's ranges (groups, materials), over its triangles, and by triangle
-    // its number there; both empty when the input had none.
+    // The input: by leaf its vertex, by triangle its number, and its ranges (groups, materials). The last two are empty
+    // if the input had no ranges.
     std::span<const Index> source_vertices() const noexcept;
     std::span<const Index> source_triangles() const noexcept;
     std::span<const MeshRange> ranges() const noexcept;
-    std::uint64_t dropped_triangles() const noexcept; // input triangles that used a vertex twice
-    std::span<const std::byte>
-    document() const noexcept; // MeshView::document; of read and mapped files it may be anything
+    std::uint64_t dropped_triangles() const noexcept;     // input triangles that used a vertex twice
+    std::span<const std::byte> document() const noexcept; // MeshView::document; unchecked if it comes from a file
     Closedness closedness() const noexcept;
     Sphere bounding_sphere() const noexcept;         // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
-    // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost:
-    // one pass over the triangles and the nodes. The colours and the texture of a pre-lit mesh then count as
-    // reflectance.
     const Light& light() const noexcept;
-    bool is_prelit() const noexcept; // luminance is that of the colours and the texture alone
-    // Fails where check() does.
+    bool is_prelit() const noexcept; // luminance comes from the colours and the texture alone
+
+    // The same tree under another light: luminance and its bounds are computed anew, attributes are dropped, everything
+    // else is shared. The colours and the texture of a pre-lit mesh then count as reflectance. Fails if check() fails.
+    // Cost: one pass over the triangles and the nodes.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same with luminances of the caller's, of leaves and of proxies, relative, 0..1 (others are clamped, NaN is 0):
-    // light that is none of vdtree::Light's. Without the texture, and pre-lit. Called from several threads. Fails and
-    // costs as relit().
-    // `keeps_texture`: the texture, if there is one, is multiplied with them.
+    // The same with the caller's own relative luminances of leaves and proxies, clamped to 0..1; NaN counts as 0. The
+    // result is pre-lit and has no texture, unless `keeps_texture`, which multiplies the luminances by it. The callback
+    // is called from several threads. Fails and costs like relit().
     Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture = false) const;
 
-    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything
-    // else is shared, but for attributes, which it has not. Vertices without colours then have the default albedo, lit.
-    // Fails where check() does. Cost: as relit().
+    // The same tree without its texture, under its own light. Vertices without colours get the default albedo, lit.
+    // Attributes are dropped. Fails and costs like relit().
     Result<VertexTree> untextured() const;
 
-    // Named values that others keep with the tree: see <unseen/vdtree/attribute.h>. Empty where there are none of that name,
-    // or of another type's sizes. Valid as long as a handle with the attribute. Of read and mapped files nobody has
-    // looked at them, SoundTree neither: the owner of a name checks each value where it uses it, and what has the sizes
-    // of T may have been anything.
+    // An attribute's values. Empty if there is no attribute of that name or its sizes are not those of T. Valid as long
+    // as some handle has the attribute. Values from files are unchecked, in a SoundTree too: the owner of a name checks
+    // each value where it uses it.
     template <class T>
     std::span<const T> attribute(std::string_view name) const noexcept {
         static_assert(is_attribute_value<T>());
@@ -182,10 +300,10 @@ public:
     }
     std::vector<AttributeInfo> attributes() const;
 
-    // Another handle that has this attribute, in place of one of the same name, and shares all else. relit(),
-    // untextured() and conserve_light() drop all attributes: they were measured under another light. Files keep them,
-    // those of names that no program knows, too. Fails on names that are none (AttributeInfo), on a number of values
-    // that is not the domain's, and where there are most_attributes already. Cost: none.
+    // Another handle that has this attribute, replacing one of the same name, and shares all else. relit(), shaded(),
+    // untextured() and conserve_light() drop all attributes, because those were measured under another light. Files keep
+    // every attribute, also under unknown names. Fails if the name is invalid (see AttributeInfo), if the number of
+    // values does not fit the domain, or if the tree has most_attributes already. Cost: none.
     template <class T>
     Result<VertexTree> with_attribute(std::string_view name, AttributeDomain domain, std::vector<T> values) const {
         static_assert(is_attribute_value<T>());
@@ -196,8 +314,8 @@ public:
                       std::as_bytes(std::span(*kept))});
     }
 
-    std::uint64_t
-    byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
+    // Bytes of all arrays. A mapped tree's are resident only where they were used.
+    std::uint64_t byte_size() const noexcept;
 
     // Another handle to the same data, which lives as long as one of them.
     VertexTree share() const { return VertexTree(data_); }
@@ -208,7 +326,7 @@ public:
 
 private:
     friend class SoundTree;
-    friend struct UncheckedLinks; // for what asks is_sound() node by node
+    friend struct UncheckedLinks; // for code that asks is_sound() node by node
     bool looks_sound(NodeId node) const;
     std::span<const std::byte> attribute_bytes(std::string_view name, std::size_t element,
                                                std::uint32_t component) const noexcept;
@@ -216,7 +334,7 @@ private:
 
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
-    // Of data_, too, for these are asked for node by node.
+    // Views of data_, kept here because they are read node by node.
     struct Links {
         std::span<const NodeId> parents, subtree_end;
         std::span<const Index> first_leaf, leaf_end, first_triangle;
@@ -225,11 +343,11 @@ private:
     Links links_;
 };
 
-// A tree all of which has been looked at: what walks a whole tree takes one of these, so that no file can lead it out
-// of bounds. Another handle to the tree's data.
+// A handle to a tree that has been checked as a whole. Algorithms that walk a whole tree take one of these, so that no
+// file can lead them out of bounds.
 class SoundTree : public VertexTree {
 public:
-    // Fails where VertexTree::check() does, and costs as much: nothing for trees that were built or read.
+    // Fails if VertexTree::check() fails, and costs as much: nothing for trees that were built or read.
     static Result<SoundTree> of(const VertexTree& tree);
 
     // By node: the parent (no_node for the root). By interior node: the leaves supported, [first_leaf, leaf_end), the
@@ -246,9 +364,9 @@ private:
     explicit SoundTree(VertexTree tree) : VertexTree(std::move(tree)) {}
 };
 
-// Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
-// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096
-// leaves of a node; attributes are their owners'. The error names the first offender. Cost: leaves times depth.
+// Checks everything that the tree promises: spheres, slabs, intervals and displacements contain what they should and
+// nest, and every triangle vanishes at its node. Displacements are compared with the first 4096 leaves of a node.
+// Attributes are not checked. The error names the first offender. Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 
 template <class F>

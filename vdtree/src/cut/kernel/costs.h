@@ -62,7 +62,7 @@ UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& a
     const Listed listed{arrays, nodes.data(), nodes.size() - 1};
     for (std::size_t start = 0; start < nodes.size(); start += piece) {
         const std::size_t size = std::min(piece, nodes.size() - start);
-        // Of the interior, and of the silhouette, where it is one.
+        // Costs as interior, and as silhouette for nodes that may be one.
         alignas(64) float cost[piece + width], seen[piece + width], silhouette_cost[piece + width],
             silhouette_seen[piece + width];
         std::uint8_t unfolded[piece + width], silhouette_unfolded[piece + width];

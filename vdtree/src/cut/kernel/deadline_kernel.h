@@ -90,14 +90,14 @@ std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_
 
 // The deadlines of up to sixteen slots that were tested.
 struct DeadlineBatch {
-    // Of their blocks, now: what their distances have changed by beyond the sphere's, and that one's distance.
+    // Of the slots' blocks, now: the change of distance beyond that of the block's sphere, and the sphere's distance.
     alignas(64) float passed[kernel_lanes], distance[kernel_lanes];
     float facing_clock; // or a little less
     float longest;      // no slack of distances is longer
     float margin;       // for rounding: slacks of unfolded nodes are shortened by this
     alignas(64) float position[kernel_lanes], facing[kernel_lanes]; // out
 };
-// Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
+// Rounding of a deadline for distances, as a share of its terms: a dozen roundings of floats when it is set and compared.
 inline constexpr float sum_rounding = 4e-6f;
 // Times a number: at least a unit in the last place less.
 inline constexpr float just_less = 1 - std::numeric_limits<float>::epsilon();

@@ -85,8 +85,8 @@ UNSEEN_INLINE std::size_t look_at(std::span<const std::uint32_t> which, float po
             next_facing = min_of(next_facing, is_due ? never : facing);
         }
         deadlines.set(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
-        // How many slots are due, nobody could foretell: a few places are written in any case, those too many by the
-        // next block again.
+        // The number of due slots is unpredictable, so branch-free: a few places are always written, and the next block
+        // overwrites the surplus.
         const std::uint32_t first = block * static_cast<std::uint32_t>(block_slots);
         std::uint32_t* const next = due + count;
         count += static_cast<std::size_t>(std::popcount(bits));

@@ -25,7 +25,7 @@ constexpr Tangent tangent_of(double root) {        // at the square of `root`
 }
 constexpr Tangent near_tangent = tangent_of(1.0954), middle_tangent = tangent_of(1.4142);
 constexpr float least_inverse_reach = 0.25f / slab_units;
-// Of the products and their sums, in shares of the distance: a dozen roundings of terms of a few times its size.
+// Rounding of products and their sums, as a share of the distance: a dozen roundings of terms a few times its size.
 constexpr float product_rounding = 1e-5f;
 
 struct Interval {
@@ -142,7 +142,7 @@ struct Sides {
     Ints front, back;
     UNSEEN_INLINE Ints is_silhouette() const { return ~(front | back); }
 };
-// Of nodes by their places in the arrays. Only the signs count.
+// The sides of nodes at places of the arrays. Only the signs count.
 template <class At>
 UNSEEN_INLINE Sides sides_of(const KernelView& view, const NodeArrays& arrays, At at) {
     Floats ring[4], towards[3], columns[4];

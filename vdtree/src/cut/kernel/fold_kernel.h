@@ -11,14 +11,13 @@
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/distance_criterion.h>
-#include <unseen/vdtree/normal_mask.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
-// Mesh units; stands for 0 where a division or an infinite switch distance would make no number of it.
+// Mesh units; replaces 0 where a division or an infinite switch distance would give NaN.
 inline constexpr float least_length = 1e-30f;
 // Mesh units: an outline of this length, beyond every eye times any switch distance, marks what keeping() keeps. Frusta
 // and occluders do not fold it. In a mesh that is as large by itself, they fold nothing so.

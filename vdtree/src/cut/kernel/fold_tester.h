@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/cost_source.h"
@@ -104,7 +104,7 @@ private:
 
     const DistanceCriterion& criterion_;
     NodeArrays arrays_; // of the tree and the criterion
-    // The criterion's; infinite where the fold is seen from everywhere.
+    // The criterion's; infinite if the fold is visible from everywhere.
     std::vector<float> switch_distance_;
     KernelView view_, costs_view_;
     std::optional<LitTester> lit_; // where lights give the classes

@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
@@ -25,7 +26,7 @@ constexpr float longest_turn = 0.5f;
 constexpr float intensity_rate = 0.13f, turn_growth = 1.07f;
 constexpr float longest_step = 0.1f; // of the distance to the sphere: (1 / (1 - 0.1))^2 - 1 < 2.4 * 0.1; cubed 1.372
 constexpr float square_rate = 2.4f, cube_growth = 1.372f, step_growth = 1.3f, arc_rate = 1.02f;
-// Of the sphere's half-angle seen from the light; from nearer by, rates hold for no step at all.
+// Largest sine of the sphere's half-angle seen from the light; from nearer by, rates hold for no step at all.
 constexpr float steepest_sine = 0.8f;
 constexpr float widening_rate = 2.1f; // of the half-angle: 1 / (cosine (1 - longest_step)), with the sine below that
 constexpr float longest_highlight_turn = 0.1f; // radians
@@ -250,7 +251,7 @@ UNSEEN_INLINE void add_highlight(const KernelLights& all, const Beam& beam, cons
     // centre's.
     const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : chord_of(d.sine, d.cosine); };
     const float chords = chord(l) + chord(v) + 1e-6f;
-    // Of the axis and h.
+    // Cosine and sine of the angle between the axis and h.
     const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse;
     const auto highlight = [&](float total, bool largest) { // (n.h)+^e
         const float sine = total * inverse;

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/lighting.h>
 
 #include "cut/kernel/fold_kernel.h"

@@ -78,8 +78,8 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
     for (std::int32_t moved = 1; moved;) {
         moved = 0;
         for (std::size_t i = 0; i < kernel_lanes; ++i) {
-            const std::int32_t c = (lit.contrast[i] < contrast_count - 1) &
-                                   !(contrast[i] <= at(contrasts_, lit.contrast[i])); // so is what is no number
+            const std::int32_t c =
+                (lit.contrast[i] < contrast_count - 1) & !(contrast[i] <= at(contrasts_, lit.contrast[i])); // NaN too
             const std::int32_t l =
                 (lit.luminance[i] < luminance_count - 1) & !(luminance[i] <= at(luminances_, lit.luminance[i]));
             lit.contrast[i] += c;
@@ -120,7 +120,7 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
             moved |= step;
         }
     }
-    // Of the way to the limit, in classes: most of it; the rest is for the eye.
+    // Most of the way to the limit, in classes, is for the lights; the rest is for the eye.
     const auto lights_share = [](std::int32_t classes) UNSEEN_INLINE_LAMBDA { return classes - classes / 8; };
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const std::int32_t own = lit.contrast[i];
@@ -140,7 +140,7 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         float left =
             unfolded ? hi - lo - jump - limit * (mean + 2 * jump) : limit * (mean - 2 * jump) - (hi - lo) - jump;
         left = unfolded || has_limit ? left - estimate_rounding : never;
-        // Of the brightest luminance.
+        // Likewise for the brightest luminance.
         const bool has_room = unfolded ? luminance[i] > 0 : luminance[i] + 1 < luminance_count;
         const float brightest = at(luminances_, std::max(luminance[i] - (unfolded ? 1 : 0), 0));
         const float room =

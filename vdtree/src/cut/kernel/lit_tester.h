@@ -8,8 +8,9 @@
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/contrast_classes.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "cut/kernel/fold_kernel.h"
 #include "cut/kernel/lit_kernel.h"

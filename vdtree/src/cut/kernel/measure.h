@@ -1,10 +1,10 @@
 // Distances, angles and heights: where nodes are, seen from the eye, and within which distances they unfold.
 
-// A node counts as hidden where a sphere of so many radii of its ring is: triangles that it shares with neighbours
-// reach beyond the ring where these are folded, too, by no more than their own size.
+// A node counts as hidden if a sphere of this many radii of its ring is: triangles that it shares with folded neighbours
+// reach beyond the ring, by no more than their own size.
 constexpr float occluded_radii = 2;
 
-// Of a table, at rows and bins. Lookups go lane by lane.
+// Entries of a table at rows and bins, looked up lane by lane.
 UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const Ints& rows, const Ints& bins) {
     const Ints at = view.bins == 1 ? rows : rows * view.bins + bins;
     return collect<Floats>([&](std::size_t lane)
@@ -12,7 +12,7 @@ UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const I
 }
 // The distances of rows at bins.
 UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const Ints& bins, const Floats& lengths) {
-    // A length of 0 times infinity is no number.
+    // A length of 0 times infinity is NaN.
     return max_of(lengths, all(least_length)) * view.inverse_threshold *
            entries(view, view.switch_distance.data(), rows, bins);
 }
@@ -60,7 +60,7 @@ UNSEEN_INLINE Floats uncovered(const KernelView& view, const Measures& m, const 
     return least + view.spread; // from the eye that sees most of it
 }
 
-// Of a point, by its vector to the eye: over the lowest plane of the best frustum.
+// Height of a point, given its vector to the eye, over the lowest plane of the best frustum.
 UNSEEN_INLINE Floats height(const KernelView& view, const Floats (&to_eye)[3]) {
     Floats best = all(view.planes.empty() ? huge : -huge);
     for (std::size_t f = 0; f + 1 < view.first_plane.size(); ++f) {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include <unseen/session/request.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/distance_criterion.h>
 #include <unseen/vdtree/view.h>
 
 namespace unseen::session {

@@ -13,7 +13,7 @@
 
 namespace unseen::session {
 
-// See perception/criterion.h for the first three, and vdtree/distance_criterion.h for the others.
+// See perception/criterion.h for the first three, and vdtree/criteria.h for the others.
 enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement };
 
 // By contrast sensitivity; the others count pixels, seen or not.

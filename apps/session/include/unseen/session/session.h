@@ -34,7 +34,7 @@
 #include <unseen/session/selection_search.h>
 #include <unseen/session/simplification.h>
 #include <unseen/session/tree_cache.h>
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 
 namespace unseen::session {
 

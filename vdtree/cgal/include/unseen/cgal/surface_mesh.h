@@ -1,8 +1,8 @@
 // CGAL surface meshes as input of trees, and cuts as CGAL surface meshes.
 //
-// Properties by vertex go both ways: "v:normal" (a vector of the kernel), "v:color" (CGAL::IO::Color) and "v:texcoord"
-// (a point in two dimensions), as CGAL's readers name them; "h:uv", texture coordinates by halfedge, is read
-// where there is no "v:texcoord", and vertices are split at seams.
+// Vertex properties go both ways under the names of CGAL's readers: "v:normal" (a vector of the kernel), "v:color"
+// (CGAL::IO::Color) and "v:texcoord" (a point in two dimensions). Without "v:texcoord", texture coordinates by halfedge
+// ("h:uv") are read, and vertices are split at seams.
 #pragma once
 
 #include <array>
@@ -38,7 +38,7 @@ struct Types {
     using TexturePoint = typename Kernel::Point_2;
 };
 
-// A property map, or none; CGAL 6 returns an optional, and CGAL 5 a pair.
+// A property map, and whether it exists; CGAL 6 returns an optional, CGAL 5 a pair.
 template <class Key, class Value, class M>
 auto find_property(const M& mesh, const char* name) {
     auto found = mesh.template property_map<Key, Value>(name);
@@ -66,13 +66,11 @@ inline CGAL::IO::Color cgal_colour(const glm::vec4& linear, ColourEncoding encod
     return {byte(linear.r), byte(linear.g), byte(linear.b), adapters::to_byte(linear.a)};
 }
 
-inline Error malformed(const std::string& what) { return {ErrorCode::malformed_data, what}; }
-
 } // namespace detail
 
 // Vertices and faces in their order, without removed ones: garbage need not be collected before. Coordinates of exact
-// kernels are rounded to the nearest double. Fails where a face is no triangle, and where a face's halfedge or vertex is
-// null or removed.
+// kernels are rounded to the nearest double. Fails if a face is not a triangle, or has a null or removed halfedge or
+// vertex.
 template <class Point>
 Result<Soup<CGAL::Surface_mesh<Point>>> to_mesh(const CGAL::Surface_mesh<Point>& mesh, const Options& options = {}) {
     using M = CGAL::Surface_mesh<Point>;
@@ -112,10 +110,10 @@ Result<Soup<CGAL::Surface_mesh<Point>>> to_mesh(const CGAL::Surface_mesh<Point>&
         Halfedge h = first;
         do {
             if (!is_there(h))
-                return detail::malformed(face + " has a halfedge that is null or removed; remove the face.");
+                return adapters::malformed(face + " has a halfedge that is null or removed; remove the face.");
             const Vertex v = mesh.target(h);
             if (!is_there(v))
-                return detail::malformed(face + " has a vertex that is null or removed; remove the face.");
+                return adapters::malformed(face + " has a vertex that is null or removed; remove the face.");
             if (count < 3) {
                 const vdtree::Index number = numbers[v.idx()];
                 adapters::CornerSoup::Corner corner = corners[number];
@@ -125,23 +123,18 @@ Result<Soup<CGAL::Surface_mesh<Point>>> to_mesh(const CGAL::Surface_mesh<Point>&
             ++count;
             h = mesh.next(h);
         } while (h != first && count <= mesh.num_halfedges());
-        if (h != first) return detail::malformed(face + " is not closed: its halfedges do not lead back to the first.");
-        if (count != 3)
-            return Error{ErrorCode::unsupported,
-                         face + " has " + std::to_string(count) +
-                             " corners, and trees are of triangles: triangulate the faces first "
-                             "(CGAL::Polygon_mesh_processing::triangulate_faces)."};
+        constexpr const char* advice =
+            "triangulate the faces first (CGAL::Polygon_mesh_processing::triangulate_faces).";
+        if (const auto valid = adapters::check_face(face, h == first, count, advice); !valid) return valid.error();
         soup.add_triangle(triangle);
         out.faces.push_back(f);
     }
-    out.vertices.reserve(soup.sources().size());
-    for (const vdtree::Index source : soup.sources()) out.vertices.push_back(kept[source]);
-    out.mesh = std::move(soup.mesh());
+    soup.finish(out, kept);
     return out;
 }
 
-// Normals, colours and texture coordinates become the properties named above, where the soup has them. Coincident
-// vertices stay apart. Fails on what vdtree::validate() refuses.
+// Normals, colours and texture coordinates become the properties named above if the soup has them. Coincident vertices
+// stay apart. Fails if vdtree::validate() fails.
 template <class M>
 Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options = {}) {
     using Vertex = typename M::Vertex_index;
@@ -174,22 +167,16 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
         return v;
     };
     for (std::size_t v = 0; v < soup.positions.size(); ++v) add_vertex(static_cast<vdtree::Index>(v));
-    std::vector<vdtree::Triangle> refused;
-    for (const vdtree::Triangle& t : soup.triangles) {
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        if (mesh.add_face(Vertex(t[0]), Vertex(t[1]), Vertex(t[2])) == M::null_face()) refused.push_back(t);
-    }
-    for (const vdtree::Triangle& t : refused) {
-        const Vertex a = add_vertex(t[0]), b = add_vertex(t[1]), c = add_vertex(t[2]);
-        if (mesh.add_face(a, b, c) == M::null_face())
-            return detail::malformed("CGAL refused a triangle that stands alone.");
-    }
-    out.loose_triangles = refused.size();
+    const auto handle = [](vdtree::Index v) { return Vertex(v); };
+    const auto add_face = [&](Vertex a, Vertex b, Vertex f) { return mesh.add_face(a, b, f) != M::null_face(); };
+    const auto loose = adapters::add_triangles(soup, handle, add_vertex, add_face);
+    if (!loose) return loose.error();
+    out.loose_triangles = *loose;
     return out;
 }
 
-// The tree of a mesh. Its source_vertices() are numbers of to_mesh()'s soup: those of the handles, where nothing is
-// removed and there is no "h:uv". Else take to_mesh(), which says what is what, and vdtree::build_tree().
+// The tree of a mesh. Its source_vertices() are the numbers of the handles, if nothing is removed and there is no "h:uv".
+// Otherwise call to_mesh(), which returns the sources, and vdtree::build_tree().
 template <class Point>
 Result<vdtree::VertexTree> build_tree(const CGAL::Surface_mesh<Point>& mesh, const vdtree::BuildOptions& build = {},
                                       const Options& options = {}) {
@@ -198,14 +185,10 @@ Result<vdtree::VertexTree> build_tree(const CGAL::Surface_mesh<Point>& mesh, con
     return vdtree::build_tree(soup->mesh.view(), build);
 }
 
-// The cut as a mesh of its own; `sources` are the tree's nodes.
+// The cut as a mesh; `sources` are the tree's nodes.
 template <class M>
 Result<Made<M>> extract_mesh(const vdtree::Cut& cut, const Options& options = {}) {
-    const vdtree::ExtractedMesh extracted = vdtree::extract_with_sources(cut);
-    auto made = from_mesh<M>(extracted.mesh.view(), options);
-    if (made)
-        for (vdtree::Index& source : made->sources) source = extracted.nodes[source];
-    return made;
+    return adapters::extract_mesh(cut, [&](const vdtree::MeshView& soup) { return from_mesh<M>(soup, options); });
 }
 
 } // namespace unseen::cgal

@@ -15,13 +15,12 @@ struct Verification {
     std::uint64_t in_rationals = 0; // those of them that doubles with their error bounds could not decide
 };
 
-// Checks in rational numbers, without any slack, what vdtree::verify() checks in doubles with a slack of 1e-14:
-//   that each support sphere contains the proxy, the leaves and the spheres of its children, and each ring sphere the
-//   proxy, its children's spheres, and the corners of all triangles at its leaves; the bounding sphere all corners;
-//   that no leaf, of all and not of the first 4096, is farther from the proxy than the displacement;
-//   that slabs contain the normals of these triangles, and masks a cell within 1e-5 of each, which is what
-//   vdtree::facing() allows for.
-// All other promises are comparisons of stored numbers, which verify() makes exactly; call it first. The error names
+// Checks in rational numbers, without slack, what vdtree::verify() checks in doubles with a slack of 1e-14:
+//   Each support sphere contains the proxy, the leaves and its children's spheres. Each ring sphere contains the proxy, its
+//   children's spheres, and the corners of all triangles at its leaves. The bounding sphere contains all corners.
+//   No leaf (verify() checks the first 4096) is farther from the proxy than the displacement.
+//   Slabs contain the normals of these triangles; masks have a cell within 1e-5 of each, which vdtree::facing() allows for.
+// verify() already checks all other promises exactly, because they compare stored numbers; call it first. The error names
 // the first offender. Cost: leaves times depth, some 20 ns each; a microsecond for each comparison in rationals.
 Result<Verification> verify_exactly(const vdtree::VertexTree& tree, const Progress& progress = {});
 

@@ -1,8 +1,8 @@
 // OpenMesh meshes as input of trees, and cuts as OpenMesh meshes.
 //
-// Any mesh of OpenMesh's array kernel: TriMesh_ArrayKernelT, or PolyMesh_ArrayKernelT with triangles only. Of a mesh
-// with attributes both by vertex and by corner (halfedge), those by vertex count; where only corners have them, as
-// texture coordinates have at seams, vertices are split.
+// Any mesh of OpenMesh's array kernel: TriMesh_ArrayKernelT, or PolyMesh_ArrayKernelT with triangles only. If a mesh has an
+// attribute both by vertex and by corner (halfedge), the vertex's is used. If only corners have it, such as texture
+// coordinates at seams, vertices are split.
 #pragma once
 
 #include <string>
@@ -27,7 +27,7 @@ using adapters::Made;
 
 namespace detail {
 
-// OpenMesh writes to stderr whenever it refuses a face; who calls a library hears of it by what it returns.
+// Silences OpenMesh, which writes to stderr whenever it refuses a face; the result reports that.
 class QuietErrors {
 public:
     QuietErrors() : was_enabled_(omerr().is_enabled()) { omerr().disable(); }
@@ -46,7 +46,7 @@ glm::vec3 vec3_of(const V& v) {
     return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-// OpenMesh's colours are of bytes, or of floating-point numbers from 0 to 1; of three channels or four.
+// OpenMesh's colours have three or four channels of bytes, or of floating-point numbers from 0 to 1.
 template <class Colour>
 glm::vec4 colour_of(const Colour& colour, ColourEncoding encoding) {
     using Channel = typename OpenMesh::vector_traits<Colour>::value_type;
@@ -74,12 +74,10 @@ Colour openmesh_colour(const glm::vec4& linear, ColourEncoding encoding) {
     return out;
 }
 
-inline Error malformed(const std::string& what) { return {ErrorCode::malformed_data, what}; }
-
 } // namespace detail
 
-// Vertices and faces in their order, without deleted ones: garbage need not be collected before. Fails where a face is
-// no triangle, and where a face has no halfedge or uses a deleted vertex.
+// Vertices and faces in their order, without deleted ones: garbage need not be collected before. Fails if a face is not a
+// triangle, has no halfedge, or uses a deleted vertex.
 template <class M>
 Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
     const auto vertex_is_deleted = [&](auto v) { return mesh.has_vertex_status() && mesh.status(v).deleted(); };
@@ -114,7 +112,7 @@ Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
         const std::string face = "Face " + std::to_string(i);
         const auto first = mesh.halfedge_handle(f);
         if (!first.is_valid())
-            return detail::malformed(face + " has no halfedge: it was made without vertices; delete it.");
+            return adapters::malformed(face + " has no halfedge: it was made without vertices; delete it.");
         vdtree::Triangle triangle{};
         std::size_t count = 0;
         auto h = first;
@@ -122,8 +120,8 @@ Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
             const auto v = mesh.to_vertex_handle(h);
             if (!v.is_valid() || static_cast<std::size_t>(v.idx()) >= numbers.size() ||
                 numbers[static_cast<std::size_t>(v.idx())] == deleted)
-                return detail::malformed(face + " uses vertex " + std::to_string(v.idx()) +
-                                         ", which is deleted or not there; delete the face, too.");
+                return adapters::malformed(face + " uses vertex " + std::to_string(v.idx()) +
+                                           ", which is deleted or not there; delete the face, too.");
             if (count < 3) {
                 const vdtree::Index number = numbers[static_cast<std::size_t>(v.idx())];
                 adapters::CornerSoup::Corner corner = corners[number];
@@ -134,22 +132,17 @@ Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
             ++count;
             h = mesh.next_halfedge_handle(h);
         } while (h.is_valid() && h != first && count <= mesh.n_halfedges());
-        if (h != first) return detail::malformed(face + " is not closed: its halfedges do not lead back to the first.");
-        if (count != 3)
-            return Error{ErrorCode::unsupported, face + " has " + std::to_string(count) +
-                                                     " corners, and trees are of triangles: call triangulate() first."};
+        if (const auto valid = adapters::check_face(face, h == first, count, "call triangulate() first."); !valid)
+            return valid.error();
         soup.add_triangle(triangle);
         out.faces.push_back(f);
     }
-    out.vertices.reserve(soup.sources().size());
-    for (const vdtree::Index source : soup.sources()) out.vertices.push_back(kept[source]);
-    out.mesh = std::move(soup.mesh());
+    soup.finish(out, kept);
     return out;
 }
 
-// Normals, colours and texture coordinates become vertex properties, which are requested where the soup has them.
-// Coincident vertices stay apart. Fails on what vdtree::validate() refuses. While it works, OpenMesh prints no errors:
-// neither here nor in other threads.
+// Normals, colours and texture coordinates become vertex properties if the soup has them. Coincident vertices stay apart.
+// Fails if vdtree::validate() fails. Meanwhile OpenMesh prints no errors, in other threads neither.
 template <class M>
 Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options = {}) {
     if (const auto valid = vdtree::validate(soup); !valid) return valid.error();
@@ -182,23 +175,16 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
     };
     for (std::size_t v = 0; v < soup.positions.size(); ++v) add_vertex(static_cast<vdtree::Index>(v));
     const detail::QuietErrors quiet;
-    std::vector<vdtree::Triangle> refused;
-    for (const vdtree::Triangle& t : soup.triangles) {
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        const auto handle = [](vdtree::Index v) { return typename M::VertexHandle(static_cast<int>(v)); };
-        if (!mesh.add_face(handle(t[0]), handle(t[1]), handle(t[2])).is_valid()) refused.push_back(t);
-    }
-    for (const vdtree::Triangle& t : refused) {
-        const auto a = add_vertex(t[0]), b = add_vertex(t[1]), c = add_vertex(t[2]);
-        if (!mesh.add_face(a, b, c).is_valid())
-            return detail::malformed("OpenMesh refused a triangle that stands alone.");
-    }
-    out.loose_triangles = refused.size();
+    const auto handle = [](vdtree::Index v) { return typename M::VertexHandle(static_cast<int>(v)); };
+    const auto add_face = [&](auto a, auto b, auto c) { return mesh.add_face(a, b, c).is_valid(); };
+    const auto loose = adapters::add_triangles(soup, handle, add_vertex, add_face);
+    if (!loose) return loose.error();
+    out.loose_triangles = *loose;
     return out;
 }
 
-// The tree of a mesh. Its source_vertices() are numbers of to_mesh()'s soup: those of the handles, where nothing is
-// deleted and attributes are the vertices'. Else take to_mesh(), which says what is what, and vdtree::build_tree().
+// The tree of a mesh. Its source_vertices() are the numbers of the handles, if nothing is deleted and attributes are by
+// vertex. Otherwise call to_mesh(), which returns the sources, and vdtree::build_tree().
 template <class M>
 Result<vdtree::VertexTree> build_tree(const M& mesh, const vdtree::BuildOptions& build = {},
                                       const Options& options = {}) {
@@ -207,14 +193,10 @@ Result<vdtree::VertexTree> build_tree(const M& mesh, const vdtree::BuildOptions&
     return vdtree::build_tree(soup->mesh.view(), build);
 }
 
-// The cut as a mesh of its own; `sources` are the tree's nodes.
+// The cut as a mesh; `sources` are the tree's nodes.
 template <class M>
 Result<Made<M>> extract_mesh(const vdtree::Cut& cut, const Options& options = {}) {
-    const vdtree::ExtractedMesh extracted = vdtree::extract_with_sources(cut);
-    auto made = from_mesh<M>(extracted.mesh.view(), options);
-    if (made)
-        for (vdtree::Index& source : made->sources) source = extracted.nodes[source];
-    return made;
+    return adapters::extract_mesh(cut, [&](const vdtree::MeshView& soup) { return from_mesh<M>(soup, options); });
 }
 
 } // namespace unseen::openmesh

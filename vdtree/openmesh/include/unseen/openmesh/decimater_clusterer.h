@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
@@ -21,8 +22,8 @@
 
 namespace unseen::openmesh {
 
-// What is decimated: a vertex a place (coincident vertices are one), with status and face normals, in double precision,
-// scaled to the unit box: the lengths of modules, such as ModQuadric's error, are shares of the mesh's largest side.
+// The mesh to decimate: one vertex for each place (coincident vertices are one), with status and face normals, in double
+// precision, scaled to the unit box. So lengths in modules, such as ModQuadric's error, are shares of the largest side.
 struct ClusterTraits : OpenMesh::DefaultTraits {
     using Point = OpenMesh::Vec3d;
     using Normal = OpenMesh::Vec3d;
@@ -36,7 +37,7 @@ using ClusterDecimater = OpenMesh::Decimater::DecimaterT<ClusterMesh>;
 
 namespace detail {
 
-// Writes a hierarchy down as merges happen.
+// Records a hierarchy while merges happen.
 class MergeRecord {
 public:
     explicit MergeRecord(std::size_t vertices) : parents_(vertices, 0) {}
@@ -59,7 +60,7 @@ private:
     std::vector<glm::dvec3> positions_;
 };
 
-// A module that allows every collapse and is told of those that happen.
+// A module that allows every collapse and reports those that happen.
 template <class M>
 class ModRecordT : public OpenMesh::Decimater::ModBaseT<M> {
 public:
@@ -74,7 +75,7 @@ public:
     }
 };
 
-// Tells the caller's progress callback, and ends the decimation where it says so.
+// Calls the caller's progress callback, and ends the decimation if that returns false.
 class ProgressObserver : public OpenMesh::Decimater::Observer {
 public:
     ProgressObserver(const Progress& progress, std::size_t vertices)
@@ -92,7 +93,7 @@ private:
     bool cancelled_ = false;
 };
 
-// The vertices that no collapse has removed, merged by Unseen's own clusterers.
+// Merges the vertices that no collapse has removed, by Unseen's own clusterers.
 inline Result<vdtree::Clustering> cluster_rest(const vdtree::ClusterInput& input, const ClusterMesh& mesh,
                                                std::span<const vdtree::Index> vertex_of_place,
                                                std::span<const vdtree::Index> places) {
@@ -124,11 +125,145 @@ inline Result<vdtree::Clustering> cluster_rest(const vdtree::ClusterInput& input
     return rest.triangles.empty() ? vdtree::cluster_octree(input_of_rest) : vdtree::cluster_quadric(input_of_rest);
 }
 
+// One clustering: the mesh with one vertex for each place, decimated, and the merges that it leads to.
+class DecimaterClustering {
+public:
+    explicit DecimaterClustering(const vdtree::ClusterInput& input)
+        : input_(input), place_of_(input.mesh.positions.size()), record_(input.mesh.positions.size()) {
+        glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+        for (const glm::dvec3& p : input.mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
+        const glm::dvec3 sides = high - low;
+        const double side = std::max({sides.x, sides.y, sides.z});
+        low_ = low;
+        size_ = side > 0 ? side : 1;
+        add_vertices();
+        merge_coincident();
+    }
+
+    // Fails on triangles that OpenMesh's halfedges cannot hold.
+    Result<void> add_faces() {
+        std::size_t refused = 0;
+        const QuietErrors quiet;
+        for (const vdtree::Triangle& t : input_.mesh.triangles) {
+            const auto handle = [&](Index v) { return ClusterMesh::VertexHandle(static_cast<int>(place_of_[v])); };
+            const auto a = handle(t[0]), b = handle(t[1]), c = handle(t[2]);
+            if (a == b || b == c || c == a) continue;
+            refused += !mesh_.add_face(a, b, c).is_valid();
+        }
+        if (refused > 0)
+            return Error{ErrorCode::unsupported,
+                         "OpenMesh's decimater needs a manifold surface with consistent orientation, and " +
+                             std::to_string(refused) + " of " + std::to_string(input_.mesh.triangles.size()) +
+                             " triangles do not fit: repair the mesh, or use the clusterer quadric, which takes any."};
+        mesh_.update_face_normals();
+        return {};
+    }
+
+    Result<void> decimate(const FunctionRef<void(ClusterDecimater&)>& add_modules, const Progress& progress) {
+        ClusterDecimater decimater(mesh_);
+        typename ModRecordT<ClusterMesh>::Handle recorder;
+        decimater.add(recorder);
+        decimater.module(recorder).on_collapse = [&](int removed, int remaining) {
+            const auto from = static_cast<std::size_t>(removed), to = static_cast<std::size_t>(remaining);
+            const Index merged = record_.make_cluster(position(to));
+            record_.set_parent(cluster_of_[from], merged);
+            record_.set_parent(cluster_of_[to], merged);
+            cluster_of_[to] = merged;
+            is_removed_[from] = 1;
+        };
+        add_modules(decimater);
+        if (!decimater.initialize())
+            return Error{ErrorCode::invalid_argument,
+                         "OpenMesh's decimater needs exactly one module that gives priorities, such as ModQuadricT; "
+                         "make the others binary (set_binary(true))."};
+        ProgressObserver observer(progress, vertex_of_place_.size());
+        decimater.set_observer(&observer);
+        decimater.decimate(0);
+        if (observer.abort()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+        return {};
+    }
+
+    // Merges the places that are left, by Unseen's own clusterers.
+    Result<vdtree::Clustering> finish() {
+        std::vector<Index> left;
+        for (std::size_t place = 0; place < is_removed_.size(); ++place)
+            if (!is_removed_[place]) left.push_back(static_cast<Index>(place));
+        if (left.size() == 1) {
+            if (record_.size() == place_of_.size()) { // one vertex alone: it still needs a root
+                const Index root = record_.make_cluster(position(left[0]));
+                record_.set_parent(cluster_of_[left[0]], root);
+            }
+            return record_.finish();
+        }
+        const auto rest = cluster_rest(input_, mesh_, vertex_of_place_, left);
+        if (!rest) return rest.error();
+        // Clusters of the rest follow those made so far.
+        const auto base = static_cast<Index>(record_.size());
+        const auto number = [&](Index c) {
+            return c < left.size() ? cluster_of_[left[c]] : base + (c - static_cast<Index>(left.size()));
+        };
+        for (const glm::dvec3& p : rest->positions.empty() ? means_of(*rest, left) : rest->positions)
+            record_.make_cluster(p);
+        for (std::size_t c = 0; c + 1 < rest->parents.size(); ++c)
+            record_.set_parent(number(static_cast<Index>(c)), number(rest->parents[c]));
+        return record_.finish();
+    }
+
+private:
+    using Index = vdtree::Index;
+
+    void add_vertices() {
+        for (std::size_t v = 0; v < place_of_.size(); ++v) {
+            if (input_.coincident[v] != v) {
+                place_of_[v] = place_of_[input_.coincident[v]];
+                ++vertices_there_[place_of_[v]];
+                continue;
+            }
+            place_of_[v] = static_cast<Index>(vertex_of_place_.size());
+            vertex_of_place_.push_back(static_cast<Index>(v));
+            vertices_there_.push_back(1);
+            const glm::dvec3 p = (input_.mesh.positions[v] - low_) / size_;
+            mesh_.add_vertex(ClusterMesh::Point(p.x, p.y, p.z));
+        }
+        is_removed_.assign(vertex_of_place_.size(), 0);
+    }
+    void merge_coincident() {
+        for (std::size_t place = 0; place < vertex_of_place_.size(); ++place)
+            cluster_of_.push_back(vertices_there_[place] == 1 ? vertex_of_place_[place]
+                                                              : record_.make_cluster(position(place)));
+        for (std::size_t v = 0; v < place_of_.size(); ++v)
+            if (vertices_there_[place_of_[v]] > 1) record_.set_parent(static_cast<Index>(v), cluster_of_[place_of_[v]]);
+    }
+    const glm::dvec3& position(std::size_t place) const { return input_.mesh.positions[vertex_of_place_[place]]; }
+
+    // By cluster of the rest that is no place: the mean of the places under it.
+    std::vector<glm::dvec3> means_of(const vdtree::Clustering& rest, std::span<const Index> left) const {
+        std::vector<glm::dvec3> means;
+        std::vector<glm::dvec4> sums(rest.parents.size(), glm::dvec4(0));
+        for (std::size_t c = 0; c < rest.parents.size(); ++c) {
+            if (c < left.size()) sums[c] = glm::dvec4((position(left[c]) - low_) / size_, 1);
+            else means.push_back(low_ + size_ * (glm::dvec3(sums[c]) / sums[c].w));
+            if (rest.parents[c] != c) sums[rest.parents[c]] += sums[c];
+        }
+        return means;
+    }
+
+    const vdtree::ClusterInput& input_;
+    glm::dvec3 low_;
+    double size_ = 1; // of the unit box
+    ClusterMesh mesh_;
+    std::vector<Index> place_of_;                         // by vertex
+    std::vector<Index> vertex_of_place_, vertices_there_; // by place: the first vertex, and how many
+    MergeRecord record_;
+    std::vector<Index> cluster_of_;        // by place: its cluster so far
+    std::vector<std::uint8_t> is_removed_; // by place
+};
+
 } // namespace detail
 
-// Collapses as far as the modules let it, in their order; what is left then, such as the parts of a mesh and the handles
-// of its surface, is merged by vdtree::cluster_quadric(). Proxies are vertices of the mesh up to there. One thread; the
-// result depends on the mesh and the modules alone.
+// Collapses edges as far as the modules allow, in their order. vdtree::cluster_quadric() merges the rest, such as separate
+// parts and the handles of the surface. Until then proxies are vertices of the mesh. One thread; the result depends on
+// the mesh and the modules alone.
 //
 //     const auto clusterer = [](const vdtree::ClusterInput& input) {
 //         return openmesh::cluster_by_decimater(input, [](openmesh::ClusterDecimater& decimater) {
@@ -139,115 +274,15 @@ inline Result<vdtree::Clustering> cluster_rest(const vdtree::ClusterInput& input
 //     };
 //     const auto tree = vdtree::build_tree(mesh.view(), clusterer);
 //
-// Fails where the surface is not manifold, with consistently oriented neighbours, once equal positions are one vertex:
-// OpenMesh's halfedges cannot hold it. Fails where not exactly one of the modules gives priorities.
+// Fails if the surface, with equal positions merged, is not manifold with consistent orientation, as OpenMesh's halfedges
+// need. Fails unless exactly one of the modules gives priorities.
 template <class AddModules>
 requires std::is_invocable_v<AddModules&, ClusterDecimater&> Result<vdtree::Clustering>
 cluster_by_decimater(const vdtree::ClusterInput& input, AddModules&& add_modules, const Progress& progress = {}) {
-    using vdtree::Index;
-    const std::size_t vertices = input.mesh.positions.size();
-    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const glm::dvec3& p : input.mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
-    const glm::dvec3 sides = high - low;
-    const double side = std::max({sides.x, sides.y, sides.z});
-    const double size = side > 0 ? side : 1;
-
-    ClusterMesh mesh;
-    std::vector<Index> place_of(vertices), vertex_of_place, vertices_there;
-    for (std::size_t v = 0; v < vertices; ++v) {
-        if (input.coincident[v] != v) {
-            place_of[v] = place_of[input.coincident[v]];
-            ++vertices_there[place_of[v]];
-            continue;
-        }
-        place_of[v] = static_cast<Index>(vertex_of_place.size());
-        vertex_of_place.push_back(static_cast<Index>(v));
-        vertices_there.push_back(1);
-        const glm::dvec3 p = (input.mesh.positions[v] - low) / size;
-        mesh.add_vertex(ClusterMesh::Point(p.x, p.y, p.z));
-    }
-    std::size_t refused = 0;
-    {
-        const detail::QuietErrors quiet;
-        for (const vdtree::Triangle& t : input.mesh.triangles) {
-            const auto handle = [&](Index v) { return ClusterMesh::VertexHandle(static_cast<int>(place_of[v])); };
-            const auto a = handle(t[0]), b = handle(t[1]), c = handle(t[2]);
-            if (a == b || b == c || c == a) continue;
-            refused += !mesh.add_face(a, b, c).is_valid();
-        }
-    }
-    if (refused > 0)
-        return Error{ErrorCode::unsupported,
-                     "OpenMesh's decimater needs a manifold surface with consistent orientation, and " +
-                         std::to_string(refused) + " of " + std::to_string(input.mesh.triangles.size()) +
-                         " triangles do not fit: repair the mesh, or take the clusterer quadric, which takes any."};
-    mesh.update_face_normals();
-
-    // Coincident vertices merge first.
-    detail::MergeRecord record(vertices);
-    std::vector<Index> cluster_of(vertex_of_place.size()); // by place
-    for (std::size_t place = 0; place < vertex_of_place.size(); ++place)
-        cluster_of[place] = vertices_there[place] == 1
-                                ? vertex_of_place[place]
-                                : record.make_cluster(input.mesh.positions[vertex_of_place[place]]);
-    for (std::size_t v = 0; v < vertices; ++v)
-        if (vertices_there[place_of[v]] > 1) record.set_parent(static_cast<Index>(v), cluster_of[place_of[v]]);
-
-    std::vector<std::uint8_t> is_removed(vertex_of_place.size(), 0);
-    {
-        ClusterDecimater decimater(mesh);
-        typename detail::ModRecordT<ClusterMesh>::Handle recorder;
-        decimater.add(recorder);
-        decimater.module(recorder).on_collapse = [&](int removed, int remaining) {
-            const auto from = static_cast<std::size_t>(removed), to = static_cast<std::size_t>(remaining);
-            const Index merged = record.make_cluster(input.mesh.positions[vertex_of_place[to]]);
-            record.set_parent(cluster_of[from], merged);
-            record.set_parent(cluster_of[to], merged);
-            cluster_of[to] = merged;
-            is_removed[from] = 1;
-        };
-        add_modules(decimater);
-        if (!decimater.initialize())
-            return Error{ErrorCode::invalid_argument,
-                         "OpenMesh's decimater needs exactly one module that gives priorities, such as ModQuadricT; "
-                         "make the others binary (set_binary(true))."};
-        detail::ProgressObserver observer(progress, vertex_of_place.size());
-        decimater.set_observer(&observer);
-        decimater.decimate(0);
-        if (observer.abort()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-    }
-
-    std::vector<Index> left;
-    for (std::size_t place = 0; place < is_removed.size(); ++place)
-        if (!is_removed[place]) left.push_back(static_cast<Index>(place));
-    if (left.size() == 1) {
-        if (record.size() == vertices) { // one vertex alone: it still needs a root
-            const Index root = record.make_cluster(input.mesh.positions[vertex_of_place[left[0]]]);
-            record.set_parent(cluster_of[left[0]], root);
-        }
-        return record.finish();
-    }
-    const auto rest = detail::cluster_rest(input, mesh, vertex_of_place, left);
-    if (!rest) return rest.error();
-    // Clusters of the rest follow those made so far. Without positions of their own, they are at the mean of what they
-    // stand for.
-    const auto base = static_cast<Index>(record.size());
-    const auto number = [&](Index c) {
-        return c < left.size() ? cluster_of[left[c]] : base + (c - static_cast<Index>(left.size()));
-    };
-    std::vector<glm::dvec3> positions = rest->positions;
-    if (positions.empty()) {
-        std::vector<glm::dvec4> sums(rest->parents.size(), glm::dvec4(0));
-        for (std::size_t c = 0; c < rest->parents.size(); ++c) {
-            if (c < left.size()) sums[c] = glm::dvec4((input.mesh.positions[vertex_of_place[left[c]]] - low) / size, 1);
-            else positions.push_back(low + size * (glm::dvec3(sums[c]) / sums[c].w));
-            if (rest->parents[c] != c) sums[rest->parents[c]] += sums[c];
-        }
-    }
-    for (const glm::dvec3& p : positions) record.make_cluster(p);
-    for (std::size_t c = 0; c + 1 < rest->parents.size(); ++c)
-        record.set_parent(number(static_cast<Index>(c)), number(rest->parents[c]));
-    return record.finish();
+    detail::DecimaterClustering clustering(input);
+    if (const auto added = clustering.add_faces(); !added) return added.error();
+    if (const auto done = clustering.decimate(add_modules, progress); !done) return done.error();
+    return clustering.finish();
 }
 
 // By quadric error alone: OpenMesh's usual decimation (Garland and Heckbert 1997, without boundary terms).
@@ -263,8 +298,8 @@ inline Result<vdtree::Clustering> cluster_by_decimater(const vdtree::ClusterInpu
         progress);
 }
 
-// The tree of a soup, clustered by that; what `unseen build --clusterer openmesh` does. Of the options, the clusterer
-// does not count, and there can be no team.
+// The tree of a soup, clustered by quadric error as above, as in `unseen build --clusterer openmesh`. Ignores the options'
+// clusterer; there can be no team.
 inline Result<vdtree::VertexTree> build_tree_by_decimater(const vdtree::MeshView& mesh,
                                                           const vdtree::BuildOptions& options = {}) {
     constexpr double begins = 0.1, ends = 0.7; // of the whole build, as vdtree::build_tree() tells it

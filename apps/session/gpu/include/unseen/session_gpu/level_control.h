@@ -25,10 +25,13 @@
 #include <vector>
 
 #include <unseen/render/context.h>
-#include <unseen/render/layers.h>
 #include <unseen/render/target.h>
 #include <unseen/session/level_chain.h>
 #include <unseen/session/session.h>
+
+namespace unseen::render {
+class LayerPasses;
+}
 
 namespace unseen::session {
 
@@ -49,7 +52,7 @@ struct LevelControlOptions {
     double bias = 1; // of distance and area: above 1 finer levels, below coarser ones; above 0
 
     LevelChainOptions chain = {};
-    int layers = render::default_layers; // 1 to render::most_layers
+    int layers = 5; // of depth, 1 to 16
     MapRecipe maps = MapRecipe::modern;
     int map_block = 1;        // a map's threshold is of so many by so many pixels, 1 to 16
     bool half_floats = false; // pictures of layers; of modern maps 1% is lost, of rpg99 in smooth pictures more

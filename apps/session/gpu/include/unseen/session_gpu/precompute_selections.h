@@ -13,7 +13,10 @@
 #include <unseen/session/selection.h>
 #include <unseen/session/session.h>
 #include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/team.h>
+
+namespace unseen::vdtree {
+class Team;
+}
 
 namespace unseen::session {
 

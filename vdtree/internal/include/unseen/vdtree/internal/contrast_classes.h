@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <unseen/vdtree/distance_criterion.h>
+#include <unseen/vdtree/criteria.h>
 
 namespace unseen::vdtree {
 
@@ -25,7 +25,7 @@ public:
     explicit ContrastClasses(const AbsoluteScale& scale)
         : scale_(scale), log2_step_(std::log2(scale_.of(1) / lowest()) / (level_count - 1)) {}
 
-    // Of a range at a level, a relative value, too.
+    // The class of a range at a level; both are relative.
     std::uint16_t class_of(LuminanceRange range, double level) const {
         const double lo = scale_.of(range.lo), hi = scale_.of(range.hi);
         const double contrast = (hi - lo) / (hi + lo);

@@ -5,7 +5,7 @@
 
 namespace unseen::vdtree {
 
-// By values: a minimum of references is looked for in memory, with a branch that nobody can foretell.
+// By values: a minimum of references would be loaded from memory after an unpredictable branch.
 inline PackedRange unite(PackedRange a, PackedRange b) {
     const std::uint16_t lo = a.lo.value < b.lo.value ? a.lo.value : b.lo.value,
                         hi = a.hi.value > b.hi.value ? a.hi.value : b.hi.value;

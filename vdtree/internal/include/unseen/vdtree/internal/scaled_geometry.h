@@ -7,8 +7,8 @@
 
 namespace unseen::vdtree {
 
-// A power of two that brings a radius to between 1 and 2; 1 where it is none, or so ordinary that sixth powers of it
-// and of its parts are numbers as they are. Lengths times it and back are exact.
+// A power of two that brings a radius to between 1 and 2. 1 for 0 and non-finite radii, and for ordinary ones, whose sixth
+// powers neither over- nor underflow. Lengths times it and back are exact.
 float unit_scale(float radius);
 
 // Positions and spheres times a power of two, relative to the origin. All else is viewed in the given geometry, which

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
@@ -22,7 +23,7 @@ std::vector<PackedRange> bound_ring_texture(const TreeGeometry& geometry, const 
 // the texture even where no vertex moves.
 std::vector<std::uint8_t> find_texture_moves(const TreeGeometry& geometry, const TreeParts& parts);
 
-// Of luminances and a texture that is multiplied with them; rounded outward.
+// The range of luminances multiplied by a texture, rounded outward.
 PackedRange product(PackedRange luminance, PackedRange texture);
 
 // The least and the largest channel of a vertex's colour as it is drawn, scaled to its luminance: a texture of the

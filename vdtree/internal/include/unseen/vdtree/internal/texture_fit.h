@@ -9,6 +9,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

@@ -37,7 +37,7 @@ struct TreeLinks {
     }
 };
 
-// Of a tree's arrays.
+// Views of a tree's arrays.
 template <class Arrays>
 TreeLinks links_of(const Arrays& tree) {
     return {tree.parents, tree.first_leaf, tree.leaf_end, tree.subtree_end};

@@ -49,7 +49,7 @@ struct GeometryArrays {
     Storage<Index> source_vertices; // by leaf
     Storage<std::byte> document;    // MeshView::document
 
-    // Of textured trees only.
+    // Textured trees only.
     Storage<TextureFacts> texture; // one
     Storage<Texel> texels;
     Storage<PackedRange> ring_texture; // by interior node
@@ -67,7 +67,7 @@ struct GeometryFacts {
 struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
     std::shared_ptr<const void> mapping; // the memory that arrays view
 
-    // Empty where there is none.
+    // Empty without a texture.
     TextureView texture_view() const {
         if (texture.empty()) return {};
         return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v, texels};
@@ -100,7 +100,7 @@ struct VertexTree::Data {
     std::vector<Attribute> attributes;
 };
 
-// Whether an attribute can be one of a tree with so many nodes: empty, or what is wrong, as a sentence.
+// Why an attribute cannot belong to a tree with this many nodes, as a sentence; empty if it can.
 std::string fault_in_attribute(const AttributeInfo& attribute, std::size_t interior_count, std::size_t node_count);
 
 // In memory of its own, whatever the given arrays view.

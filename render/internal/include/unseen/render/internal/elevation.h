@@ -1,0 +1,56 @@
+// Threshold maps with elevation by local contrast (Ramasubramanian and others 1999), for comparison with older work. The
+// passes know neither display nor observer: perception::rpg99_tables() makes their tables.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <unseen/render/context.h>
+#include <unseen/render/internal/visibility_passes.h>
+#include <unseen/vdtree/result.h>
+
+namespace unseen::render {
+
+// The fields of Rpg99Tables in perception/judge_tables.h, which explains the computation.
+struct ElevationTables {
+    static constexpr int band_count = 6, level_count = 8;
+
+    std::array<float, 3> kernel = {};
+    std::array<float, band_count> frequency_factor = {};
+    int adaptation_level = 0;
+    float floor = 0, largest_elevation = 0;
+    float masking_scale = 0, masking_gain = 0, masking_power = 0;
+    float first_log2 = 0;
+    int nodes_an_octave = 0, luminances = 0;
+    std::vector<float> log2_tvi;
+    std::vector<float> log2_csf;
+};
+
+// Move-only; keeps a handle to the context. Memory: 108 bytes a pixel, and 4 for each map.
+class ElevationPasses {
+public:
+    // For pictures of one size. Fails on contradictory tables, beyond this GL's limits, and if memory runs out.
+    static Result<ElevationPasses> create(const Context& context, int width, int height, const ElevationTables& tables);
+    ElevationPasses(ElevationPasses&&) noexcept;
+    ElevationPasses& operator=(ElevationPasses&&) noexcept;
+    ~ElevationPasses();
+
+    // Maps the just visible step of luminance, cd/m2, by pixel of the picture. Does not wait. Maps are kept by number as in
+    // VisibilityPasses. Fails on a picture of another size.
+    static constexpr int most_maps = VisibilityPasses::most_maps;
+    Result<void> map_thresholds(const LuminanceTexture& picture, int number = 0);
+    Result<std::vector<float>> read_thresholds(int number = 0) const; // waits; fails where there is no map yet
+    unsigned thresholds_texture(int number = 0) const noexcept;       // one 32-bit float; 0 before there is a map
+
+    int full_screen_passes() const noexcept; // since create()
+    std::uint64_t texture_bytes() const noexcept;
+
+private:
+    struct Impl;
+    explicit ElevationPasses(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace unseen::render

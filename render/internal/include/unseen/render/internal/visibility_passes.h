@@ -1,0 +1,140 @@
+// Finds the pixels of a picture that differ visibly from a reference: the passes of a judge that works by bands of a
+// pyramid. They know neither display nor observer: perception::judge_tables() makes their tables.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <unseen/render/context.h>
+#include <unseen/render/target.h>
+#include <unseen/vdtree/result.h>
+
+namespace unseen::render {
+
+// A picture in memory that becomes a texture. Move-only; keeps a handle to the context.
+class LuminanceImage {
+public:
+    // Row-major from the top left. Fails on a size below 1x1 or beyond this GL's limits, on another number of values, and if
+    // memory runs out. Does not check the values.
+    static Result<LuminanceImage> create(const Context& context, int width, int height, std::span<const float> cdm2);
+    LuminanceImage(LuminanceImage&&) noexcept;
+    LuminanceImage& operator=(LuminanceImage&&) noexcept;
+    ~LuminanceImage();
+
+    Result<void> set(std::span<const float> cdm2); // of the same size
+    LuminanceTexture texture() const noexcept;
+
+private:
+    struct Impl;
+    explicit LuminanceImage(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+struct LuminanceExtent {
+    float least = 0, largest = 0; // cd/m2
+};
+// Waits for the GPU. Fails on a NaN, infinite or negative luminance, naming the first pixel; `which` is the picture's name
+// in the message.
+Result<LuminanceExtent> luminance_extent(const Context& context, const LuminanceTexture& picture, const char* which);
+
+// Tables for pictures of one size: the fields of perception/judge_tables.h, which explains the computation.
+struct VisibilityTables {
+    struct Node {
+        float log2_s = 0, own = 1, smoothed = 0;
+    };
+    struct Gaussian {
+        float weight = 0;
+        int halvings = 0;          // 0 to 30
+        std::vector<float> kernel; // 1 to 12 values
+    };
+    struct Band {
+        float of_patch = 1;
+        std::array<Gaussian, 3> window;
+        std::vector<Node> nodes; // luminances x eccentricities
+    };
+    struct Gaze {
+        glm::vec3 direction = {0, 0, 1};
+        float tangent_per_pixel = 0;
+    };
+
+    int width = 0, height = 0;
+    float floor_cdm2 = 0; // above 0
+    float beta = 0, most_thresholds = 0;
+    std::array<float, 3> kernel = {};
+    float masking_power = 0, masking_knee = 0, least_masker = 0, most_masker = 0;
+    int luminance_shift = 0, first_luminance = 0;
+    int luminances = 0, eccentricities = 0;
+    float first_eccentricity = 0, eccentricity_step = 0;
+    std::optional<Gaze> gaze = {};
+    std::vector<Band> bands; // 1 to 16
+};
+
+struct VisibilitySummary {
+    double largest = 0; // V
+    std::uint64_t visible_pixels = 0;
+};
+
+// The factors by which a picture raises thresholds, at least, in cells of a grid over it.
+struct ElevationGrid {
+    int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
+    int columns = 0, rows = 0;
+    std::vector<float> elevation; // [(band * rows + row) * columns + column], 1 or more; bands as in the tables
+};
+
+// Prepares a reference once, and judges any number of pictures against it. Everything is made on demand: the reference's
+// weights and the planes for judging in the first judge(), the threshold map in the first map_thresholds(). The same
+// pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
+//
+// Memory, in bytes a pixel: 4 for the reference; for judging 11 for its weights, 11 more while it is prepared, and some 35;
+// 4 for each threshold map and 25 more while it is mapped. From the first set_reference() on, temporary memory is kept.
+class VisibilityPasses {
+public:
+    // Copies the reference. Fails on tables that contradict themselves or the picture, beyond this GL's limits, and if memory
+    // runs out. The tables' luminances must span the reference's; see luminance_extent().
+    static Result<VisibilityPasses> create(const Context& context, const VisibilityTables& tables,
+                                           const LuminanceTexture& reference);
+    VisibilityPasses(VisibilityPasses&&) noexcept;
+    VisibilityPasses& operator=(VisibilityPasses&&) noexcept;
+    ~VisibilityPasses();
+
+    // Sets another reference, of the same size and within the tables' luminances. Does not wait, and makes no textures from
+    // the second time on. Fails like create(); then the reference stays.
+    Result<void> set_reference(const LuminanceTexture& reference);
+
+    // Judges a picture of the reference's size. Does not wait.
+    Result<void> judge(const LuminanceTexture& test);
+
+    // Results for the last judged picture; these wait for the GPU. Fail if none was judged, and if a luminance of it was
+    // negative or not finite; the message names the first such pixel.
+    Result<VisibilitySummary> summary() const;
+    Result<std::vector<float>> read_visibility() const; // V by pixel, row-major from the top left
+
+    // Maps the just visible step of luminance, cd/m2, by pixel of this reference. Maps of several references are kept by
+    // number, 0 to most_maps - 1; one of the same number is overwritten.
+    static constexpr int most_maps = 16;
+    Result<void> map_thresholds(int number = 0);
+    Result<std::vector<float>> read_thresholds(int number = 0) const; // fails where there is no map yet
+    unsigned thresholds_texture(int number = 0) const noexcept;       // 0 before there is a map
+
+    int full_screen_passes() const noexcept;      // since create()
+    std::uint64_t texture_bytes() const noexcept; // of all textures except the tables
+
+    // Maps the reference's masking, band by band. The masker of a band is the mean around a sample, by a Gaussian of 1.5
+    // samples; a cell has the least of all samples in it or around it, so everything in some cells is masked by at least
+    // the least of these. Reading waits for the GPU, but less than reading a picture would. Cells are 1 to 64 pixels.
+    Result<void> map_elevations(int cell_px = 8);
+    Result<ElevationGrid> read_elevations() const; // fails where there is no map yet
+
+private:
+    struct Impl;
+    explicit VisibilityPasses(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace unseen::render

@@ -1,0 +1,809 @@
+// The judge's passes. Step by step they do what perception's judge does on the CPU (judge_modern.cpp there, which is the
+// reference); shaders/planes.glsl says how numbers lie in textures.
+#include <unseen/render/internal/visibility_passes.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <unseen/render/target.h>
+#include <unseen/vdtree/internal/errors.h>
+
+#include "context_impl.h"
+#include "gl.h"
+#include "gpu_plane.h"
+#include "luminance_texture.h"
+#include "plane_program.h"
+#include "shaders.h"
+
+namespace unseen::render {
+namespace {
+
+constexpr std::size_t most_bands = 16;             // of pool.frag: what a fragment shader can read at least
+constexpr std::size_t few_bands = 8;               // of its variant for usual sizes
+constexpr std::size_t most_taps = 12;              // of blur.frag
+constexpr int most_halvings = 30;                  // shifts of a whole number
+constexpr int group_columns = 64, group_rows = 16; // of examine.comp
+
+constexpr int largest_cell_px = 64;
+// A Gaussian of 1.5 samples: as far as one part of a pattern is seen with another, about.
+constexpr std::array<float, 5> pooling_kernel = {0.26656f, 0.21344f, 0.10959f, 0.03608f, 0.00761f};
+
+glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
+
+glm::vec4 taps(const VisibilityTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
+
+Result<void> check(const VisibilityTables& t) {
+    const auto refuse = [](const std::string& what) { return judge_error("the tables are none: " + what); };
+    if (t.bands.empty() || t.bands.size() > most_bands) return refuse("they need 1 to 16 bands");
+    if (t.luminances < 2 || t.eccentricities < 1) return refuse("they need two luminances and an eccentricity");
+    if (!t.gaze && t.eccentricities != 1) return refuse("without a gaze there is one eccentricity");
+    if (!(t.floor_cdm2 > 0 && t.beta > 0 && t.most_thresholds > 0 && t.masking_knee > 0 && t.least_masker > 0 &&
+          t.most_masker >= t.least_masker && t.eccentricity_step > 0))
+        return refuse("a number that must be above 0 is not");
+    if (t.luminance_shift < 1 || t.luminance_shift > 23) return refuse("luminances are shifted by 1 to 23 bits");
+    const auto nodes = static_cast<std::size_t>(t.luminances) * static_cast<std::size_t>(t.eccentricities);
+    for (const VisibilityTables::Band& band : t.bands) {
+        if (band.nodes.size() != nodes) return refuse("a band has not as many nodes as luminances by eccentricities");
+        for (const VisibilityTables::Gaussian& g : band.window)
+            if (g.kernel.empty() || g.kernel.size() > most_taps || g.halvings < 0 || g.halvings > most_halvings)
+                return refuse("a window's Gaussian has 1 to 12 taps, and up to 30 halvings");
+        if (band.window[0].halvings < band.window[1].halvings || band.window[1].halvings < band.window[2].halvings)
+            return refuse("a window's Gaussians are given from the widest on");
+    }
+    const std::size_t rows = static_cast<std::size_t>(t.eccentricities) * t.bands.size();
+    const auto most = static_cast<std::size_t>(largest_target_side());
+    if (static_cast<std::size_t>(t.luminances) > most || rows > most)
+        return unsupported("judge: the tables are larger than this GPU's textures; judge on the CPU");
+    return {};
+}
+
+// ---- what is in a picture ---------------------------------------------------------------------------------------------
+
+struct Found { // as examine.comp has it
+    std::uint32_t least = 0xffffffffU, largest = 0, not_below_1 = 0, first_bad = 0xffffffffU;
+};
+
+Buffer make_found() {
+    Buffer buffer = Buffer::create("found in a picture");
+    const Found nothing;
+    glNamedBufferStorage(buffer.id(), sizeof(nothing), &nothing, GL_DYNAMIC_STORAGE_BIT);
+    return buffer;
+}
+
+Result<const Program*> examining(const Context& context) {
+    const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::examine_comp}};
+    return context.impl().programs.named("examine", source);
+}
+
+void examine(const Program& program, PlanePasses& passes, const LuminanceTexture& picture, const Buffer& found) {
+    const Found nothing;
+    glNamedBufferSubData(found.id(), 0, sizeof(nothing), &nothing);
+    passes.bind(0, picture.id);
+    program.set(0, glm::ivec2(picture.width, picture.height));
+    program.set(1, static_cast<unsigned>(picture.channel));
+    program.set(2, glm::vec4(picture.scale, picture.offset, 0, 0));
+    program.use();
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, found.id());
+    glDispatchCompute(static_cast<GLuint>((picture.width + group_columns - 1) / group_columns),
+                      static_cast<GLuint>((picture.height + group_rows - 1) / group_rows), 1);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, 0);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
+Found read(const Buffer& buffer) {
+    Found found;
+    glGetNamedBufferSubData(buffer.id(), 0, sizeof(found), &found);
+    return found;
+}
+
+Result<void> check(const Found& found, int width, const char* which) {
+    if (found.first_bad == Found{}.first_bad) return {};
+    const auto columns = static_cast<std::uint32_t>(width);
+    return judge_error("luminance of the " + std::string(which) + " at pixel (" +
+                       std::to_string(found.first_bad % columns) + ", " + std::to_string(found.first_bad / columns) +
+                       ") is negative or not finite");
+}
+
+} // namespace
+
+// ---- LuminanceImage ---------------------------------------------------------------------------------------------------
+
+struct LuminanceImage::Impl {
+    Impl(const Context& context_, int width_, int height_) : context(context_), width(width_), height(height_) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the texture, which goes next
+
+    Result<void> set(std::span<const float> values) const {
+        const auto wanted = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+        if (values.size() != wanted)
+            return judge_error("a picture of " + size_text(width, height) + " pixels has " + std::to_string(wanted) +
+                               " luminances, not " + std::to_string(values.size()));
+        reset_pixel_stores();
+        glTextureSubImage2D(texture.id(), 0, 0, 0, width, height, GL_RED, GL_FLOAT, values.data());
+        return {};
+    }
+
+    Context context; // first, and so gone last
+    int width, height;
+    Texture2d texture;
+};
+
+LuminanceImage::LuminanceImage(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LuminanceImage::LuminanceImage(LuminanceImage&&) noexcept = default;
+LuminanceImage& LuminanceImage::operator=(LuminanceImage&&) noexcept = default;
+LuminanceImage::~LuminanceImage() = default;
+
+Result<LuminanceImage> LuminanceImage::create(const Context& context, int width, int height,
+                                              std::span<const float> cdm2) {
+    auto impl = std::make_unique<Impl>(context, width, height);
+    auto made = in_context(context, "Making a picture", [&]() -> Result<void> {
+        if (auto ok = check_size(width, height); !ok) return ok;
+        impl->texture = Texture2d::create("luminance");
+        glTextureStorage2D(impl->texture.id(), 1, GL_R32F, width, height);
+        return impl->set(cdm2);
+    });
+    if (!made) return made.error();
+    return LuminanceImage(std::move(impl));
+}
+
+Result<void> LuminanceImage::set(std::span<const float> cdm2) {
+    return in_context(impl_->context, "Making a picture", [&] { return impl_->set(cdm2); });
+}
+
+LuminanceTexture LuminanceImage::texture() const noexcept {
+    return {.id = impl_->texture.id(), .width = impl_->width, .height = impl_->height};
+}
+
+Result<LuminanceExtent> luminance_extent(const Context& context, const LuminanceTexture& picture, const char* which) {
+    LuminanceExtent extent;
+    auto done = in_context(context, "Looking at a picture", [&]() -> Result<void> {
+        if (auto ok = check_texture(picture); !ok) return ok;
+        const auto program = examining(context);
+        if (!program) return program.error();
+        const Buffer buffer = make_found();
+        PlanePasses passes;
+        examine(**program, passes, picture, buffer);
+        const Found found = read(buffer);
+        extent = {std::bit_cast<float>(found.least), std::bit_cast<float>(found.largest)};
+        return check(found, picture.width, which);
+    });
+    if (!done) return done.error();
+    return extent;
+}
+
+// ---- VisibilityPasses -------------------------------------------------------------------------------------------------
+
+struct VisibilityPasses::Impl {
+    Impl(const Context& context_, const VisibilityTables& tables_)
+        : context(context_), tables(tables_), size(tables.width, tables.height) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+
+    // A band of the reference.
+    struct Band {
+        glm::ivec2 size = {};
+        GpuPlanes weights; // own, smoothed
+    };
+    // What judging needs. Planes that all levels use are as large as the largest of them.
+    struct Judging {
+        std::array<GpuPlanes, 3> differences; // of the first level, and of every second and third one
+        GpuPlanes reduced, band, blurred_rows;
+        std::array<GpuPlanes, 3> energies; // as they are, and halved by turns
+        std::array<GpuPlanes, 3> blurred;  // by the window's Gaussians
+        std::vector<GpuPlanes> powers;     // by band
+        GpuPlanes visibility;
+        Buffer found_in_test, found_visible;
+    };
+    enum class Sight { weights, thresholds, maskers };
+    // What mapping and weighing need meanwhile.
+    struct Scratch {
+        GpuPlanes split, across, odd, even; // luminance and contrast; levels of the reference
+        std::vector<GpuPlanes> steps;       // thresholds by band
+        std::array<GpuPlanes, 3> maskers;   // as they are, pooled along rows, and pooled
+        GpuPlanes packed;
+    };
+
+    Result<void> prepare(const LuminanceTexture& picture);
+    Result<void> copy_reference(const LuminanceTexture& picture);
+    Result<void> check_reference(const LuminanceTexture& picture) const;
+    Result<void> set_reference(const LuminanceTexture& picture);
+    Result<void> weigh_reference();
+    Result<void> need_scratch();
+    void end_scratch() {
+        if (!keeps_scratch) scratch.reset();
+    }
+    Result<void> find_programs(Sight sight);
+    void upload_nodes();
+    // Calls use(level, luminance and contrast) for each band.
+    template <class Use>
+    Result<void> for_each_reference_band(PlanePasses& passes, Use use);
+    void see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight, const GpuPlanes& to);
+    void reduce(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const GpuPlanes& across, const GpuPlanes& to);
+
+    Result<void> find_judging_programs();
+    Result<void> prepare_judging();
+    Result<void> judge(const LuminanceTexture& test);
+    void add_energies(PlanePasses& passes, std::size_t level);
+    void blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size, std::span<const float> kernel,
+              const GpuPlanes& rows, const GpuPlanes& to);
+    void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& packed,
+              const GpuPlanes& to);
+    Result<void> map_elevations(int cell_px);
+    Result<void> map_thresholds(std::size_t number);
+
+    std::uint64_t texture_bytes() const;
+
+    Context context; // first, and so gone last
+    VisibilityTables tables;
+    glm::ivec2 size;
+    Texture2d nodes; // of all bands
+    GpuPlanes reference;
+    std::vector<Band> bands;
+    std::optional<Judging> judging;
+    bool is_judged = false, is_weighed = false;
+    std::optional<Scratch> scratch;
+    bool keeps_scratch = false;
+    struct Map {
+        GpuPlanes planes;
+        bool is_of_reference = false; // of the present one
+    };
+    std::vector<Map> maps;
+    mutable int passes_done = 0;
+    struct Elevations {
+        int cell_px;
+        glm::ivec2 cells;
+        GpuPlanes planes; // one band below the other
+        bool is_of_reference;
+    };
+    std::optional<Elevations> elevations;
+
+    const Program *copy = nullptr, *subtract = nullptr, *reduce_rows = nullptr, *reduce_columns = nullptr,
+                  *split_reference = nullptr, *split_base = nullptr, *split_difference = nullptr, *weigh = nullptr,
+                  *step = nullptr, *square = nullptr, *halve = nullptr, *raise = nullptr, *pool_powers = nullptr,
+                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr, *mask = nullptr, *elevate = nullptr;
+    std::array<const Program*, 3> blur_rows = {}, blur_columns = {};
+};
+
+// Programs that nothing calls for are not compiled.
+Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
+    PlanePrograms programs(context);
+    programs.find(unpack, "unpack", shaders::unpack_frag);
+    programs.find(reduce_columns, "reduce columns", shaders::reduce_frag);
+    programs.find(reduce_rows, "reduce rows", shaders::reduce_frag, {"ALONG_ROWS"});
+    programs.find(split_reference, "split reference", shaders::split_frag, {"REFERENCE"});
+    programs.find(split_base, "split base", shaders::split_frag, {"REFERENCE", "BASE"});
+    const bool is_step = sight == Sight::thresholds;
+    const Program*& seen = is_step ? step : sight == Sight::maskers ? mask : weigh;
+    if (sight == Sight::maskers) {
+        if (tables.gaze) programs.find(seen, "mask by gaze", shaders::sight_frag, {"MASKERS", "GAZE"});
+        else programs.find(seen, "mask", shaders::sight_frag, {"MASKERS"});
+        programs.find(elevate, "least elevation", shaders::least_elevation_frag);
+        programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
+        programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
+    } else if (is_step && tables.gaze) programs.find(seen, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
+    else if (is_step) programs.find(seen, "step", shaders::sight_frag, {"THRESHOLDS"});
+    else if (tables.gaze) programs.find(seen, "weigh by gaze", shaders::sight_frag, {"GAZE"});
+    else programs.find(seen, "weigh", shaders::sight_frag);
+    const bool is_few = tables.bands.size() <= few_bands;
+    if (is_step && is_few)
+        programs.find(pool_thresholds, "pool 8 thresholds", shaders::pool_frag, {"THRESHOLDS", "UP_TO_8"});
+    else if (is_step) programs.find(pool_thresholds, "pool thresholds", shaders::pool_frag, {"THRESHOLDS"});
+    return programs.result();
+}
+
+void VisibilityPasses::Impl::upload_nodes() {
+    std::vector<glm::vec4> texels;
+    for (const VisibilityTables::Band& band : tables.bands)
+        for (const VisibilityTables::Node& node : band.nodes)
+            texels.emplace_back(node.log2_s, node.own, node.smoothed, 0);
+    const auto rows = static_cast<GLsizei>(static_cast<std::size_t>(tables.eccentricities) * tables.bands.size());
+    nodes = Texture2d::create("sensitivity");
+    glTextureStorage2D(nodes.id(), 1, GL_RGBA32F, tables.luminances, rows);
+    reset_pixel_stores();
+    glTextureSubImage2D(nodes.id(), 0, 0, 0, tables.luminances, rows, GL_RGBA, GL_FLOAT, texels.data());
+}
+
+void VisibilityPasses::Impl::reduce(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const GpuPlanes& across,
+                                    const GpuPlanes& to) {
+    const glm::ivec2 across_size(from_size.x, halved(from_size).y);
+    reduce_columns->set(0, from_size);
+    reduce_columns->set(1, taps(tables));
+    passes.draw(*reduce_columns, across, texels_of(across_size), {from});
+    reduce_rows->set(0, across_size);
+    reduce_rows->set(1, taps(tables));
+    passes.draw(*reduce_rows, to, texels_of(halved(from_size)), {across.texture()});
+}
+
+Result<void> VisibilityPasses::Impl::need_scratch() {
+    if (scratch) return {};
+    const glm::ivec2 second = halved(size), third = halved(second);
+    Scratch made;
+    auto split = GpuPlanes::create(size, 2, PlaneFormat::full, "luminance and contrast");
+    if (!split) return split.error();
+    made.split = std::move(*split);
+    if (bands.size() > 1)
+        for (const auto& [planes, pixels] :
+             {std::pair{&made.across, glm::ivec2(size.x, second.y)}, {&made.odd, second}, {&made.even, third}}) {
+            auto level = GpuPlanes::create(pixels, 1, PlaneFormat::full, "levels of a reference");
+            if (!level) return level.error();
+            *planes = std::move(*level);
+        }
+    scratch = std::move(made);
+    return {};
+}
+
+template <class Use>
+Result<void> VisibilityPasses::Impl::for_each_reference_band(PlanePasses& passes, Use use) {
+    if (auto made = need_scratch(); !made) return made;
+    const GpuPlanes& split = scratch->split;
+    unsigned fine = reference.texture();
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        const glm::ivec2 here = bands[level].size;
+        if (level + 1 == bands.size()) {
+            split_base->set(2, tables.floor_cdm2);
+            passes.draw(*split_base, split, texels_of(here), {fine});
+        } else {
+            const GpuPlanes& next = level % 2 == 0 ? scratch->odd : scratch->even;
+            reduce(passes, fine, here, scratch->across, next);
+            split_reference->set(0, halved(here));
+            split_reference->set(1, taps(tables));
+            split_reference->set(2, tables.floor_cdm2);
+            passes.draw(*split_reference, split, texels_of(here), {fine, next.texture()});
+            fine = next.texture();
+        }
+        if (auto used = use(level, split); !used) return used;
+    }
+    return {};
+}
+
+void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight,
+                                 const GpuPlanes& to) {
+    const Program& program = sight == Sight::thresholds ? *step : sight == Sight::maskers ? *mask : *weigh;
+    const Band& band = bands[level];
+    program.set(0, band.size);
+    program.set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
+    program.set(2, glm::ivec2(tables.first_luminance, tables.luminances));
+    program.set(3, glm::ivec2(static_cast<int>(level) * tables.eccentricities, tables.luminance_shift));
+    program.set(4, glm::vec4(tables.bands[level].of_patch, 0, 0, 0));
+    if (tables.gaze) {
+        program.set(5, glm::vec4(tables.gaze->direction, tables.gaze->tangent_per_pixel));
+        program.set(6, glm::vec4(tables.first_eccentricity, 1 / tables.eccentricity_step,
+                                 static_cast<float>(tables.eccentricities), 0));
+        program.set(7, size);
+        program.set(8, static_cast<unsigned>(level));
+    }
+    passes.draw(program, to, texels_of(band.size), {of_reference.texture(0), of_reference.texture(1), nodes.id()});
+}
+
+Result<void> VisibilityPasses::Impl::check_reference(const LuminanceTexture& picture) const {
+    if (auto ok = check_texture(picture); !ok) return ok;
+    if (picture.width != size.x || picture.height != size.y)
+        return judge_error("the tables are for pictures of " + size_text(size.x, size.y) + ", not " +
+                           size_text(picture.width, picture.height));
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::prepare(const LuminanceTexture& picture) {
+    if (auto ok = check(tables); !ok) return ok;
+    if (auto ok = check_reference(picture); !ok) return ok;
+    PlanePrograms programs(context);
+    programs.find(copy, "luminance", shaders::luminance_frag);
+    if (auto ok = programs.result(); !ok) return ok;
+    upload_nodes();
+    auto copied = GpuPlanes::create(size, 1, PlaneFormat::full, "reference");
+    if (!copied) return copied.error();
+    reference = std::move(*copied);
+    bands.resize(tables.bands.size());
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        bands[level].size = level == 0 ? size : halved(bands[level - 1].size);
+    }
+    return copy_reference(picture);
+}
+
+Result<void> VisibilityPasses::Impl::copy_reference(const LuminanceTexture& picture) {
+    PlanePasses passes;
+    copy->set(0, size);
+    copy->set(1, static_cast<unsigned>(picture.channel));
+    copy->set(2, glm::vec4(picture.scale, picture.offset, 0, 0));
+    passes.draw(*copy, reference, texels_of(size), {picture.id});
+    passes_done += passes.count();
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::set_reference(const LuminanceTexture& picture) {
+    if (auto ok = check_reference(picture); !ok) return ok;
+    is_judged = is_weighed = false;
+    keeps_scratch = true;
+    for (Map& map : maps) map.is_of_reference = false;
+    if (elevations) elevations->is_of_reference = false;
+    return copy_reference(picture);
+}
+
+// What judging needs of the reference.
+Result<void> VisibilityPasses::Impl::weigh_reference() {
+    if (is_weighed) return {};
+    if (auto ok = find_programs(Sight::weights); !ok) return ok;
+    for (Band& band : bands) {
+        if (band.weights) continue;
+        auto weights = GpuPlanes::create(band.size, 2, PlaneFormat::full, "weights of a band");
+        if (!weights) return weights.error();
+        band.weights = std::move(*weights);
+    }
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        see(passes, level, of_reference, Sight::weights, bands[level].weights);
+        return {};
+    });
+    end_scratch();
+    passes_done += passes.count();
+    is_weighed = static_cast<bool>(done);
+    return done;
+}
+
+Result<void> VisibilityPasses::Impl::find_judging_programs() {
+    PlanePrograms programs(context);
+    programs.find(subtract, "difference", shaders::luminance_frag, {"DIFFERENCE"});
+    programs.find(split_difference, "split difference", shaders::split_frag);
+    programs.find(square, "energy", shaders::energy_frag);
+    programs.find(halve, "halve", shaders::halve_frag);
+    programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
+    programs.find(blur_rows[1], "blur rows by 8", shaders::blur_frag, {"ALONG_ROWS", "REACH_2"});
+    programs.find(blur_rows[2], "blur rows by 11", shaders::blur_frag, {"ALONG_ROWS", "REACH_3"});
+    programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
+    programs.find(blur_columns[1], "blur columns by 8", shaders::blur_frag, {"REACH_2"});
+    programs.find(blur_columns[2], "blur columns by 11", shaders::blur_frag, {"REACH_3"});
+    if (tables.beta == 3.5f) programs.find(raise, "power 3.5", shaders::power_frag, {"EXPONENT_3_5"});
+    else if (tables.beta == 2) programs.find(raise, "power 2", shaders::power_frag, {"EXPONENT_2"});
+    else programs.find(raise, "power", shaders::power_frag);
+    if (bands.size() <= few_bands) programs.find(pool_powers, "pool 8 powers", shaders::pool_frag, {"UP_TO_8"});
+    else programs.find(pool_powers, "pool powers", shaders::pool_frag);
+    if (auto ok = programs.result(); !ok) return ok;
+    const auto found = examining(context);
+    if (!found) return found.error();
+    look = *found;
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::prepare_judging() {
+    if (judging) return {};
+    if (auto ok = find_judging_programs(); !ok) return ok;
+    Judging made;
+    Result<void> result;
+    const auto make = [&](GpuPlanes& planes, glm::ivec2 pixels, PlaneFormat format, const char* label) {
+        if (!result) return;
+        auto created = GpuPlanes::create(pixels, 1, format, label);
+        if (created) planes = std::move(*created);
+        else result = created.error();
+    };
+    const glm::ivec2 second = halved(size), third = halved(second);
+    const bool has_levels = bands.size() > 1;
+    make(made.differences[0], size, PlaneFormat::full, "difference");
+    if (has_levels) {
+        make(made.differences[1], second, PlaneFormat::full, "levels of a difference");
+        make(made.differences[2], third, PlaneFormat::full, "levels of a difference");
+        make(made.reduced, {size.x, second.y}, PlaneFormat::full, "levels of a difference");
+        make(made.band, size, PlaneFormat::full, "band of a difference");
+    }
+    int halvings = 0;
+    std::array<glm::ivec2, 3> largest = {glm::ivec2(1), glm::ivec2(1), glm::ivec2(1)};
+    for (std::size_t level = 0; level < bands.size(); ++level)
+        for (std::size_t i = 0; i < largest.size(); ++i) {
+            const int of_this = tables.bands[level].window[i].halvings;
+            glm::ivec2 pixels = bands[level].size;
+            for (int h = 0; h < of_this; ++h) pixels = halved(pixels);
+            largest[i] = glm::max(largest[i], pixels);
+            halvings = std::max(halvings, of_this);
+        }
+    make(made.energies[0], size, PlaneFormat::full, "energy");
+    if (halvings > 0) make(made.energies[1], second, PlaneFormat::full, "halved energy");
+    if (halvings > 1) make(made.energies[2], third, PlaneFormat::full, "halved energy");
+    glm::ivec2 widest(1);
+    for (std::size_t i = 0; i < largest.size(); ++i) {
+        make(made.blurred[i], largest[i], PlaneFormat::full, "blurred energy");
+        widest = glm::max(widest, largest[i]);
+    }
+    make(made.blurred_rows, widest, PlaneFormat::full, "blurred energy");
+    for (const Band& band : bands) make(made.powers.emplace_back(), band.size, PlaneFormat::full, "power of a band");
+    make(made.visibility, size, PlaneFormat::single, "visibility");
+    if (!result) return result;
+    made.found_in_test = make_found();
+    made.found_visible = make_found();
+    judging = std::move(made);
+    return {};
+}
+
+// `rows`: for what is blurred along the rows alone.
+void VisibilityPasses::Impl::blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size,
+                                  std::span<const float> kernel, const GpuPlanes& rows, const GpuPlanes& to) {
+    std::array<float, most_taps> padded = {};
+    std::copy(kernel.begin(), kernel.end(), padded.begin());
+    const std::size_t reach = kernel.size() - 1, variant = reach <= 4 ? 0 : reach <= 8 ? 1 : 2;
+    const std::span<const float> used(padded.data(), std::min(4 * variant + 5, most_taps));
+    const auto pass = [&](const Program& program, unsigned source, const GpuPlanes& into) {
+        program.set(0, from_size);
+        program.set(1, used);
+        passes.draw(program, into, texels_of(from_size), {source});
+    };
+    pass(*blur_rows[variant], from, rows);
+    pass(*blur_columns[variant], rows.texture(), to);
+}
+
+// From the energies of a band to what the window holds of them, as powers.
+void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level) {
+    const auto& window = tables.bands[level].window;
+    std::array<glm::ivec2, 3> sizes = {};
+    const GpuPlanes* from = &judging->energies[0];
+    glm::ivec2 from_size = bands[level].size;
+    int halvings = 0;
+    for (std::size_t i = window.size(); i-- > 0;) { // from the narrowest on
+        // A narrower one is halved no more often than a wider one.
+        for (; halvings < window[i].halvings; ++halvings) {
+            const GpuPlanes& to = judging->energies[halvings % 2 == 0 ? 1 : 2];
+            halve->set(0, from_size);
+            from_size = halved(from_size);
+            passes.draw(*halve, to, texels_of(from_size), {from->texture()});
+            from = &to;
+        }
+        blur(passes, from->texture(), from_size, window[i].kernel, judging->blurred_rows, judging->blurred[i]);
+        sizes[i] = from_size;
+    }
+    raise->set(0, glm::vec4(window[0].weight, window[1].weight, window[2].weight, 0));
+    raise->set(1, glm::vec4(window[0].halvings, window[1].halvings, window[2].halvings, tables.beta));
+    for (std::size_t i = 0; i < sizes.size(); ++i) raise->set(2 + static_cast<int>(i), sizes[i]);
+    const auto& blurred = judging->blurred;
+    passes.draw(*raise, judging->powers[level], texels_of(bands[level].size),
+                {blurred[0].texture(), blurred[1].texture(), blurred[2].texture()});
+}
+
+// The shader reads all its textures, also those that it does not count.
+void VisibilityPasses::Impl::pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from,
+                                  const GpuPlanes& packed, const GpuPlanes& to) {
+    for (std::size_t i = 0; i < (from.size() <= few_bands ? few_bands : most_bands); ++i)
+        passes.bind(static_cast<unsigned>(i), from[std::min(i, from.size() - 1)].texture());
+    program.set(0, size);
+    program.set(1, static_cast<unsigned>(from.size()));
+    passes.draw(program, packed, texels_of(size), {});
+    passes.draw(*unpack, to, size, {packed.texture()});
+}
+
+Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
+    if (auto ok = check_texture(test); !ok) return ok;
+    if (test.width != size.x || test.height != size.y)
+        return judge_error("the images differ in size: reference " + size_text(size.x, size.y) + ", test " +
+                           size_text(test.width, test.height));
+    if (auto ok = weigh_reference(); !ok) return ok;
+    if (auto ok = prepare_judging(); !ok) return ok;
+    const auto& j = *judging;
+    PlanePasses passes;
+    examine(*look, passes, test, j.found_in_test);
+    subtract->set(0, size);
+    subtract->set(1, static_cast<unsigned>(test.channel));
+    subtract->set(2, glm::vec4(test.scale, test.offset, 0, 0));
+    passes.draw(*subtract, j.differences[0], texels_of(size), {test.id, reference.texture()});
+    unsigned difference = j.differences[0].texture();
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        const Band& band = bands[level];
+        unsigned here = difference;
+        if (level + 1 < bands.size()) {
+            const GpuPlanes& next = j.differences[level % 2 == 0 ? 1 : 2];
+            reduce(passes, difference, band.size, j.reduced, next);
+            split_difference->set(0, halved(band.size));
+            split_difference->set(1, taps(tables));
+            passes.draw(*split_difference, j.band, texels_of(band.size), {difference, next.texture()});
+            here = j.band.texture();
+            difference = next.texture();
+        }
+        square->set(0, band.size);
+        square->set(1, glm::vec4(tables.most_thresholds, 0, 0, 0));
+        passes.draw(*square, j.energies[0], texels_of(band.size),
+                    {here, band.weights.texture(0), band.weights.texture(1)});
+        add_energies(passes, level);
+    }
+    pool_powers->set(2, tables.beta);
+    pool(passes, *pool_powers, j.powers, j.differences[0], j.visibility); // the difference is needed no more
+    examine(*look, passes, {.id = j.visibility.texture(), .width = size.x, .height = size.y}, j.found_visible);
+    passes_done += passes.count();
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::map_thresholds(std::size_t number) {
+    if (number < maps.size() && maps[number].is_of_reference) return {};
+    if (auto ok = find_programs(Sight::thresholds); !ok) return ok;
+    if (maps.size() <= number) maps.resize(number + 1);
+    GpuPlanes& map = maps[number].planes;
+    if (!map) {
+        auto made = GpuPlanes::create(size, 1, PlaneFormat::single, "thresholds");
+        if (!made) return made.error();
+        map = std::move(*made);
+    }
+    if (auto ok = need_scratch(); !ok) return ok;
+    auto& steps = scratch->steps;
+    for (std::size_t level = steps.size(); level < bands.size(); ++level) {
+        auto here = GpuPlanes::create(bands[level].size, 1, PlaneFormat::full, "thresholds of a band");
+        if (!here) return here.error();
+        steps.push_back(std::move(*here));
+    }
+    if (!scratch->packed) {
+        auto packed = GpuPlanes::create(size, 1, PlaneFormat::full, "thresholds");
+        if (!packed) return packed.error();
+        scratch->packed = std::move(*packed);
+    }
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        see(passes, level, of_reference, Sight::thresholds, steps[level]);
+        return {};
+    });
+    if (!done) return done;
+    pool(passes, *pool_thresholds, steps, scratch->packed, map);
+    passes_done += passes.count();
+    end_scratch();
+    maps[number].is_of_reference = true;
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::map_elevations(int cell_px) {
+    if (cell_px < 1 || cell_px > largest_cell_px)
+        return judge_error("cells of elevations have 1 to " + std::to_string(largest_cell_px) + " pixels a side, not " +
+                           std::to_string(cell_px));
+    if (elevations && elevations->cell_px == cell_px && elevations->is_of_reference) return {};
+    if (auto ok = find_programs(Sight::maskers); !ok) return ok;
+    const glm::ivec2 cells = (size + cell_px - 1) / cell_px;
+    const auto band_count = static_cast<int>(bands.size());
+    if (cells.y * band_count > largest_target_side())
+        return unsupported("judge: the elevations of " + std::to_string(band_count) + " bands in " +
+                           size_text(cells.x, cells.y) +
+                           " cells are larger than this GPU's textures; take larger cells");
+    if (auto ok = need_scratch(); !ok) return ok;
+    for (GpuPlanes& planes : scratch->maskers) {
+        if (planes) continue;
+        auto made = GpuPlanes::create(size, 1, PlaneFormat::full, "maskers");
+        if (!made) return made.error();
+        planes = std::move(*made);
+    }
+    auto grid = GpuPlanes::create({cells.x, cells.y * band_count}, 1, PlaneFormat::single, "elevations");
+    if (!grid) return grid.error();
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        const glm::ivec2 here = bands[level].size;
+        see(passes, level, of_reference, Sight::maskers, scratch->maskers[0]);
+        blur(passes, scratch->maskers[0].texture(), here, pooling_kernel, scratch->maskers[1], scratch->maskers[2]);
+        const int first_row = static_cast<int>(level) * cells.y;
+        elevate->set(0, here);
+        elevate->set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
+        elevate->set(2, glm::ivec2(cell_px, static_cast<int>(level)));
+        elevate->set(3, glm::ivec2(0, first_row));
+        passes.draw(*elevate, *grid, cells, {scratch->maskers[2].texture()}, first_row);
+        return {};
+    });
+    if (!done) return done;
+    passes_done += passes.count();
+    end_scratch();
+    elevations = Elevations{cell_px, cells, std::move(*grid), true};
+    return {};
+}
+
+std::uint64_t VisibilityPasses::Impl::texture_bytes() const {
+    std::uint64_t bytes = reference.bytes();
+    for (const Band& band : bands) bytes += band.weights.bytes();
+    for (const Map& map : maps) bytes += map.planes.bytes();
+    if (elevations) bytes += elevations->planes.bytes();
+    if (scratch) {
+        for (const GpuPlanes* planes :
+             {&scratch->split, &scratch->across, &scratch->odd, &scratch->even, &scratch->packed})
+            bytes += planes->bytes();
+        for (const GpuPlanes& planes : scratch->steps) bytes += planes.bytes();
+        for (const GpuPlanes& planes : scratch->maskers) bytes += planes.bytes();
+    }
+    if (!judging) return bytes;
+    for (const GpuPlanes* planes : {&judging->reduced, &judging->band, &judging->blurred_rows, &judging->visibility})
+        bytes += planes->bytes();
+    for (const auto* some : {&judging->differences, &judging->energies, &judging->blurred})
+        for (const GpuPlanes& planes : *some) bytes += planes.bytes();
+    for (const GpuPlanes& planes : judging->powers) bytes += planes.bytes();
+    return bytes;
+}
+
+VisibilityPasses::VisibilityPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VisibilityPasses::VisibilityPasses(VisibilityPasses&&) noexcept = default;
+VisibilityPasses& VisibilityPasses::operator=(VisibilityPasses&&) noexcept = default;
+VisibilityPasses::~VisibilityPasses() = default;
+
+Result<VisibilityPasses> VisibilityPasses::create(const Context& context, const VisibilityTables& tables,
+                                                  const LuminanceTexture& reference) {
+    auto impl = std::make_unique<Impl>(context, tables);
+    auto made = in_context(context, "Preparing a judge's reference", [&] { return impl->prepare(reference); });
+    if (!made) return made.error();
+    return VisibilityPasses(std::move(impl));
+}
+
+Result<void> VisibilityPasses::judge(const LuminanceTexture& test) {
+    impl_->is_judged = false; // whatever fails
+    auto judged = in_context(impl_->context, "Judging", [&] { return impl_->judge(test); });
+    impl_->is_judged = static_cast<bool>(judged);
+    return judged;
+}
+
+Result<VisibilitySummary> VisibilityPasses::summary() const {
+    if (!impl_->is_judged) return judge_error("no picture was judged yet");
+    VisibilitySummary summary;
+    auto done = in_context(impl_->context, "Reading a judgement", [&]() -> Result<void> {
+        if (auto ok = check(read(impl_->judging->found_in_test), impl_->size.x, "test"); !ok) return ok;
+        const Found found = read(impl_->judging->found_visible);
+        summary = {static_cast<double>(std::bit_cast<float>(found.largest)), found.not_below_1};
+        return {};
+    });
+    if (!done) return done.error();
+    return summary;
+}
+
+Result<std::vector<float>> VisibilityPasses::read_visibility() const {
+    if (auto ok = summary(); !ok) return ok.error();
+    std::vector<float> values;
+    auto done = in_context(impl_->context, "Reading a judgement", [&]() -> Result<void> {
+        values = read_floats(impl_->judging->visibility.texture(), impl_->size);
+        return {};
+    });
+    if (!done) return done.error();
+    return values;
+}
+
+Result<void> VisibilityPasses::set_reference(const LuminanceTexture& reference) {
+    return in_context(impl_->context, "Preparing a judge's reference", [&] { return impl_->set_reference(reference); });
+}
+
+Result<void> VisibilityPasses::map_thresholds(int number) {
+    if (number < 0 || number >= most_maps)
+        return judge_error("maps of thresholds have the numbers 0 to " + std::to_string(most_maps - 1) + ", not " +
+                           std::to_string(number));
+    return in_context(impl_->context, "Mapping thresholds",
+                      [&] { return impl_->map_thresholds(static_cast<std::size_t>(number)); });
+}
+
+Result<std::vector<float>> VisibilityPasses::read_thresholds(int number) const {
+    const unsigned texture = thresholds_texture(number);
+    if (texture == 0) return judge_error("there is no map of thresholds yet");
+    std::vector<float> values;
+    auto done = in_context(impl_->context, "Reading thresholds", [&]() -> Result<void> {
+        values = read_floats(texture, impl_->size);
+        return {};
+    });
+    if (!done) return done.error();
+    return values;
+}
+
+Result<void> VisibilityPasses::map_elevations(int cell_px) {
+    return in_context(impl_->context, "Mapping elevations", [&] { return impl_->map_elevations(cell_px); });
+}
+
+Result<ElevationGrid> VisibilityPasses::read_elevations() const {
+    if (!impl_->elevations || !impl_->elevations->is_of_reference)
+        return judge_error("there is no map of elevations yet");
+    const Impl::Elevations& from = *impl_->elevations;
+    ElevationGrid grid{from.cell_px, from.cells.x, from.cells.y, {}};
+    auto done = in_context(impl_->context, "Reading elevations", [&]() -> Result<void> {
+        grid.elevation =
+            read_floats(from.planes.texture(), {from.cells.x, from.cells.y * static_cast<int>(impl_->bands.size())});
+        return {};
+    });
+    if (!done) return done.error();
+    return grid;
+}
+
+unsigned VisibilityPasses::thresholds_texture(int number) const noexcept {
+    const auto& maps = impl_->maps;
+    if (number < 0 || static_cast<std::size_t>(number) >= maps.size()) return 0;
+    const GpuPlanes& planes = maps[static_cast<std::size_t>(number)].planes;
+    return planes ? planes.texture() : 0;
+}
+
+int VisibilityPasses::full_screen_passes() const noexcept { return impl_->passes_done; }
+
+std::uint64_t VisibilityPasses::texture_bytes() const noexcept { return impl_->texture_bytes(); }
+
+} // namespace unseen::render

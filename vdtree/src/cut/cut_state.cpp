@@ -1,0 +1,453 @@
+#include "cut/cut_state.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cassert>
+#include <utility>
+
+#include "cut/cut_follower.h"
+#include "cut/index_buffer.h"
+#include "cut/kernel/prefetch.h"
+#include "tree/unchecked_links.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Patching the index buffer around one change costs about as much as gathering this many triangles.
+constexpr std::size_t triangles_per_patch = 60;
+std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
+
+// Walking all leaves in order takes as long as finding the leaves of this many times fewer changes.
+constexpr std::size_t leaves_per_change = 16;
+
+// Revisions of one cut never come to those of another one.
+std::uint64_t first_revision() {
+    static std::atomic<std::uint64_t> cuts{0};
+    return ++cuts << 40;
+}
+
+bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i >> 6] >> (i & 63)) & 1; }
+void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
+void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
+
+} // namespace
+
+// The index buffer and what is known of it.
+struct CutState::Indices {
+    explicit Indices(const VertexTree& tree) : buffer(tree) {}
+    IndexBuffer buffer;
+    bool is_stale = true;
+    bool is_patched = false;   // writes are the whole difference to the buffer before the last change
+    unsigned quiet_frames = 0; // in a row, of few changes
+
+    void count_changes(std::size_t changes, Index triangles) {
+        quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0;
+    }
+    std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
+
+    void change_version() {
+        static std::atomic<std::uint64_t> last{0};
+        version = ++last;
+    }
+};
+
+CutState::CutState(const VertexTree& tree)
+    : tree_(tree.share()), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+      revision_(first_revision()) {}
+CutState::~CutState() = default;
+
+CutFollower& CutState::follower() {
+    if (!follower_) follower_ = std::make_unique<CutFollower>(tree_);
+    return *follower_;
+}
+
+void CutState::forget_followed() noexcept {
+    if (follower_) follower_->forget();
+}
+
+void CutState::set_unfolded(NodeId node) {
+    set_bit(unfolded_, node);
+    const auto first = unchecked_links(tree_).first_triangle;
+    triangle_count_ += first[node + 1] - first[node];
+}
+
+void CutState::set_folded(NodeId node) {
+    clear_bit(unfolded_, node);
+    const auto first = unchecked_links(tree_).first_triangle;
+    triangle_count_ -= first[node + 1] - first[node];
+}
+
+// Makes the leaves of a node stand for the node itself.
+void CutState::assign(NodeId node) {
+    if (tree_.is_leaf(node)) {
+        proxy_[node - tree_.interior_count()] = node;
+        return;
+    }
+    const auto& links = unchecked_links(tree_);
+    std::fill(proxy_.begin() + links.first_leaf[node], proxy_.begin() + links.leaf_end[node], node);
+}
+
+std::span<const NodeId> CutState::children_of(NodeId node) {
+    children_.clear();
+    tree_.for_each_child(node, [&](NodeId child) { children_.push_back(child); });
+    return children_;
+}
+
+// Somebody else than the follower changes the cut: what it knows, and the index buffer, are out of date.
+void CutState::make_stale() {
+    changes_.clear();
+    revision_ += 2;
+    forget_followed();
+    if (!indices_) return;
+    indices_->is_stale = true;
+    indices_->is_patched = false;
+    indices_->quiet_frames = 0;
+    indices_->buffer.drop_lists();
+}
+
+bool CutState::unfold(NodeId node) {
+    assert(!tree_.is_leaf(node) && (is_active(node) || is_unfolded(node)));
+    if (test_bit(unfolded_, node) || !tree_.is_sound(node)) return false;
+    make_stale();
+    set_unfolded(node);
+    for (const NodeId child : children_of(node)) assign(child);
+    return true;
+}
+
+bool CutState::fold(NodeId node) {
+    assert(!tree_.is_leaf(node));
+    if (!test_bit(unfolded_, node)) return false;
+    tree_.for_each_child(node, [&]([[maybe_unused]] NodeId child) { assert(!is_unfolded(child)); });
+    make_stale();
+    set_folded(node);
+    assign(node);
+    return true;
+}
+
+bool CutState::unfold_ancestors(NodeId node) {
+    const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
+    bool changed = false;
+    // What stands for the node's first leaf is an ancestor as long as its number is lower.
+    while (leaf < tree_.leaf_count() && proxy_[leaf] < node && unfold(proxy_[leaf])) changed = true;
+    return changed;
+}
+
+bool CutState::fold_subtree(NodeId node) {
+    if (tree_.is_leaf(node) || !test_bit(unfolded_, node)) return false;
+    make_stale();
+    for (NodeId below = node; below < unchecked_links(tree_).subtree_end[node]; ++below)
+        if (test_bit(unfolded_, below)) set_folded(below);
+    assign(node);
+    return true;
+}
+
+void CutState::unfold_all() {
+    make_stale();
+    if (!tree_.check()) { // but for what is damaged
+        for (NodeId node = 0; node < tree_.interior_count(); ++node)
+            if (is_active(node)) unfold(node);
+        return;
+    }
+    for (NodeId node = 0; node < tree_.interior_count(); ++node) set_bit(unfolded_, node);
+    for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) proxy_[leaf] = tree_.interior_count() + leaf;
+    triangle_count_ = tree_.triangle_count();
+}
+
+// ---- changes in steps
+
+void CutState::begin_changes() {
+    changes_.clear();
+    ++revision_;
+    if (!indices_) return;
+    indices_->is_patched = !indices_->is_stale && indices_->buffer.can_patch();
+    indices_->buffer.begin_patch();
+    indices_->writes_from = indices_->version;
+}
+
+// Gives up patching where gathering has become the cheaper way.
+bool CutState::is_patching() {
+    if (!indices_ || !indices_->is_patched) return false;
+    if (changes_.size() < few_changes(triangle_count_)) return true;
+    indices_->is_patched = false;
+    indices_->buffer.drop_lists();
+    return false;
+}
+
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the
+// children in soon_, where those of each node end.
+void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
+    const auto& links = unchecked_links(tree_);
+    const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, first_triangle = links.first_triangle;
+    const auto subtree_end = links.subtree_end;
+    const auto triangles = links.triangles;
+    const auto prefetch_leaves = [&](NodeId node) {
+        prefetch(&first_leaf[node]);
+        prefetch(&leaf_end[node]);
+    };
+    for (const NodeId node : nodes) {
+        prefetch_leaves(node);
+        prefetch(&subtree_end[node]);
+        prefetch(&first_triangle[node]);
+    }
+    // The first child is the node's neighbour; the next one, which most nodes have, is anywhere.
+    for (const NodeId node : nodes)
+        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node])
+            prefetch_leaves(subtree_end[child]);
+    soon_.clear();
+    soon_ends_.clear();
+    for (const NodeId node : nodes) {
+        tree_.for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
+        soon_ends_.push_back(soon_.size());
+        prefetch(&proxy_[first_leaf[node]]);
+        prefetch(&proxy_[leaf_end[node] - 1]);
+    }
+    if (!indices_ || !indices_->is_patched) return;
+    const std::span<const NodeId> active = folds ? std::span<const NodeId>(soon_) : nodes;
+    const IndexBuffer& buffer = indices_->buffer;
+    buffer.prefetch_places(soon_);
+    if (!folds) {
+        buffer.prefetch_places(nodes);
+        for (const NodeId node : nodes)
+            if (first_triangle[node] < tree_.triangle_count()) prefetch(&triangles[first_triangle[node]]);
+    }
+    buffer.prefetch_lists(active);
+    // The third corners of the triangles that come.
+    const auto for_each_third = [&](auto&& f) {
+        for (const NodeId node : nodes)
+            for (Index t = first_triangle[node]; t < first_triangle[node + 1]; ++t)
+                for (const Index leaf : triangles[t])
+                    if (leaf < first_leaf[node] || leaf >= leaf_end[node]) f(leaf);
+    };
+    if (!folds) for_each_third([&](Index leaf) { prefetch(&proxy_[leaf]); });
+    buffer.prefetch_corners(active);
+    if (folds) return;
+    others_.clear();
+    for_each_third([&](Index leaf) { others_.push_back(proxy_[leaf]); });
+    buffer.prefetch_places(others_);
+    buffer.prefetch_lists(others_);
+}
+
+void CutState::apply_unfold(NodeId node, std::span<const NodeId> children) {
+    set_unfolded(node);
+    changes_.push_back({node, false});
+    for (const NodeId child : children) assign(child);
+    if (is_patching()) indices_->buffer.unfold(node, children, proxy_);
+}
+
+void CutState::apply_fold(NodeId node, std::span<const NodeId> children) {
+    set_folded(node);
+    changes_.push_back({node, true});
+    if (is_patching()) indices_->buffer.fold(node, children);
+    assign(node);
+}
+
+void CutState::fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
+    const NodeId end = unchecked_links(tree_).subtree_end[node];
+    for (std::size_t word = (std::size_t{end} + 63) / 64; word-- > node / 64;) {
+        std::uint64_t bits = unfolded_[word];
+        if (word == node / 64) bits &= ~std::uint64_t{0} << (node & 63);
+        if (word == end / 64) bits &= (std::uint64_t{1} << (end & 63)) - 1;
+        while (bits) {
+            const int highest = 63 - std::countl_zero(bits);
+            bits &= ~(std::uint64_t{1} << highest);
+            const NodeId below = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
+            apply_fold(below);
+            on_fold(below);
+        }
+    }
+}
+
+void CutState::end_changes(AdjustStats& stats) {
+    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
+    stats.triangles = triangle_count_;
+    if (!indices_) return;
+    indices_->count_changes(changes_.size(), triangle_count_);
+    if (indices_->is_patched) {
+        indices_->buffer.end_patch();
+        if (!indices_->buffer.writes().empty()) indices_->change_version();
+    } else if (!changes_.empty()) indices_->is_stale = true;
+    else indices_->is_patched = !indices_->is_stale; // by no writes at all
+}
+
+// ---- other cuts as wholes
+
+bool CutState::are_few_changes(std::span<const std::uint64_t> unfolded) const {
+    std::size_t changes = 0;
+    for (std::size_t word = 0; word < unfolded_.size(); ++word)
+        changes += static_cast<std::size_t>(std::popcount(unfolded_[word] ^ unfolded[word]));
+    return changes < few_changes(triangle_count_);
+}
+
+void CutState::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    if (!are_few_changes(unfolded)) return become(std::move(unfolded), stats);
+    begin_changes();
+    replay(unfolded);
+    end_changes(stats);
+}
+
+void CutState::change_further(std::vector<std::uint64_t> unfolded) {
+    if (are_few_changes(unfolded)) return replay(unfolded);
+    const std::vector<FoldChange> before = std::move(changes_);
+    AdjustStats ignored; // all changes are counted at the end
+    become(std::move(unfolded), ignored);
+    --revision_; // one for all of them
+    changes_.insert(changes_.begin(), before.begin(), before.end());
+}
+
+// Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn
+// comes, and folds run downward.
+void CutState::replay(std::span<const std::uint64_t> unfolded) {
+    for (std::size_t word = 0; word < unfolded.size(); ++word)
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
+            apply_unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    for (std::size_t word = unfolded.size(); word-- > 0;) {
+        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
+            const int highest = 63 - std::countl_zero(bits);
+            apply_fold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)));
+            bits &= ~(std::uint64_t{1} << highest);
+        }
+    }
+}
+
+// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for
+// themselves.
+void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
+    const auto& links = unchecked_links(tree_);
+    const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, subtree_end = links.subtree_end;
+    const NodeId end = tree_.interior_count();
+    const auto next_folded = [&](NodeId node) {
+        std::size_t word = node / 64;
+        std::uint64_t folded = ~unfolded[word] & (~std::uint64_t{0} << (node % 64));
+        while (folded == 0 && ++word < unfolded.size()) folded = ~unfolded[word];
+        return folded == 0 ? end : static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(folded)));
+    };
+    // The number of leaves is unpredictable, so branch-free: a few places are written at once, and the next node overwrites
+    // the surplus.
+    constexpr Index at_once = 16;
+    const Index leaves = tree_.leaf_count(), last_begin = leaves - std::min(leaves, at_once);
+    NodeId* const proxies = proxy_.data();
+    Index leaf = 0;
+    const auto write = [&](Index leaves_end, auto&& proxy_of) {
+        for (; leaf < leaves_end && leaf <= last_begin; leaf += at_once)
+            for (Index i = 0; i < at_once; ++i) proxies[leaf + i] = proxy_of(leaf + i);
+        for (; leaf < leaves_end; ++leaf) proxies[leaf] = proxy_of(leaf);
+        leaf = leaves_end;
+    };
+    const auto stand_for_themselves = [&](Index leaves_end) { write(leaves_end, [end](Index l) { return end + l; }); };
+    for (NodeId node = 0; node < end; node = subtree_end[node]) {
+        node = next_folded(node);
+        if (node >= end) break;
+        stand_for_themselves(first_leaf[node]);
+        write(leaf_end[node], [node](Index) { return node; });
+    }
+    stand_for_themselves(leaves);
+}
+
+// Every proxy is written at most once, however deep the new cut is.
+void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    changes_.clear();
+    ++revision_;
+    for (std::size_t word = 0; word < unfolded.size(); ++word)
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
+            changes_.push_back(
+                {static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
+    for (std::size_t word = unfolded.size(); word-- > 0;) {
+        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
+            const int highest = 63 - std::countl_zero(bits);
+            bits &= ~(std::uint64_t{1} << highest);
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
+        }
+    }
+    if (tree_.leaf_count() < leaves_per_change * changes_.size()) {
+        count_triangles();
+        assign_all(unfolded);
+    } else {
+        assign_changed(unfolded);
+    }
+    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
+    stats.triangles = triangle_count_;
+    unfolded_ = std::move(unfolded);
+    if (!indices_ || changes_.empty()) return;
+    indices_->is_stale = true;
+    indices_->is_patched = false;
+    indices_->count_changes(changes_.size(), triangle_count_);
+    indices_->buffer.drop_lists();
+}
+
+// The triangles of changes_.
+void CutState::count_triangles() {
+    const auto first = unchecked_links(tree_).first_triangle;
+    constexpr std::size_t ahead = 32; // changes between a prefetch and its use
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+        if (i + ahead < changes_.size()) prefetch(&first[changes_[i + ahead].node]);
+        const auto [node, folded] = changes_[i];
+        const Index triangles = first[node + 1] - first[node];
+        triangle_count_ = folded ? triangle_count_ - triangles : triangle_count_ + triangles;
+    }
+}
+
+// The triangles of changes_, and the proxies under them.
+void CutState::assign_changed(const std::vector<std::uint64_t>& unfolded) {
+    const auto& links = unchecked_links(tree_);
+    const auto first = links.first_triangle, first_leaf = links.first_leaf, leaf_end = links.leaf_end;
+    const auto subtree_end = links.subtree_end, parents = links.parents;
+    const auto prefetch_links = [&](NodeId node) {
+        prefetch(&first_leaf[node]);
+        prefetch(&leaf_end[node]);
+        prefetch(&subtree_end[node]);
+    };
+    constexpr std::size_t far = 32, near = 16; // changes between a prefetch and its use
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+        if (i + far < changes_.size()) {
+            const FoldChange& soon = changes_[i + far];
+            prefetch_links(soon.node);
+            prefetch(&first[soon.node]);
+            if (soon.folded) prefetch(&parents[soon.node]);
+        }
+        if (i + near < changes_.size() && !changes_[i + near].folded) {
+            const NodeId soon = changes_[i + near].node, child = soon + 1;
+            if (child < subtree_end[soon] && subtree_end[child] < subtree_end[soon]) prefetch_links(subtree_end[child]);
+        }
+        const auto [node, folded] = changes_[i];
+        const Index triangles = first[node + 1] - first[node];
+        if (folded) {
+            triangle_count_ -= triangles;
+            if (node == VertexTree::root() || test_bit(unfolded, parents[node])) assign(node);
+        } else {
+            triangle_count_ += triangles;
+            tree_.for_each_child(node, [&](NodeId child) {
+                if (tree_.is_leaf(child) || !test_bit(unfolded, child)) assign(child);
+            });
+        }
+    }
+}
+
+std::span<const NodeId> CutState::indices() const {
+    if (!indices_) indices_ = std::make_unique<Indices>(tree_);
+    if (indices_->is_stale) {
+        indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
+        indices_->is_stale = false;
+        indices_->change_version();
+        // When little has changed twice, little will change next; a frame after a jump has enough to do.
+        if (indices_->quiet_frames > 1) indices_->buffer.make_lists();
+    }
+    return indices_->buffer.indices();
+}
+
+std::optional<std::span<const IndexWrite>> CutState::index_writes() const noexcept {
+    if (!indices_ || !indices_->is_patched) return std::nullopt;
+    return indices_->buffer.writes();
+}
+
+std::uint64_t CutState::index_version() const noexcept { return indices_ ? indices_->version : 0; }
+std::uint64_t CutState::index_writes_from() const noexcept { return indices_ ? indices_->writes_from : 0; }
+
+std::uint64_t CutState::byte_size() const noexcept {
+    return sizeof(std::uint64_t) * unfolded_.capacity() + sizeof(NodeId) * proxy_.capacity() +
+           sizeof(FoldChange) * changes_.capacity() + (follower_ ? follower_->byte_size() : 0) +
+           (indices_ ? indices_->buffer.byte_size() : 0);
+}
+
+} // namespace unseen::vdtree
