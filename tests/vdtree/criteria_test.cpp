@@ -65,9 +65,8 @@ bool is_less_than_a_turn(const View& view, double tolerance) { return tolerance 
 
 // By node: whether the view's frustum leaves it unfolded under a criterion that folds nothing else.
 std::vector<bool> seen_of(const VertexTree& tree, const View& view, const Similarity& placement = {}) {
-    const auto criterion = DistanceCriterion::create(
-        tree, {.lengths = std::vector<float>(tree.interior_count(), 1.0f),
-               .switch_distance = {DistanceCriterion::always_visible}});
+    const auto criterion = DistanceCriterion::create(tree, {.lengths = std::vector<float>(tree.interior_count(), 1.0f),
+                                                            .switch_distance = {DistanceCriterion::always_visible}});
     const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, placement));
     std::vector<bool> seen;
     for (NodeId node = 0; node < tree.interior_count(); ++node) seen.push_back((*bits)[node / 64] >> (node % 64) & 1);

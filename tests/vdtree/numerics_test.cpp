@@ -102,8 +102,8 @@ TEST(Numerics, NodesBehindTheEye) {
         view.fov_y_degrees = fields[round % 4];
         view.eye = random_direction(random) * random_between(random, 0.5, 1.5);
         view.target = view.eye + random_direction(random);
-        const auto costs = costs_from(
-            tree, criterion, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}});
+        const auto costs =
+            costs_from(tree, criterion, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}});
         const Projector project(view);
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             const Footprint at = project(tree.origin() + glm::dvec3(tree.positions()[node]));

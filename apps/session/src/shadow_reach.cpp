@@ -11,8 +11,8 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 
 namespace unseen::session {
 namespace {
