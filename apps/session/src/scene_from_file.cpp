@@ -33,7 +33,6 @@ constexpr double usual_ambient = 0.15; // relative luminance of white
 struct Part {
     std::size_t mesh = 0;
     glm::dmat3 stretch = glm::dmat3(1);
-    bool is_copy = false;                        // of a mesh that has another stretch, too
     bool folds = false;                          // shown by other nodes than those of the background, too
     std::optional<vdtree::VertexTree> tree = {}; // none: it has no triangles
     TreeOrigin origin = TreeOrigin::built;
@@ -54,8 +53,7 @@ Error in_file(const fs::path& file, const Error& error) {
 class Builder {
 public:
     Builder(meshio::SceneFile& file, const fs::path& name, const LoadOptions& options, bool is_lit)
-        : file_(file), name_(name), options_(options), is_lit_(is_lit), cache_(options.cache),
-          stretched_triangles_(file.contents().file_bytes, 1, std::uint64_t{1} << 19) {}
+        : file_(file), name_(name), options_(options), is_lit_(is_lit), cache_(options.cache) {}
 
     Result<void> build(std::vector<Part>& parts) {
         const auto start = vdtree::Clock::now();
@@ -126,12 +124,6 @@ private:
             ++empty_;
             return read;
         }
-        if (part.is_copy && !stretched_triangles_.spend((*read)->mesh.triangles.size()))
-            return Error{ErrorCode::unsupported,
-                         Message::of("{}: its nodes stretch meshes in so many ways, each of which needs a tree of its "
-                                     "own, that they multiply to far more than the file holds: scale evenly, or read "
-                                     "the file with {load.as = }model.",
-                                     {name_.string()})};
         if (const auto laid = lay_texture(name_, **read, options_); !laid) return laid.error();
         for (std::string& warning : (*read)->warnings) warnings_.push_back(std::move(warning));
         for (std::string& note : (*read)->notes) notes_.push_back(std::move(note));
@@ -175,7 +167,6 @@ private:
     const LoadOptions& options_;
     bool is_lit_;
     TreeCache cache_;
-    Budget stretched_triangles_;
     std::mutex mutex_;
     std::atomic<bool> is_over_{false};
     std::optional<Error> failure_;
@@ -312,8 +303,8 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         });
         const std::size_t part = found != same.end() ? *found : parts.size();
         if (found == same.end()) {
-            parts.push_back({mesh, factored->stretch, !same.empty()});
             same.push_back(part);
+            parts.push_back({mesh, factored->stretch});
         }
         parts[part].folds = parts[part].folds || !node.is_background;
         placed.push_back({&node, factored->placement, part});
