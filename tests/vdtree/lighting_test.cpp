@@ -101,8 +101,9 @@ TEST(Shading, HasItsHighlightWhereTheHalfVectorIsTheNormal) {
 }
 
 TEST(Lights, ThatCannotBeAreRefusedByTheNameOfTheirField) {
-    const auto complaint = [](const Lighting& lighting) {
-        return validate(lighting) ? std::string() : validate(lighting).error().message;
+    const auto complaint = [](const Lighting& lighting) -> std::string {
+        const auto valid = validate(lighting);
+        return valid ? std::string() : std::string(valid.error().message);
     };
     const LightSource good = directional({0, 0, 1});
     EXPECT_EQ(complaint(lit_by(good)), "");
