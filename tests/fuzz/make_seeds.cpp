@@ -1,4 +1,5 @@
 // Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow,image,text,selection}/.
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -7,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <unseen/calibration/calibration.h>
 #include <unseen/meshio/mesh_io.h>
@@ -45,24 +47,23 @@ void write_for_reader(const fs::path& file, char reader, const fs::path& mesh) {
     write(file, reader + std::string(std::istreambuf_iterator<char>(stream), {}));
 }
 
+// In the order of mesh_fuzz.cpp.
+char reader_of(const fs::path& mesh) {
+    constexpr std::string_view endings[] = {".ply", ".obj", ".off", ".stl", ".gltf", ".glb", ".vtp", ".vtk", ".mtl"};
+    return static_cast<char>(std::find(std::begin(endings), std::end(endings), mesh.extension()) - std::begin(endings));
+}
+
 void make_meshes(const fs::path& folder) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(1));
-    for (const auto& [ending, reader] : {std::pair(".ply", '\0'), std::pair(".obj", '\1'), std::pair(".glb", '\5'),
-                                         std::pair(".vtp", '\6'), std::pair(".vtk", '\7')}) {
-        const fs::path plain = folder / ("plain" + std::string(ending));
+    for (const std::string ending : {".ply", ".obj", ".glb", ".vtp", ".vtk"}) {
+        const fs::path plain = folder / ("plain" + ending);
         expect(meshio::write_mesh(plain, mesh.view()));
-        write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
+        write_for_reader(folder / ("mesh" + ending), reader_of(plain), plain);
         fs::remove(plain);
     }
     if (const std::string levels = mesh_files::compressed_glb(); !levels.empty())
         write(folder / "levels.glb", '\5' + levels);
-    const std::string text_ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
-                                 "y\nproperty float z\nelement face 1\n"
-                                 "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-    write(folder / "text.ply", std::string(1, '\0') + text_ply);
-    write(folder / "mesh.off", "\2OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n");
-    write(folder / "mesh.stl", "\3solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
-                               "0\nendloop\nendfacet\nendsolid s\n");
+    for (const auto& [name, bytes] : mesh_files::samples()) write(folder / name, reader_of(name) + bytes);
     write(folder / "mesh.gltf",
           "\4{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/"
           "octet-stream;base64,"
@@ -89,8 +90,7 @@ void make_scene(const fs::path& folder) {
 }
 
 void make_vtk(const fs::path& folder) {
-    for (const auto& [name, bytes] : vtk_files::samples())
-        write(folder / name, (name.ends_with(".vtp") ? '\6' : '\7') + bytes);
+    for (const auto& [name, bytes] : vtk_files::samples()) write(folder / name, reader_of(name) + bytes);
     // The statements of legacy files.
     write(folder / "statements.vtk",
           '\7' + vtk_files::vtk_quad(false, false,
