@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <set>
@@ -18,6 +17,7 @@
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/lit_folds.h>
 #include <unseen/vdtree/internal/input_file.h>
+#include <unseen/vdtree/internal/names.h>
 
 namespace unseen::session {
 namespace {
@@ -81,19 +81,6 @@ void add_after(std::string_view keyword, std::string_view text, Names& names) {
         }
         if (words > static_cast<int>(most_words)) names.reset();
     }
-}
-
-std::string decode_percent(std::string_view uri) {
-    std::string name;
-    for (std::size_t i = 0; i < uri.size(); ++i) {
-        unsigned code = 0;
-        const char* const digits = uri.data() + i + 1;
-        const bool is_code =
-            uri[i] == '%' && i + 2 < uri.size() && std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
-        name += is_code ? static_cast<char>(code) : uri[i];
-        if (is_code) i += 2;
-    }
-    return name;
 }
 
 // The text of a JSON string; nothing if it has other escapes than of slashes, as exporters write them.

@@ -13,6 +13,7 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/names.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
@@ -283,18 +284,18 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         auto factored = factor(node.to_world);
         if (!factored)
             return Error{ErrorCode::malformed_data,
-                         Message::of("{}: node {} '{}' has, with the nodes above it, a transform without an inverse (a "
+                         Message::of("{}: node {} {} has, with the nodes above it, a transform without an inverse (a "
                                      "scale of 0, or one that is a million times another): correct it, or read the "
                                      "file with {load.as = }model.",
-                                     {name.string(), std::to_string(node.node), node.name})};
+                                     {name.string(), std::to_string(node.node), in_quotes(node.name)})};
         factored->placement.scale *= options.unit_metres;
         factored->placement.translation *= options.unit_metres;
         if (!is_in_reach(factored->placement))
             return Error{ErrorCode::malformed_data,
-                         Message::of("{}: node {} '{}' is too small, too large or too far away for single floats "
+                         Message::of("{}: node {} {} is too small, too large or too far away for single floats "
                                      "(beyond 1e-15 to 1e15 metres): correct its transform, or give "
                                      "{load.unit_metres}.",
-                                     {name.string(), std::to_string(node.node), node.name})};
+                                     {name.string(), std::to_string(node.node), in_quotes(node.name)})};
         turns = turns || is_turned(factored->placement);
         const auto mesh = static_cast<std::size_t>(node.mesh);
         std::vector<std::size_t>& same = of_mesh[mesh];

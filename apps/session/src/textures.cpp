@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <unseen/vdtree/internal/budget.h>
+#include <unseen/vdtree/internal/names.h>
 
 #include "texture_atlas.h"
 #include "texture_image.h"
@@ -96,8 +97,9 @@ public:
     Result<const Texture*> of(const meshio::Material& material) {
         const bool is_embedded = material.image.empty();
         const std::filesystem::path file =
-            is_embedded ? std::filesystem::path(mesh_file_.string() + ": the image of material '" + material.name + "'")
-                        : mesh_file_.parent_path() / material.image;
+            is_embedded
+                ? std::filesystem::path(mesh_file_.string() + ": the image of material " + in_quotes(material.name))
+                : mesh_file_.parent_path() / material.image;
         auto [entry, is_new] =
             images_.try_emplace({material.image, material.image_bytes.get(), material.wrap_u, material.wrap_v});
         if (is_new) {
@@ -191,9 +193,10 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
         const std::size_t m = std::min(of_vertex[v], read.materials.size());
         const auto [entry, is_new] = part_of.try_emplace(of_material[m], parts.size());
         if (is_new)
-            parts.push_back({m < read.materials.size() ? "material '" + read.materials[m].name + "'" : "no material",
-                             of_material[m],
-                             {}});
+            parts.push_back(
+                {m < read.materials.size() ? "material " + in_quotes(read.materials[m].name) : "no material",
+                 of_material[m],
+                 {}});
         part_of_material[m] = entry->second;
         mesh.uvs[v] = glm::vec2(maps[m](mesh.uvs[v]));
         parts[entry->second].used.include(mesh.uvs[v]);

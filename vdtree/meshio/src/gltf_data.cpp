@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -49,23 +48,6 @@ bool is_fallback(const json& buffer) {
 }
 
 } // namespace
-
-std::string decode_percent(std::string_view text) {
-    std::string decoded;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        unsigned code = 0;
-        if (text[i] == '%' && i + 2 < text.size()) {
-            const auto [end, error] = std::from_chars(&text[i + 1], &text[i + 1] + 2, code, 16);
-            if (error == std::errc() && end == &text[i + 1] + 2) {
-                decoded += static_cast<char>(code);
-                i += 2;
-                continue;
-            }
-        }
-        decoded += text[i];
-    }
-    return decoded;
-}
 
 Buffers::Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin)
     : source_(source) {

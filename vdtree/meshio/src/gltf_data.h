@@ -19,8 +19,6 @@
 
 namespace unseen::meshio::gltf {
 
-std::string decode_percent(std::string_view text); // of URIs
-
 class Buffers {
 public:
     // The source must outlive the buffers. `bin`: the container's own, for the first.

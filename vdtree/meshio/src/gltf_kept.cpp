@@ -8,6 +8,7 @@
 
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "kept_arrays.h"
 #include "mesh_readers.h"
 
 namespace unseen::meshio::gltf {
@@ -58,15 +59,6 @@ std::set<std::string> unknown_required(const json& document) {
             unknown.insert(required);
     }
     return unknown;
-}
-
-std::string listed(const std::set<std::string>& names) {
-    constexpr std::size_t enough = 10;
-    std::string list;
-    std::size_t count = 0;
-    for (const std::string& name : names)
-        if (count++ < enough) list += (list.empty() ? "" : ", ") + in_quotes(name);
-    return list + (count > enough ? " and " + std::to_string(count - enough) + " more" : "");
 }
 
 // Removes the extensions of an object, and of all within it, that are not kept.
@@ -141,7 +133,8 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
         {"skins", "skins", any_has(array_of(document, "nodes"), "skin"), drop.skins, "; the mesh is in its bind pose"},
         {"morph targets", "morph-targets", has_morph_targets(document), drop.morph_targets, ""},
         {"animations", "animations", !array_of(document, "animations").empty(), drop.animations, ""},
-        {"unknown extensions", "extensions", !unknown.empty(), drop.extensions, ": " + listed(unknown)}};
+        {"unknown extensions", "extensions", !unknown.empty(), drop.extensions,
+         ": " + listed({unknown.begin(), unknown.end()})}};
     std::string refused, names;
     for (const Thing& thing : things) {
         if (!thing.is_there) continue;
@@ -154,8 +147,8 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
     }
     if (!refused.empty()) {
         fail("it has " + refused + ", which a simplified mesh cannot keep" +
-             (unknown.empty() || drop.extensions ? "" : " (" + listed(unknown) + ")") + "; leave them out with " +
-             Message::of("{read.drop = }") + names + ".");
+             (unknown.empty() || drop.extensions ? "" : " (" + listed({unknown.begin(), unknown.end()}) + ")") +
+             "; leave them out with " + Message::of("{read.drop = }") + names + ".");
     }
 }
 
@@ -168,7 +161,8 @@ json without_geometry(json document, std::vector<Message>& warnings) {
     if (stripped.erase(lod_extension) > 0)
         warnings.push_back("of its levels of detail (MSFT_lod) the finest were read.");
     if (!stripped.empty())
-        warnings.push_back("what extensions say that are not known was left out: " + listed(stripped) + ".");
+        warnings.push_back(
+            "what extensions say that are not known was left out: " + listed({stripped.begin(), stripped.end()}) + ".");
     for (const char* key : {"extensionsUsed", "extensionsRequired"}) keep_names(document, key);
     const auto change_each = [&](const char* key, auto&& change) {
         if (const auto found = document.find(key); found != document.end())

@@ -242,7 +242,7 @@ Result<SourceDocument> as_obj(SourceDocument document, const std::string& librar
     const std::vector<std::string> names = material_names(source);
     for (File& image : document.files)
         if (!image.uri.empty())
-            if (const auto path = path_beside(gltf::decode_percent(image.uri))) image.uri = path->generic_string();
+            if (const auto path = path_beside(decode_percent(image.uri))) image.uri = path->generic_string();
     MtlWriter writer(source, library, document.files);
     const std::string text = writer.write(names);
     if (writer.lost_mirrors())

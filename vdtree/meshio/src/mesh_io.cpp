@@ -8,7 +8,6 @@
 #include "text_scanner.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
@@ -28,8 +27,6 @@ namespace {
 enum class Format { ply, obj, off, stl, gltf, vtp, legacy_vtk };
 
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
-// Longer than any word of the formats; the rest of a longer one helps nobody.
-constexpr std::size_t max_quoted = 40;
 
 std::optional<Format> format_by_ending(const fs::path& name) {
     const std::string ending = lower_ending(name);
@@ -242,14 +239,6 @@ Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::st
     return malformed(source, "byte " + std::to_string(byte) + ": " + what);
 }
 Error cancelled(const MeshSource& source) { return {ErrorCode::cancelled, source.name + ": reading was cancelled."}; }
-
-std::string in_quotes(std::string_view text) {
-    std::string result = "'";
-    for (const char c : text.substr(0, max_quoted)) {
-        result += std::isprint(static_cast<unsigned char>(c)) ? c : '?';
-    }
-    return result + (text.size() > max_quoted ? "...'" : "'");
-}
 
 std::string counted_were(std::uint64_t count, const std::string& noun) {
     return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");

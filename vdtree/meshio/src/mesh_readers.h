@@ -16,6 +16,7 @@
 #include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/finite.h>
 #include <unseen/vdtree/internal/input_file.h>
+#include <unseen/vdtree/internal/names.h>
 
 namespace unseen::meshio {
 
@@ -90,9 +91,6 @@ Error malformed(const MeshSource& source, const Message& what);
 Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what);
 Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what);
 Error cancelled(const MeshSource& source);
-
-// Text from a file as it may stand in a message: quoted, unprintable bytes replaced, long ones cut.
-std::string in_quotes(std::string_view text);
 
 // "1 face was", "3 faces were".
 std::string counted_were(std::uint64_t count, const std::string& noun);

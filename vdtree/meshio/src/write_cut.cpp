@@ -66,7 +66,7 @@ Result<void> write_beside(const fs::path& file, const SourceDocument& document, 
     for (const File& beside : document.files) {
         if (beside.uri.empty() || !beside.bytes) continue;
         const bool is_gltf = document.format == SourceDocument::Format::gltf;
-        const auto path = path_beside(is_gltf ? gltf::decode_percent(beside.uri) : beside.uri);
+        const auto path = path_beside(is_gltf ? decode_percent(beside.uri) : beside.uri);
         if (!path) continue; // a file elsewhere, of which the name is all there is
         if (!may_be_written(*path)) {
             notes.push_back(in_quotes(path->string()) + " is no usual name of an image or library: it was not copied.");
