@@ -378,7 +378,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
 
     const auto refused = [&](const LevelControlOptions& options) {
         const auto made = LevelControl::create(context(), session, ahead(64), options);
-        return made ? std::string("none") : made.error().message;
+        return made ? "none" : made.error().message;
     };
     EXPECT_THAT(refused({.bias = 0}), HasSubstr("bias"));
     EXPECT_THAT(refused({.bias = std::nan("")}), HasSubstr("bias"));

@@ -153,7 +153,7 @@ TEST_F(PrecomputeTest, RefusesOptionsOutOfRange) {
     Session session = bodies();
     const auto complaint = [&](const PrecomputeOptions& options) {
         const auto done = precompute_selections(context(), session, folder / "a.sel", options);
-        return done ? std::string("it was done") : done.error().message;
+        return done ? "it was done" : done.error().message;
     };
     EXPECT_THAT(complaint({}), HasSubstr("budget"));
     EXPECT_THAT(complaint({.budget = 1, .window_px = 8}), HasSubstr("window"));

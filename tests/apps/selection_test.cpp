@@ -390,7 +390,7 @@ TEST(SelectionFile, ThatContradictsItselfIsRefused) {
         break_it(bad);
         EXPECT_TRUE(write_selections(folder / "a.sel", bad));
         const auto back = read_selections(folder / "a.sel");
-        return back ? std::string("it was read") : back.error().message;
+        return back ? "it was read" : back.error().message;
     };
     EXPECT_THAT(refused([](Selections& s) { s.corners[2].cameras[3].objects.back().object = 70; }),
                 HasSubstr("there is not"));

@@ -466,7 +466,7 @@ TEST_F(ProcedureTest, RefusesPlansThatAreNone) {
         CalibrationPlan plan = default_plan();
         change(plan);
         const auto made = Procedure::create(plan, CsfTable::standard());
-        return made ? std::string("none") : made.error().message;
+        return made ? "none" : made.error().message;
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places.clear(); }), HasSubstr("places"));

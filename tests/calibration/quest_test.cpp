@@ -126,7 +126,7 @@ TEST(QuestPlus, RefusesGridsThatAreNone) {
         QuestGrid grid = standard_grid();
         change(grid);
         const auto made = QuestPlus::create(grid);
-        return made ? std::string("none") : made.error().message;
+        return made ? "none" : made.error().message;
     };
     EXPECT_THAT(error_of([](QuestGrid& g) { g.slope.clear(); }), HasSubstr("slope has no values"));
     EXPECT_THAT(error_of([](QuestGrid& g) { g.log10_threshold[3] = g.log10_threshold[2]; }),

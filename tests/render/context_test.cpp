@@ -98,7 +98,7 @@ TEST_F(ContextTest, CanBeMadeOnSeveralThreads) {
     for (std::string& failure : failures)
         threads.emplace_back([&failure] {
             auto made = Context::headless();
-            failure = made ? made->take_errors() : made.error().message;
+            failure = made ? made->take_errors() : std::string(made.error().message);
         });
     for (std::thread& thread : threads) thread.join();
     EXPECT_THAT(failures, ::testing::Each(""));

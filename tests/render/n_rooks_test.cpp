@@ -1,5 +1,5 @@
 // The sample pattern, which needs no GL.
-#include <unseen/render/renderer.h>
+#include <unseen/render/sample_sum.h>
 
 #include <algorithm>
 #include <cmath>

@@ -209,7 +209,7 @@ TEST_F(OverlayTest, RefusesWhatIsNoImageAndNoPicture) {
     const std::vector<glm::u8vec4> three(3);
     const auto why_not = [&](int columns, int rows) {
         const auto set = image.set_image({columns, rows, three});
-        return set ? std::string("taken") : set.error().message;
+        return set ? "taken" : set.error().message;
     };
     EXPECT_THAT(why_not(2, 2), HasSubstr("2x2 pixels does not come as 3"));
     EXPECT_THAT(why_not(-3, -1), HasSubstr("-3x-1"));

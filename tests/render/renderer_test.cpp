@@ -618,7 +618,7 @@ TEST_F(RendererTest, RefusesWhatCannotBeDrawn) {
     const auto why_not = [&](const View& view, const DrawOptions& options, const Similarity& placement) {
         const auto frame = renderer->draw(scene.cut, view, options, placement);
         EXPECT_EQ(context().take_errors(), "");
-        return frame ? std::string("drawn") : frame.error().message;
+        return frame ? "drawn" : frame.error().message;
     };
     const View view = frontal_view(8, 8);
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();

@@ -367,7 +367,7 @@ TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     Target to = target();
     const auto why_not = [&](const Item& item, const Camera& camera) {
         const auto drawn = draw({&item, 1}, camera, to);
-        return drawn ? std::string("drawn") : drawn.error().message;
+        return drawn ? "drawn" : drawn.error().message;
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const View view = oblique_view();
