@@ -93,7 +93,8 @@ CLI::App& Setup::add_section(const std::string& name, const std::string& about) 
 
 void Setup::mark(CLI::App& section, unsigned part) {
     for (CLI::Option* option : section.get_options())
-        if (std::ranges::none_of(options_, [&](const auto& known) { return known.first == option; }))
+        if (option != section.get_help_ptr() &&
+            std::ranges::none_of(options_, [&](const auto& known) { return known.first == option; }))
             options_.push_back({option, part});
 }
 

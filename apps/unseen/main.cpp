@@ -19,7 +19,8 @@ constexpr const char* examples = R"(Examples:
   unseen sheet bunny.vdt -o sheet.png
   unseen view bunny.vdt
 
-'unseen VERB --help' explains a verb, 'unseen help setup' the options that verbs share. Exit status: 0 done, 1 failed, 2 wrong usage.)";
+'unseen VERB --help' explains a verb, 'unseen help setup' the options that verbs share.
+Exit status: 0 done, 1 failed, 2 wrong usage.)";
 
 } // namespace
 
