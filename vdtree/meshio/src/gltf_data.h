@@ -7,7 +7,9 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <new>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,6 +20,22 @@
 #include "mesh_readers.h"
 
 namespace unseen::meshio::gltf {
+
+// Runs what may find a broken rule.
+template <class Value, class Do>
+Result<Value> guarded(const MeshSource& source, Do&& run) {
+    try {
+        return run();
+    } catch (const Broken& broken) {
+        return malformed(source, broken.what);
+    } catch (const json::exception&) {
+        return malformed(source, wrong_type);
+    } catch (const std::bad_alloc&) {
+        return too_large(source.name);
+    } catch (const std::length_error&) { // what a vector throws instead beyond its largest size
+        return too_large(source.name);
+    }
+}
 
 class Buffers {
 public:

@@ -615,13 +615,7 @@ std::vector<SourceDocument::File> Meshes::files(std::vector<Message>& warnings) 
 } // namespace gltf
 
 Result<ReadResult> read_gltf(const MeshSource& source) {
-    try {
-        return gltf::read_document(source);
-    } catch (const gltf::Broken& broken) {
-        return malformed(source, broken.what);
-    } catch (const nlohmann::json::exception&) {
-        return malformed(source, gltf::wrong_type);
-    }
+    return gltf::guarded<ReadResult>(source, [&] { return gltf::read_document(source); });
 }
 
 } // namespace unseen::meshio

@@ -196,11 +196,11 @@ void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
                            "and takes less memory where they are welded before.");
 }
 
+} // namespace
+
 Error too_large(const std::string& name) {
     return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
 }
-
-} // namespace
 
 Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result) {
     if (const Result<void> settled = settle_bad_parts(source, result); !settled) return settled.error();

@@ -91,6 +91,7 @@ Error malformed(const MeshSource& source, const Message& what);
 Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what);
 Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what);
 Error cancelled(const MeshSource& source);
+Error too_large(const std::string& name); // for this machine's memory
 
 // "1 face was", "3 faces were".
 std::string counted_were(std::uint64_t count, const std::string& noun);

@@ -4,10 +4,8 @@
 #include <cctype>
 #include <cmath>
 #include <map>
-#include <new>
 #include <numbers>
 #include <set>
-#include <stdexcept>
 
 #include <glm/geometric.hpp>
 
@@ -276,26 +274,6 @@ private:
     int further_cameras_ = 0, orthographic_ = 0;
 };
 
-Error out_of_memory(const std::string& name) {
-    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
-}
-
-// Runs what may find a broken rule.
-template <class Value, class Do>
-Result<Value> guarded(const MeshSource& source, Do&& run) {
-    try {
-        return run();
-    } catch (const gltf::Broken& broken) {
-        return malformed(source, broken.what);
-    } catch (const json::exception&) {
-        return malformed(source, gltf::wrong_type);
-    } catch (const std::bad_alloc&) {
-        return out_of_memory(source.name);
-    } catch (const std::length_error&) {
-        return out_of_memory(source.name);
-    }
-}
-
 } // namespace
 
 // In the order in which they refer to each other.
@@ -355,7 +333,7 @@ Result<SceneFile> SceneFile::from_bytes(std::string bytes, const fs::path& name,
     constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
     if (bytes.starts_with(utf8_mark)) bytes.erase(0, utf8_mark.size());
     auto impl = std::make_unique<Impl>(std::move(bytes), name, options, folder);
-    const auto read = guarded<void>(impl->source, [&] { return impl->read(); });
+    const auto read = gltf::guarded<void>(impl->source, [&] { return impl->read(); });
     if (!read) return read.error();
     return SceneFile(std::move(impl));
 }
@@ -365,7 +343,7 @@ Result<std::optional<ReadResult>> SceneFile::mesh(std::size_t mesh, const glm::d
     const std::string& name = impl_->reduced.model.meshes[mesh].name;
     MeshSource source = impl_->source;
     source.name += ": " + numbered("mesh", mesh) + (name.empty() ? "" : " " + in_quotes(name));
-    return guarded<Read>(source, [&]() -> Result<Read> {
+    return gltf::guarded<Read>(source, [&]() -> Result<Read> {
         if (!impl_->source.keep_going(impl_->source.bytes.size() / 2, "reading glTF")) return cancelled(source);
         ReadResult read = impl_->meshes->read(mesh, stretch);
         if (read.mesh.triangles.empty() && !read.bad.any()) return Read();
