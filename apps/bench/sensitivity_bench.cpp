@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 #include <random>
-#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -16,6 +15,7 @@
 #include <unseen/calibration/procedure.h>
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
+#include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
 
@@ -80,19 +80,16 @@ struct Reference {
 std::optional<Reference> read_reference(const fs::path& file) {
     const auto text = read_text_file(file);
     if (!text) return std::nullopt;
-    std::istringstream stream(*text);
+    constexpr std::size_t most_fields = 1000;
+    const auto records = parse_csv(*text, file.string(), most_fields);
+    if (!records) return std::nullopt;
     Reference reference;
     reference.file = file;
-    std::size_t number = 0;
-    for (std::string line; std::getline(stream, line);) {
-        ++number;
-        if (!line.empty() && line.back() == '\r') line.pop_back();
-        if (line.empty() || line[0] == '#') continue;
-        std::vector<std::string> cells;
-        std::istringstream parts(line);
-        for (std::string cell; std::getline(parts, cell, ',');) cells.push_back(cell);
-        if (reference.columns.empty()) reference.columns = std::move(cells);
-        else if (cells.size() == reference.columns.size()) reference.rows.push_back({number, std::move(cells)});
+    for (const CsvRecord& record : *records) {
+        if (record.fields[0].starts_with('#')) continue;
+        if (reference.columns.empty()) reference.columns = record.fields;
+        else if (record.fields.size() == reference.columns.size())
+            reference.rows.push_back({static_cast<std::size_t>(record.line), record.fields});
     }
     return reference;
 }

@@ -4,10 +4,10 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <sstream>
 #include <string_view>
 
 #include <glm/geometric.hpp>
+#include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
@@ -108,14 +108,22 @@ public:
     Result<std::vector<CameraPose>> read() {
         const auto text = read_text_file(file_);
         if (!text) return text.error();
-        stream_.str(*text);
-        if (auto header = read_header(); !header) return header.error();
+        constexpr std::size_t most_fields = 1000;
+        const auto records = parse_csv(*text, file_, most_fields);
+        if (!records) return records.error();
         std::vector<CameraPose> poses;
-        while (next_line()) {
-            if (trimmed(line_).empty()) continue;
+        for (const CsvRecord& record : *records) {
+            line_number_ = record.line;
+            std::vector<std::string_view> cells;
+            for (const std::string& field : record.fields) cells.push_back(trimmed(field));
+            if (cells.size() == 1 && cells[0].empty()) continue;
+            if (columns_.empty()) {
+                if (auto header = read_header(cells); !header) return header.error();
+                continue;
+            }
             if (poses.size() == static_cast<std::size_t>(most_path_frames))
                 return malformed("there are more than " + std::to_string(most_path_frames) + " frames.");
-            auto pose = read_pose();
+            auto pose = read_pose(cells);
             if (!pose) return pose.error();
             poses.push_back(*pose);
         }
@@ -124,29 +132,12 @@ public:
     }
 
 private:
-    bool next_line() {
-        ++line_number_;
-        return static_cast<bool>(std::getline(stream_, line_));
-    }
-
     Error malformed(const std::string& what) const {
         return {ErrorCode::malformed_data, file_ + ", line " + std::to_string(line_number_) + ": " + what};
     }
 
-    std::vector<std::string_view> cells() const {
-        std::vector<std::string_view> cells;
-        std::string_view rest = line_;
-        for (std::size_t comma = 0; comma != std::string_view::npos;) {
-            comma = rest.find(',');
-            cells.push_back(trimmed(rest.substr(0, comma)));
-            if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);
-        }
-        return cells;
-    }
-
-    Result<void> read_header() {
-        next_line();
-        for (const std::string_view name : cells()) {
+    Result<void> read_header(const std::vector<std::string_view>& cells) {
+        for (const std::string_view name : cells) {
             const auto found = std::find(column_names.begin(), column_names.end(), name);
             const auto column = static_cast<Column>(found - column_names.begin());
             if (column == column_count)
@@ -172,8 +163,7 @@ private:
         return malformed("the header has no column '" + std::string(column_names[column]) + "'.");
     }
 
-    Result<CameraPose> read_pose() const {
-        const auto texts = cells();
+    Result<CameraPose> read_pose(const std::vector<std::string_view>& texts) const {
         if (texts.size() != columns_.size())
             return malformed("there are " + std::to_string(texts.size()) + " columns, but " +
                              std::to_string(columns_.size()) + " in the header.");
@@ -197,9 +187,7 @@ private:
 
     std::string file_;
     glm::dvec3 up_;
-    std::istringstream stream_;
-    std::string line_;
-    std::uint64_t line_number_ = 0;
+    int line_number_ = 1;
     std::vector<Column> columns_;
 };
 
