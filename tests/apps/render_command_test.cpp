@@ -826,14 +826,6 @@ TEST_F(RenderCommandTest, InterruptedFlightsKeepTheirRows) {
 
 TEST_F(RenderCommandTest, PathsAndTracesAreTextOfAnEnd) {
     const std::string mark = "\xef\xbb\xbf";
-    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"--path", "/dev/zero"}, {"--path", "orbit:0:2", "--gaze-trace", "/dev/zero"}}) {
-        std::vector<std::string> all = {"render", "ball.vdt"};
-        all.insert(all.end(), words.begin(), words.end());
-        const Outcome outcome = run(all);
-        EXPECT_EQ(outcome.status, 1);
-        EXPECT_THAT(outcome.err, ::testing::AllOf(IsAnErrorForPeople(), HasSubstr("512 MiB")));
-    }
     write_text(path("p.csv"), mark + "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,0,3,0,0,0\n");
     write_text(path("g.csv"), mark + "time_s,x_px,y_px\n0,1,2\n");
     const Outcome flown = run({"fly", "ball.vdt", "--path", "p.csv", "--gaze-trace", "g.csv"});
