@@ -1,4 +1,5 @@
 // The adapter for OpenMesh: meshes to trees, cuts back to meshes, its decimater as a clusterer.
+#include <unseen/openmesh/decimater_clusterer.h>
 #include <unseen/openmesh/openmesh.h>
 
 #include <algorithm>

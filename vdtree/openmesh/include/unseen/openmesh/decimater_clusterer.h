@@ -17,7 +17,7 @@
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
-#include <unseen/openmesh/convert.h>
+#include <unseen/openmesh/openmesh.h>
 #include <unseen/vdtree/builder.h>
 
 namespace unseen::openmesh {
