@@ -15,7 +15,6 @@
 #include <unseen/perception/judge_tables.h>
 #include <unseen/render/internal/elevation.h>
 #include <unseen/render/internal/visibility_passes.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/internal/pass_tables.h>
 #include <unseen/session_gpu/picture_judge.h>

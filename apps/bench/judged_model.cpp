@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::app {
 namespace {

@@ -14,12 +14,10 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/judge.h>
-#include <unseen/session/selection_follower.h>
+#include <unseen/session/selection.h>
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/gpu_judge.h>
-#include <unseen/session_gpu/level_pictures.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/csv.h>

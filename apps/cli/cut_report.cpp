@@ -124,8 +124,8 @@ std::string visibility_text(const session::Report& s, const session::Observer& o
         display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
     const session::FoldTest test = s.fold_tests.front();
     text += ": by the model (fold test " + session::name_of(test) +
-            (test == session::FoldTest::luebke_hallen ? ", which misses some changes" : "") +
-            "), which can be wrong, for " + describe(observer) + ", " + where + ", on " +
+            (session::facts_of(test).is_safe ? "" : ", which misses some changes") + "), which can be wrong, for " +
+            describe(observer) + ", " + where + ", on " +
             (is_default_display ? "the default display" : "this display") + ", ";
     if (!observer.gaze) return text + "wherever they look";
     const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };

@@ -193,10 +193,14 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, 
                                {"--suppression", Rule::needs_one_of, moving, why}});
 }
 
-void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
-                          const std::string& text) {
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, bool only_perceptual) {
     std::vector<std::pair<std::string, FoldTest>> choices;
-    for (const FoldTest test : tests) choices.emplace_back(name_of(test), test);
+    std::string text;
+    for (const session::FoldTestFacts& facts : session::fold_tests()) {
+        if (only_perceptual && !facts.is_perceptual) continue;
+        choices.emplace_back(facts.name, facts.test);
+        text += (text.empty() ? "" : ", ") + std::string(facts.name) + " (" + std::string(facts.summary) + ")";
+    }
     add_choice(verb, "--fold-test", chosen, std::move(choices), text);
 }
 
@@ -308,12 +312,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
                     "distance")
         ->type_name("X")
         ->check(positive());
-    add_fold_test_option(group, o.request.fold_test,
-                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe,
-                                    FoldTest::extent, FoldTest::displacement},
-                         "error (perceptual: what folds really change; default), luebke-hallen-safe (perceptual: what "
-                         "they could change at most, more triangles), luebke-hallen (as published, unsafe: some folds "
-                         "can be seen), extent or displacement (in pixels; extent is --pixels' own)");
+    add_fold_test_option(group, o.request.fold_test);
     group.add_flag("--chroma", o.request.chroma, "Also keep changes of colour that can be seen, not only of luminance");
     add_gaze_option(group, o.gaze_px);
     add_velocity_option(group, o.velocity_deg_s);

@@ -15,7 +15,7 @@
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/perception/units.h>
 #include <unseen/session/gaze_player.h>
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/session/request.h>
 
 #include "rules.h"
@@ -118,9 +118,7 @@ void add_velocity_option(CLI::App& verb, std::optional<double>& degrees_a_second
 inline constexpr int samples_to_judge = 64;
 void add_samples_option(CLI::App& verb, int& samples, const std::string& defaults);
 void add_seed_option(CLI::App& verb, std::uint64_t& seed, const std::string& of);
-// The option takes `tests` alone.
-void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
-                          const std::string& text);
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, bool only_perceptual = false);
 void add_json_option(CLI::App& verb, std::string& file);
 void add_verbose_option(CLI::App& verb, bool& is_verbose);
 // As TriangleCount::of() takes it.

@@ -8,7 +8,7 @@
 
 #include <unistd.h>
 
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/tree_io.h>
 

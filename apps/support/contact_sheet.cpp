@@ -5,7 +5,7 @@
 #include <functional>
 
 #include <unseen/render/renderer.h>
-#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/number_format.h>
 
 #include "fold_map.h"

@@ -6,7 +6,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>

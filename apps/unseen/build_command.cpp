@@ -13,7 +13,7 @@
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/lit_folds.h>
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "build_team.h"

@@ -3,7 +3,7 @@
 #include <ctime>
 #include <memory>
 
-#include <unseen/session/tree_cache.h>
+#include <unseen/session/load.h>
 
 #include "options.h"
 #include "report.h"

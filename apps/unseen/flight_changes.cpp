@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include <glm/geometric.hpp>
-#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::app {
 namespace {

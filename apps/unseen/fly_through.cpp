@@ -4,7 +4,6 @@
 
 #include <unseen/perception/image.h>
 #include <unseen/session/follower.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/internal/stopwatch.h>

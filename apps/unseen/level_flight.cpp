@@ -5,8 +5,8 @@
 #include <vector>
 
 #include <unseen/render/internal/layers.h>
-#include <unseen/session/selection_follower.h>
-#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session/selection.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "camera_path.h"
 #include "interruption.h"

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/render/internal/layers.h>
-#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "colour_bar.h"
 #include "terminal.h"

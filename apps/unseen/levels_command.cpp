@@ -124,9 +124,7 @@ Command levels_command(CLI::App& app, Setup& setup) {
     add_json_option(*verb, o.json);
     add_verbose_option(*verb, o.is_verbose);
     add_methods(*verb, o);
-    add_fold_test_option(*verb, o.what.request.fold_test,
-                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe},
-                         "By which levels are made: error (default), luebke-hallen or luebke-hallen-safe");
+    add_fold_test_option(*verb, o.what.request.fold_test, true);
     verb->add_flag("--chroma", o.what.request.chroma, "Levels also keep changes of colour that can be seen");
     add_gaze_option(*verb, o.what.gaze_px);
     add_velocity_option(*verb, o.what.velocity_deg_s);

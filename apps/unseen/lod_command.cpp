@@ -167,10 +167,7 @@ Result<session::Lod> make_levels(LodArguments& a, session::Session& session, con
     if (session.scene().objects.empty())
         return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
     ProgressBar bar("judging levels");
-    a.options.progress = [&](double share) {
-        bar(share, "levels");
-        return true;
-    };
+    a.options.progress = std::ref(bar);
     return session::make_levels(session, context, a.options);
 }
 

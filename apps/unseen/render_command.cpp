@@ -5,7 +5,6 @@
 #include <unseen/perception/image.h>
 #include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
 #include "cut_report.h"

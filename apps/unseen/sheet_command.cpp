@@ -93,9 +93,7 @@ Command sheet_command(CLI::App& app, Setup& setup) {
                 std::to_string(usual_maps_cell_px) + ")")
         ->type_name("PIXELS")
         ->check(whole(16, 4096));
-    add_fold_test_option(*verb, a->sheet.fold_test,
-                         std::array{FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error},
-                         "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')");
+    add_fold_test_option(*verb, a->sheet.fold_test, true);
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     setup.act_in(*verb, Setup::view | Setup::model);

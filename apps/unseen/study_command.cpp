@@ -111,7 +111,7 @@ Result<void> add_pairs(StudyArguments& a, std::size_t model, const render::Conte
     session::StudyPicturesOptions options = pictures_of(a, model, *session);
     options.pairs_original = study.task == StudyTask::differ;
     ProgressBar bar("drawing " + a.models[model]);
-    options.progress = [&](double share) { bar(share, "pictures"); };
+    options.progress = std::ref(bar);
     const vdtree::View view = make_view(*session, a.view);
     Result<std::vector<calibration::StudyPair>> pairs = std::vector<calibration::StudyPair>();
     if (a.levels) {

@@ -132,7 +132,7 @@ Result<int> run(TradeoffArguments& a) {
     Result<session::Tradeoff> tradeoff = session::Tradeoff{};
     {
         ProgressBar bar("measuring");
-        a.options.progress = [&](double share) { bar(share, "ways"); };
+        a.options.progress = std::ref(bar);
         tradeoff = session::measure_tradeoff(*session, *context, make_view(*session, a.view), a.options);
     }
     if (!tradeoff) return tradeoff.error();

@@ -15,7 +15,6 @@
 #include <glm/trigonometric.hpp>
 
 #include <unseen/perception/image.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 

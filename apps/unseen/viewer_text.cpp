@@ -9,20 +9,7 @@
 namespace unseen::app {
 namespace {
 
-using session::FoldTest;
 using session::GazeSource;
-
-// In words: of the option's names, "error" would read like a failure.
-std::string words_for(FoldTest test) {
-    switch (test) {
-    case FoldTest::error: return "measured errors";
-    case FoldTest::luebke_hallen: return "Luebke-Hallen";
-    case FoldTest::luebke_hallen_safe: return "Luebke-Hallen, safe";
-    case FoldTest::extent: return "extent in pixels";
-    case FoldTest::displacement: return "displacement in pixels";
-    }
-    return {};
-}
 
 // As people say it: two digits, and nothing of microseconds.
 std::string time_text(double ms) {
@@ -74,7 +61,8 @@ std::vector<TextLine> viewer_lines(const ViewerState& state) {
                                    {viewer_mode(state), "mode"}};
     if (state.goal.kind != session::Goal::Kind::full) {
         lines.push_back({seen_from_text(report, state.display), "visible"});
-        if (!report.fold_tests.empty()) lines.push_back({words_for(report.fold_tests.front()), "fold test"});
+        if (!report.fold_tests.empty())
+            lines.push_back({std::string(session::facts_of(report.fold_tests.front()).title), "fold test"});
     }
     if (state.gaze) lines.push_back({gaze_text(state), "gaze"});
     if (state.orthographic_height)

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
+#include <unseen/session_gpu/picture_judge.h>
+#include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
 #include "gl_test.h"
@@ -72,6 +75,25 @@ TEST_F(LevelControlTest, ChangesLevelsWithoutBeingWaitedFor) {
         changed += frame->changed;
     }
     EXPECT_GT(changed, 0);
+}
+
+// What draws a session shares it: the session may move or go.
+TEST_F(LevelControlTest, OutlivesItsSession) {
+    auto session = std::make_unique<Session>(bodies(row));
+    auto renderer = SceneRenderer::create(context(), *session);
+    auto control = LevelControl::create(context(), *session, ahead(64));
+    auto pictures = LevelPictures::create(context(), *session, 2);
+    auto judge = PictureJudge::create(context(), *session, ahead(64), 1);
+    ASSERT_TRUE(renderer && control && pictures && judge);
+    const auto cuts = whole_cuts(*session);
+    Session moved = std::move(*session);
+    session.reset();
+    EXPECT_TRUE(renderer->draw(drawn_cuts(cuts), ahead(64), {}));
+    EXPECT_TRUE(control->draw(ahead(64)));
+    EXPECT_TRUE(pictures->draw(ahead(64), SelectionQuality::ssim));
+    EXPECT_TRUE(judge->judge(cuts));
+    moved.set_gaze(Gaze{{10, 10}});
+    EXPECT_TRUE(control->draw(ahead(64))) << "which goes by the gaze of the session";
 }
 
 // ---- chains -----------------------------------------------------------------------------------------------------------

@@ -10,8 +10,7 @@
 
 #include <gmock/gmock.h>
 
-#include <unseen/session/selection_follower.h>
-#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/session/selection.h>
 
 #include "gl_test.h"
 #include "measured.h"

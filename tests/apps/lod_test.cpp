@@ -118,7 +118,7 @@ TEST_F(LodTest, OptionsOutOfRangeAreErrors) {
     EXPECT_THAT(make_levels(session, context(), {.samples = 257}).error().message, HasSubstr("lod.samples"));
     EXPECT_THAT(make_levels(session, context(), {.fov_y_degrees = std::nan("")}).error().message,
                 HasSubstr("lod.fov_y_degrees"));
-    const auto stopped = make_levels(session, context(), {.progress = [](double) { return false; }});
+    const auto stopped = make_levels(session, context(), {.progress = [](double, const char*) { return false; }});
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
 }

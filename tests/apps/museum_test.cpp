@@ -12,7 +12,6 @@
 #include <make_scene.h>
 #include <unseen/perception/judge.h>
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/level_control.h>
 #include <unseen/session_gpu/scene_renderer.h>
 

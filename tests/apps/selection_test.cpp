@@ -1,5 +1,5 @@
 // Levels selected within a budget: the search against all choices and against whole pictures, its file, and following.
-#include <unseen/session/selection_follower.h>
+#include <unseen/session/selection.h>
 
 #include <algorithm>
 #include <cmath>

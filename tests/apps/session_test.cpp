@@ -106,6 +106,24 @@ TEST(Session, SaysOfEachEffectWhyItIsOnOrOff) {
     }
 }
 
+TEST(Session, RefusesObjectsThatAreNotThere) {
+    Session session = two_balls();
+    const vdtree::View view = session.default_view();
+    const auto plan = session.plan(view, {}, 2);
+    ASSERT_FALSE(plan);
+    EXPECT_THAT(plan.error().message, HasSubstr("There is no object 2: the scene has 2"));
+    EXPECT_FALSE(session.recipe(view, {}, 2));
+    EXPECT_DEATH(session.tree(2), "There is no object 2");
+}
+
+TEST(Session, ChromaAsksNothingOfWhatIsGrey) {
+    auto session = *Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
+    const auto plain = session.simplify(), chroma = session.simplify({.chroma = true});
+    ASSERT_TRUE(plain && chroma);
+    EXPECT_EQ(chroma->fold_tests.front(), FoldTest::error);
+    EXPECT_EQ(chroma->stats.triangles, plain->stats.triangles);
+}
+
 TEST(Session, SharesABudgetAmongItsObjects) {
     Session session = two_balls();
     const auto shared = session.simplify({.goal = Goal::budget(1500), .fold_test = FoldTest::luebke_hallen});

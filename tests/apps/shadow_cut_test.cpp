@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <unseen/perception/judge.h>
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/session/session.h>
 #include <unseen/session_gpu/scene_renderer.h>
 

@@ -1,5 +1,5 @@
-// Names of files are looked for in the text of a mesh, without a parser. One that only seems to be named makes a tree be
-// built once more, or an output be refused; so every name that might be meant counts.
+// Names of files are looked for in the text of a mesh, without a parser. One that only seems to be named makes a tree
+// be built once more, or an output be refused; so every name that might be meant counts.
 #include "cache_key.h"
 
 #include <algorithm>

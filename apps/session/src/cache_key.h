@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 
 namespace unseen::session {
 

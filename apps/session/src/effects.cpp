@@ -22,21 +22,9 @@ bool is_full(const Decision& decision) { return decision.request.goal.kind == Go
 
 Effect fold_test_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"fold test", false, "nothing is folded in the full model"};
-    const std::string instead = decision.why.empty() ? std::string() : " (" + std::string(decision.why) + ")";
-    if (decision.test == FoldTest::error)
-        return {"fold test", true,
-                std::string("error: what each fold changes in luminance and outline, ") +
-                    (sight.lighting ? "from whichever side the lights come, " : "") +
-                    "against the contrast sensitivity"};
-    if (decision.test == FoldTest::luebke_hallen_safe)
-        return {"fold test", true,
-                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, " +
-                    std::string(sight.lighting ? "under the lights, " : "and the shift of the mean, ") +
-                    "against the contrast sensitivity" + instead};
-    if (decision.test == FoldTest::luebke_hallen)
-        return {"fold test", true,
-                "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
-    return {"fold test", true, name_of(decision.test) + ": pixels on the screen, whether they can be seen or not"};
+    return {"fold test", true,
+            name_of(decision.test) + ": " + what_it_looks_at(sight, decision.test) +
+                (decision.why.empty() ? "" : " (" + std::string(decision.why) + ")")};
 }
 
 // Without commas in thousands, for a comma parts the coordinates of a pixel.

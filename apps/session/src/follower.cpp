@@ -75,12 +75,12 @@ public:
 
 private:
     Result<void> take_up_trees();
-    Result<void> make_recipes(const Prepared& prepared);
-    bool stays_out_of_sight(const Followed& object, const Sight& sight, const Decision& decision) const;
+    Result<void> make_recipes(Prepared& prepared);
+    bool stays_out_of_sight(const Followed& object, Sight& sight, const Decision& decision) const;
     Result<std::vector<vdtree::AdjustStats>> unfold_all();
     Result<std::vector<vdtree::AdjustStats>> share_budget(const Request& request);
-    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request, const Prepared& prepared);
-    void conclude(Report& report, const Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const;
+    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request, Prepared& prepared);
+    void conclude(Report& report, Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const;
     Result<void> glide(Report& report);
 
     std::shared_ptr<Session::State> session_;
@@ -123,16 +123,16 @@ Result<void> Follower::State::take_up_trees() {
 }
 
 // Nothing of the object is in the window, nor was it when its cut was made: all is folded, and stays so.
-bool Follower::State::stays_out_of_sight(const Followed& object, const Sight& sight, const Decision& decision) const {
+bool Follower::State::stays_out_of_sight(const Followed& object, Sight& sight, const Decision& decision) const {
     return object.stats_out_of_sight && object.test_out_of_sight == decision.test && !glide_s_ &&
            is_out_of_sight(sight, decision);
 }
 
-Result<void> Follower::State::make_recipes(const Prepared& prepared) {
+Result<void> Follower::State::make_recipes(Prepared& prepared) {
     const bool is_shared = prepared.shares_budget();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         Followed& object = objects_[i];
-        const Sight& sight = prepared.sights[i];
+        Sight& sight = prepared.sights[i];
         const Decision& decision = prepared.decisions[i];
         object.recipe.reset();
         if (!is_shared && stays_out_of_sight(object, sight, decision)) continue;
@@ -172,8 +172,7 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Req
 }
 
 // Each has the time that the ones before have left.
-Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request,
-                                                                      const Prepared& prepared) {
+Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request, Prepared& prepared) {
     std::vector<vdtree::AdjustStats> stats;
     const auto start = vdtree::Clock::now();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
@@ -188,7 +187,7 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Requ
         auto followed = object.cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
         if (!followed) return followed.error();
         stats.push_back(*followed);
-        const Sight& sight = prepared.sights[i];
+        Sight& sight = prepared.sights[i];
         const Decision& decision = prepared.decisions[i];
         if (followed->triangles > 0 || !followed->is_complete || !is_out_of_sight(sight, decision)) continue;
         object.stats_out_of_sight = *followed;
@@ -199,10 +198,10 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Requ
     return stats;
 }
 
-void Follower::State::conclude(Report& report, const Prepared& prepared,
+void Follower::State::conclude(Report& report, Prepared& prepared,
                                const std::vector<vdtree::AdjustStats>& stats) const {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
-        const Sight& sight = prepared.sights[i];
+        Sight& sight = prepared.sights[i];
         const Decision& decision = prepared.decisions[i];
         report.source_triangles += sight.object.tree.triangle_count();
         report.dropped += sight.object.tree.dropped_triangles();
@@ -239,7 +238,7 @@ Result<void> Follower::State::glide(Report& report) {
 }
 
 Result<Report> Follower::State::follow(const vdtree::View& view, const Request& request) {
-    const auto prepared = session_->prepare(view, request, shadows_);
+    auto prepared = session_->prepare(view, request, shadows_);
     if (!prepared) return prepared.error();
     if (const auto taken = take_up_trees(); !taken) return taken.error();
     const bool folds = request.goal.kind != Goal::Kind::full;

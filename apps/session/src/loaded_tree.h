@@ -4,9 +4,8 @@
 #include <memory>
 
 #include <unseen/perception/lit_folds.h>
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/session/scene.h>
-#include <unseen/session/tree_cache.h>
 
 namespace unseen::session {
 
@@ -22,8 +21,8 @@ struct MeasurementPlace {
     std::string key; // of the file's tree
     std::filesystem::path file;
     vdtree::VertexTree tree; // that this is of: an object's tree may have become another one
-    // Under the key stands, or is to stand, the tree with what its folds change under its own light. Not of meshes: there
-    // stands what was built, whether it was measured or not.
+    // Under the key stands, or is to stand, the tree with what its folds change under its own light. Not of meshes:
+    // there stands what was built, whether it was measured or not.
     bool is_of_tree_file = true;
 };
 
@@ -33,7 +32,7 @@ struct LoadedTree {
     std::shared_ptr<const MeasurementPlace> measurement = {}; // null: nothing of it is kept
 };
 
-// open_tree() where `may_map`, else load_tree().
+// load_tree(); where `may_map`, tree files of 256 MiB and more are mapped: only what is used is read, and checked.
 Result<LoadedTree> load(const std::filesystem::path& file, const LoadOptions& options, bool may_map);
 
 // A tree that was just built, measured or with its light conserved as the options say, unless it is too large for that.
@@ -49,8 +48,8 @@ std::shared_ptr<const MeasurementPlace> place_of_mesh(const TreeCache& cache, co
 Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                          const Messages& messages);
 
-// What a tree's folds change under lights: what the tree has of it, or what is kept, else measured now and kept. `place`
-// may be null. `takes_long`: a note says so before it is measured.
+// What a tree's folds change under lights: what the tree has of it, or what is kept, else measured now and kept.
+// `place` may be null. `takes_long`: a note says so before it is measured.
 Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                                         const Messages& messages, bool takes_long);
 

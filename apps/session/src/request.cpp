@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include <unseen/perception/criterion.h>
 #include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
@@ -31,8 +30,6 @@ Result<void> validate_goal(const Request& r) {
 }
 
 } // namespace
-
-std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 Result<void> validate(const Request& r) {
     if (r.shown && r.purpose != Purpose::picture)

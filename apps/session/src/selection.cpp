@@ -27,7 +27,8 @@ constexpr std::array<char, 8> journal_magic = {'U', 'N', 'S', 'E', 'E', 'N', 'S'
 constexpr std::uint32_t selection_version = 2;
 constexpr std::uint32_t most_selected_levels = static_cast<std::uint32_t>(most_levels);
 
-// ---- bytes ------------------------------------------------------------------------------------------------------------
+// ---- bytes
+// ------------------------------------------------------------------------------------------------------------
 
 class ByteWriter {
 public:
@@ -155,7 +156,8 @@ bool is_within(const SelectionGrid& grid, const LatticePoint& p) {
 
 } // namespace
 
-// ---- grids ------------------------------------------------------------------------------------------------------------
+// ---- grids
+// ------------------------------------------------------------------------------------------------------------
 
 std::vector<LatticePoint> corners_of(const SelectionGrid& grid, const SelectionCell& cell) {
     std::vector<LatticePoint> corners;
@@ -226,7 +228,8 @@ std::uint64_t scene_fingerprint(const Scene& scene, std::span<const std::vector<
     return hash_of(all.take());
 }
 
-// ---- files ------------------------------------------------------------------------------------------------------------
+// ---- files
+// ------------------------------------------------------------------------------------------------------------
 
 std::vector<std::byte> to_bytes(const SelectionCorner& corner) {
     ByteWriter out;
@@ -368,7 +371,8 @@ Result<Selections> read_selections(const std::filesystem::path& file) {
     return s;
 }
 
-// ---- journals ---------------------------------------------------------------------------------------------------------
+// ---- journals
+// ---------------------------------------------------------------------------------------------------------
 
 Result<SelectionJournal> SelectionJournal::open(const std::filesystem::path& file, std::uint64_t key) {
     SelectionJournal journal;

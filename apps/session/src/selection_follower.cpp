@@ -1,4 +1,4 @@
-#include <unseen/session/selection_follower.h>
+#include <unseen/session/selection.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include <unseen/session/selection_search.h>
+#include <unseen/session/selection.h>
 
 #include <algorithm>
 #include <cassert>
@@ -54,7 +54,8 @@ PixelRect united(const PixelRect& a, const PixelRect& b) {
     return {std::min(a.left, b.left), std::min(a.top, b.top), std::max(a.right, b.right), std::max(a.bottom, b.bottom)};
 }
 
-// ---- pictures from parts ----------------------------------------------------------------------------------------------
+// ---- pictures from parts
+// ----------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -106,7 +107,8 @@ std::vector<float> put_together(const LayeredPicture& picture, std::span<const i
     return values;
 }
 
-// ---- what a picture loses ---------------------------------------------------------------------------------------------
+// ---- what a picture loses
+// ---------------------------------------------------------------------------------------------
 
 Result<PictureLoss> PictureLoss::create(SelectionQuality quality, int width, int height, std::vector<float> reference,
                                         const perception::Display& display) {
@@ -218,7 +220,8 @@ double PictureLoss::of(std::span<const float> picture) const {
     return sum;
 }
 
-// ---- the search -------------------------------------------------------------------------------------------------------
+// ---- the search
+// -------------------------------------------------------------------------------------------------------
 
 namespace {
 

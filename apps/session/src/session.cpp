@@ -65,6 +65,12 @@ Result<std::optional<vdtree::Lighting>> copied(const Result<std::shared_ptr<cons
     return *lighting ? std::optional(**lighting) : std::nullopt;
 }
 
+Result<void> check_object(const Scene& scene, std::size_t object) {
+    if (object < scene.objects.size()) return {};
+    return invalid_argument("There is no object " + std::to_string(object) + ": the scene has " +
+                            std::to_string(scene.objects.size()) + ", counted from 0.");
+}
+
 Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
     Plan plan{decision.test, std::string(decision.why), decision.measures, effects_of(sight, decision, std::nullopt)};
     for (Effect& effect : plan.effects) effect.object = object;
@@ -357,8 +363,12 @@ Result<Session> Session::create(Scene scene, Observer observer, Messages message
     return Session(std::move(*state));
 }
 
+Session Session::share() const { return Session(state_); }
+
 const Scene& Session::scene() const noexcept { return state_->scene; }
 const vdtree::VertexTree& Session::tree(std::size_t object) const noexcept {
+    const auto there = check_object(state_->scene, object);
+    if (!there) end_without_value(there.error());
     return state_->scene.objects[object].tree;
 }
 const Observer& Session::observer() const noexcept { return state_->observer; }
@@ -412,8 +422,9 @@ vdtree::View Session::default_view() const {
 
 Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std::size_t object) const {
     if (const auto valid = validate(request); !valid) return valid.error();
+    if (const auto there = check_object(state_->scene, object); !there) return there.error();
     ShadowMemory none;
-    const auto sights = state_->look(view, none);
+    auto sights = state_->look(view, none);
     if (!sights) return sights.error();
     const auto decision = decide((*sights)[object], request, object);
     if (!decision) return decision.error();
@@ -422,7 +433,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
 
 Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
     ShadowMemory none;
-    const auto prepared = state_->prepare(view, request, none);
+    auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;
     for (std::size_t i = 0; i < prepared->sights.size(); ++i)
@@ -433,8 +444,9 @@ Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Reque
 Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& request, std::size_t object) {
     if (request.goal.kind == Goal::Kind::full)
         return invalid_field("{request.goal = full} folds nothing, so there is nothing to cut by.");
+    if (const auto there = check_object(state_->scene, object); !there) return there.error();
     ShadowMemory none;
-    const auto prepared = state_->prepare(view, request, none);
+    auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     return make_recipe(prepared->sights[object], prepared->decisions[object]);
 }
@@ -449,7 +461,7 @@ Result<std::optional<vdtree::Lighting>> Session::backdrop_lighting(const vdtree:
 
 Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) const {
     ShadowMemory none;
-    const auto sights = state_->look(view, none);
+    auto sights = state_->look(view, none);
     if (!sights) return sights.error();
     if (sights->empty()) return perception::SceneLuminance{state_->background, state_->background};
     return sights->front().luminance;

@@ -1,8 +1,8 @@
 // Where shadows may fall that can be seen, and how far the outlines that cast them may move before they are.
 //
-// All that stands in a scene is covered with small balls, once. For a view, each ball that may be in its window says how
-// far the outline of a shadow may move there. A map for each light has the least of these, by the direction from the
-// light and the way to it: what casts a shadow looks up what lies behind it.
+// All that stands in a scene is covered with small balls, once. For a view, each ball that may be in its window says
+// how far the outline of a shadow may move there. A map for each light has the least of these, by the direction from
+// the light and the way to it: what casts a shadow looks up what lies behind it.
 #pragma once
 
 #include <cstdint>
@@ -86,8 +86,8 @@ public:
 
     static std::uint64_t made() noexcept; // by this process, so far: tests see by it what is kept
 
-    // World units: how far outlines of what is in this sphere may move. Infinite where no light casts a shadow of it that
-    // can be seen; 0 where the eye may be in one. Cost: some hundred nanoseconds a light.
+    // World units: how far outlines of what is in this sphere may move. Infinite where no light casts a shadow of it
+    // that can be seen; 0 where the eye may be in one. Cost: some hundred nanoseconds a light.
     double unseen_shift(const WorldSphere& sphere) const;
 
 private:

@@ -26,6 +26,7 @@ struct ObjectCache {
     std::optional<perception::CutRings> cut_rings = {};
     std::optional<vdtree::Sphere> all = {}; // see sphere_of_all()
     std::optional<bool> knows_texture = {}; // see perception::knows_texture()
+    std::optional<bool> has_chroma = {};    // see perception::has_chroma()
     bool rings_have_chroma = false;         // few requests look at colours, and bounding them takes time
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
     std::optional<perception::LitFolds> lit_folds = {};  // measured where the default test asks for it
@@ -38,8 +39,8 @@ struct SceneShadows {
     const std::vector<std::shared_ptr<ObjectCache>>& caches;
     std::optional<ShadowReceivers> receivers = {};
     std::optional<LitReceivers> lit = {}; // for the last lights
-    // How shadows' edges are seen in views like this one. The same object for the same key, however long ago it was made:
-    // objects go by one reach only where their criteria have the same.
+    // How shadows' edges are seen in views like this one. The same object for the same key, however long ago it was
+    // made: objects go by one reach only where their criteria have the same.
     struct EdgesKey {
         vdtree::View lens = {}; // without its place
         double ambient = 0;
@@ -92,7 +93,7 @@ struct Sight {
     std::optional<glm::dvec2> gaze_px = {};
 };
 
-inline ShadowState& shadow_of(const Sight& sight) { return sight.memory.of_objects[sight.number]; }
+inline ShadowState& shadow_of(Sight& sight) { return sight.memory.of_objects[sight.number]; }
 
 // What will be done for a valid request.
 struct Decision {

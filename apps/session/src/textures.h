@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 
 namespace unseen::session {
 

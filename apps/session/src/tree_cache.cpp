@@ -1,4 +1,4 @@
-#include <unseen/session/tree_cache.h>
+#include <unseen/session/load.h>
 
 #include <algorithm>
 #include <charconv>

@@ -22,7 +22,7 @@
 #include <unseen/render/shadows.h>
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/internal/pass_tables.h>
-#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 
 #include "shared_uploads.h"
@@ -108,7 +108,7 @@ bool same_gaze(const std::optional<Gaze>& a, const std::optional<Gaze>& b) {
 } // namespace
 
 struct LevelControl::Impl {
-    struct Thing {
+    struct Subject { // an object and its levels
         const UploadedLevels* levels = nullptr;
         vdtree::Similarity placement;
         WorldSphere sphere;
@@ -140,7 +140,8 @@ struct LevelControl::Impl {
 
     Impl(const render::Context& context_, Session& session_, const LevelControlOptions& options_,
          render::StageTimes times_)
-        : context(context_), session(session_), options(options_), uploads(context_), times(std::move(times_)) {}
+        : context(context_), session(session_.share()), options(options_), uploads(context_), times(std::move(times_)) {
+    }
 
     Result<void> load(const vdtree::View& view, const Request& request);
     Result<void> need_passes(const vdtree::View& view);
@@ -148,9 +149,9 @@ struct LevelControl::Impl {
     void take_times(LevelFrame& frame);
     void decide(const OpenTest& open, std::uint64_t pixels, LevelFrame& frame);
     int best_of_layer(int layer, const std::vector<std::size_t>& in_sight, const std::vector<int>& layer_of) const;
-    int to_compare_with(const Thing& thing, int best) const;
+    int to_compare_with(const Subject& subject, int best) const;
     bool is_due(std::size_t object, int layer) const;
-    int chosen_level(const Thing& thing, const vdtree::View& view) const;
+    int chosen_level(const Subject& subject, const vdtree::View& view) const;
     Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
     render::LuminanceTexture luminance_of(const render::Target& target) const;
     Result<void> map(int left_out);
@@ -162,12 +163,36 @@ struct LevelControl::Impl {
     render::ThresholdTexture thresholds_texture(int left_out) const;
     Result<LevelFrame> draw(const vdtree::View& view);
     int passes_done() const;
+    bool is_perceptual() const { return options.method == LevelMethod::perceptual; }
+
+    // A frame on its way: each step of draw() leaves here what the next ones need.
+    struct Drawing {
+        struct Test {
+            std::size_t place = 0; // in `in_sight`
+            int compared_with = 0; // level
+        };
+        std::vector<std::size_t> in_sight;             // objects
+        std::vector<render::Item> objects, background; // objects: those in sight
+        render::LayerSplit split;                      // of these
+        std::vector<std::vector<Test>> tests;          // by layer
+        std::vector<render::Item> compared;            // the objects, those that are tested at their other level
+    };
+    Result<void> gather(Drawing& d, LevelFrame& frame);
+    Result<void> gather_casters(const Drawing& d);
+    Result<void> split(Drawing& d, LevelFrame& frame) const;
+    void fade(const Drawing& d, std::vector<render::Item>& shown, std::vector<int>& layer_of, LevelFrame& frame);
+    Result<void> draw_layers(const Drawing& d, LevelFrame& frame);
+    void choose_tests(Drawing& d, LevelFrame& frame) const;
+    Result<std::size_t> map_layers(const Drawing& d);
+    Result<void> draw_compared(Drawing& d, LevelFrame& frame);
+    Result<void> count_differences(const Drawing& d);
+    void sum_up(LevelFrame& frame) const;
 
     render::Context context;
-    Session& session;
+    Session session;
     LevelControlOptions options;
     SharedUploads uploads;
-    std::vector<Thing> things;
+    std::vector<Subject> subjects;
     std::vector<render::GpuCut> backdrop;
     std::vector<WorldSphere> backdrop_spheres;
     std::optional<render::Ball> reach; // of shadows: around all that there is
@@ -201,11 +226,11 @@ Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& r
                                                         : level_chain(session, from, request, i, options.chain);
         });
         if (!levels) return levels.error();
-        Thing& thing = things.emplace_back();
-        thing.levels = *levels;
-        thing.placement = scene.objects[i].placement;
-        thing.sphere = world_sphere(scene.objects[i]);
-        thing.level = thing.levels->chain.size() - 1;
+        Subject& subject = subjects.emplace_back();
+        subject.levels = *levels;
+        subject.placement = scene.objects[i].placement;
+        subject.sphere = world_sphere(scene.objects[i]);
+        subject.level = subject.levels->chain.size() - 1;
     }
     for (const Object& part : scene.backdrop) {
         auto whole = uploads.whole(part.tree);
@@ -230,7 +255,7 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
                                                  std::to_string(most) + " pixels a side; choose a smaller size."};
     passes.reset(); // the old ones first, so that both sizes need not fit at a time
     open.clear();
-    for (Thing& thing : things) thing.is_open = false;
+    for (Subject& subject : subjects) subject.is_open = false;
     auto layers = render::LayerPasses::create(
         context, wanted.width, wanted.height,
         {.most = options.layers,
@@ -246,7 +271,7 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
         perception::set_pixels_per_degree(
             display,
             perception::PixelsPerDegree(perception::pixels_per_degree(observer.display).value() / options.map_block));
-    if (options.method != LevelMethod::perceptual) {
+    if (!is_perceptual()) {
         // Nothing is mapped.
     } else if (options.maps == MapRecipe::rpg99) {
         const auto tables = perception::rpg99_tables(
@@ -311,16 +336,16 @@ std::vector<char> LevelControl::Impl::find_shaded(const render::LayerSplit& spli
                                                   const std::vector<std::size_t>& in_sight) const {
     std::vector<char> shaded(static_cast<std::size_t>(std::max(split.count, 1)), 0);
     const auto sphere_of_caster = [&](std::size_t i) {
-        return i < things.size() ? things[i].sphere : backdrop_spheres[i - things.size()];
+        return i < subjects.size() ? subjects[i].sphere : backdrop_spheres[i - subjects.size()];
     };
     for (std::size_t i = 0; i < in_sight.size(); ++i) {
         const auto layer = static_cast<std::size_t>(split.layer_of[i]);
-        const Thing& thing = things[in_sight[i]];
-        if (shaded[layer] || !thing.lighting) continue;
-        for (const Caster& light : casting_lights(session.tree(in_sight[i]), thing.placement, *thing.lighting))
+        const Subject& subject = subjects[in_sight[i]];
+        if (shaded[layer] || !subject.lighting) continue;
+        for (const Caster& light : casting_lights(session.tree(in_sight[i]), subject.placement, *subject.lighting))
             for (std::size_t from = 0; from < casters.size() && !shaded[layer]; ++from)
-                shaded[layer] =
-                    caster_layers[from] != split.layer_of[i] && may_shade(light, sphere_of_caster(from), thing.sphere);
+                shaded[layer] = caster_layers[from] != split.layer_of[i] &&
+                                may_shade(light, sphere_of_caster(from), subject.sphere);
     }
     return shaded;
 }
@@ -352,66 +377,67 @@ int LevelControl::Impl::passes_done() const {
            (passes->rpg99 ? passes->rpg99->full_screen_passes() : 0);
 }
 
-// ---- decisions --------------------------------------------------------------------------------------------------------
+// ---- decisions
+// --------------------------------------------------------------------------------------------------------
 
-// l_HQ of the paper: the best level for the first layer, the next one for the second, and so on; better where an object of
-// the layer has reached it.
+// l_HQ of the paper: the best level for the first layer, the next one for the second, and so on; better where an object
+// of the layer has reached it.
 int LevelControl::Impl::best_of_layer(int layer, const std::vector<std::size_t>& in_sight,
                                       const std::vector<int>& layer_of) const {
     int best = layer;
     for (std::size_t i = 0; i < in_sight.size(); ++i)
-        if (layer_of[i] == layer) best = std::min(best, things[in_sight[i]].level - 1);
+        if (layer_of[i] == layer) best = std::min(best, subjects[in_sight[i]].level - 1);
     return std::max(best, 0);
 }
 
 // What a level is held against: one that is better, but that is the next worse one for the best level, to see whether
 // that would do; and the next better one for the worst level. In the beginning the best one.
-int LevelControl::Impl::to_compare_with(const Thing& thing, int best) const {
-    const int worst = thing.levels->chain.size() - 1;
-    if (thing.level == 0) return std::min(1, worst);
-    if (!thing.is_known) return 0;
-    if (thing.level == worst) return worst - 1;
-    return std::min(best, thing.level - 1);
+int LevelControl::Impl::to_compare_with(const Subject& subject, int best) const {
+    const int worst = subject.levels->chain.size() - 1;
+    if (subject.level == 0) return std::min(1, worst);
+    if (!subject.is_known) return 0;
+    if (subject.level == worst) return worst - 1;
+    return std::min(best, subject.level - 1);
 }
 
 bool LevelControl::Impl::is_due(std::size_t object, int layer) const {
-    const Thing& thing = things[object];
-    if (thing.is_open || thing.is_fading || thing.levels->chain.size() < 2) return false;
-    if (tests_all || !thing.is_known) return true;
+    const Subject& subject = subjects[object];
+    if (subject.is_open || subject.is_fading || subject.levels->chain.size() < 2) return false;
+    if (tests_all || !subject.is_known) return true;
     const auto period = static_cast<std::uint64_t>(options.frames_a_layer) * (static_cast<std::uint64_t>(layer) + 1);
     return (frames + object) % period == 0;
 }
 
 void LevelControl::Impl::decide(const OpenTest& asked, std::uint64_t pixels, LevelFrame& frame) {
     LevelTest test = asked.test;
-    Thing& thing = things[test.object];
-    thing.is_open = false;
+    Subject& subject = subjects[test.object];
+    subject.is_open = false;
     test.pixels = pixels;
     const double all = static_cast<double>(passes->width) * static_cast<double>(passes->height);
     const bool is_too_coarse = static_cast<double>(pixels) > options.upper_share * all,
                could_be_coarser = static_cast<double>(pixels) < options.lower_share * all;
-    const int worst = thing.levels->chain.size() - 1;
+    const int worst = subject.levels->chain.size() - 1;
     const bool has_moved =
-        glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye);
-    if (has_moved || (++thing.tests_since >= tests_until_retried && thing.refused_in != thing.lighting))
-        thing.refused = most_levels;
+        glm::length(view.eye - subject.refused_at) > moved_share * glm::length(subject.sphere.centre - view.eye);
+    if (has_moved || (++subject.tests_since >= tests_until_retried && subject.refused_in != subject.lighting))
+        subject.refused = most_levels;
     if (test.level > 0 && is_too_coarse) {
         test.decision = LevelDecision::better;
-        thing.refused = std::min(thing.refused, test.level);
-        thing.refused_at = view.eye;
-        thing.refused_in = thing.lighting;
-        thing.tests_since = 0;
-        --thing.level;
+        subject.refused = std::min(subject.refused, test.level);
+        subject.refused_at = view.eye;
+        subject.refused_in = subject.lighting;
+        subject.tests_since = 0;
+        --subject.level;
     } else {
-        thing.is_known = true;
+        subject.is_known = true;
         // The worst one was compared with the next better one: that they look alike lets it stay.
-        if (could_be_coarser && test.level < worst && test.level + 1 < thing.refused) {
+        if (could_be_coarser && test.level < worst && test.level + 1 < subject.refused) {
             test.decision = LevelDecision::worse;
-            ++thing.level;
+            ++subject.level;
         }
     }
     if (test.decision != LevelDecision::keep) last_change = frames;
-    else thing.tested = test.frame;
+    else subject.tested = test.frame;
     frame.tests.push_back(test);
 }
 
@@ -445,16 +471,16 @@ void LevelControl::Impl::take_times(LevelFrame& frame) {
     }
 }
 
-int LevelControl::Impl::chosen_level(const Thing& thing, const vdtree::View& from) const {
-    const LevelChain& chain = thing.levels->chain;
+int LevelControl::Impl::chosen_level(const Subject& subject, const vdtree::View& from) const {
+    const LevelChain& chain = subject.levels->chain;
     int level = chain.size() - 1;
-    if (options.method == LevelMethod::given) return thing.level;
+    if (options.method == LevelMethod::given) return subject.level;
     if (options.method == LevelMethod::distance) {
-        const double distance =
-            std::max(glm::length(thing.sphere.centre - from.eye) - thing.sphere.radius, 0.0) / thing.placement.scale;
+        const double distance = std::max(glm::length(subject.sphere.centre - from.eye) - subject.sphere.radius, 0.0) /
+                                subject.placement.scale;
         while (level > 0 && !(chain.unseen_from(level) * options.bias <= distance)) --level;
     } else {
-        const double triangles = options.bias * pixels_of(thing.sphere, from);
+        const double triangles = options.bias * pixels_of(subject.sphere, from);
         while (level > 0 && static_cast<double>(chain.triangles(level)) < triangles) --level;
     }
     return level;
@@ -463,12 +489,199 @@ int LevelControl::Impl::chosen_level(const Thing& thing, const vdtree::View& fro
 Result<render::Item> LevelControl::Impl::item(std::size_t object, int level, const vdtree::View& from) const {
     auto lighting = session.lighting(from, object);
     if (!lighting) return lighting.error();
-    render::Item made{things[object].levels->cuts[static_cast<std::size_t>(level)], things[object].placement};
+    render::Item made{subjects[object].levels->cuts[static_cast<std::size_t>(level)], subjects[object].placement};
     made.lighting = std::move(*lighting);
     return made;
 }
 
-// ---- a frame ----------------------------------------------------------------------------------------------------------
+// ---- a frame
+// ----------------------------------------------------------------------------------------------------------
+
+// What is in the window, at its level.
+Result<void> LevelControl::Impl::gather(Drawing& d, LevelFrame& frame) {
+    frame.levels.assign(subjects.size(), -1);
+    frame.tested_with.assign(subjects.size(), -1);
+    for (std::size_t i = 0; i < subjects.size(); ++i) {
+        Subject& subject = subjects[i];
+        if (!is_in_sight(subject.sphere, view)) continue;
+        if (!is_perceptual()) subject.level = chosen_level(subject, view);
+        auto made = item(i, subject.level, view);
+        if (!made) return made.error();
+        subject.lighting = made->lighting;
+        d.objects.push_back(std::move(*made));
+        d.in_sight.push_back(i);
+        frame.levels[i] = subject.level;
+        const bool has_changed = subject.drawn_level >= 0 && subject.drawn_level != subject.level;
+        frame.changed += has_changed;
+        if (has_changed && !tests_all)
+            subject.fading_from = subject.drawn_level, subject.fade_left = options.fade_frames;
+        subject.drawn_level = subject.level;
+        frame.triangles += subject.levels->chain.triangles(subject.level);
+    }
+    for (std::size_t i = 0; i < backdrop.size(); ++i) {
+        auto lighting = session.backdrop_lighting(view, i);
+        if (!lighting) return lighting.error();
+        render::Item& made =
+            d.background.emplace_back(render::Item{backdrop[i], session.scene().backdrop[i].placement});
+        made.lighting = std::move(*lighting);
+    }
+    return {};
+}
+
+// What casts shadows: also what is out of the window, at the level that it would have.
+Result<void> LevelControl::Impl::gather_casters(const Drawing& d) {
+    casters.clear();
+    caster_layers.clear();
+    is_shaded.clear();
+    if (std::ranges::none_of(d.objects, is_in_casting_light) &&
+        std::ranges::none_of(d.background, is_in_casting_light)) {
+        shadows.reset();
+        other_shadows.reset();
+        return {};
+    }
+    for (std::size_t i = 0; i < subjects.size(); ++i) {
+        auto made = item(i, subjects[i].level, view);
+        if (!made) return made.error();
+        casters.push_back(std::move(*made));
+    }
+    casters.insert(casters.end(), d.background.begin(), d.background.end());
+    if (!reach) reach = render::ball_around(casters);
+    return {};
+}
+
+Result<void> LevelControl::Impl::split(Drawing& d, LevelFrame& frame) const {
+    std::vector<glm::dvec3> centres;
+    for (const std::size_t i : d.in_sight) centres.push_back(subjects[i].sphere.centre);
+    auto made = render::split_into_layers(centres, view, options.layers);
+    if (!made) return made.error();
+    d.split = std::move(*made);
+    if (!is_perceptual()) d.split = {.layer_of = std::vector<int>(d.objects.size(), 0), .count = 0, .borders = {}};
+    frame.layers = d.split.count;
+    return {};
+}
+
+// Those that fade are drawn at both levels.
+void LevelControl::Impl::fade(const Drawing& d, std::vector<render::Item>& shown, std::vector<int>& layer_of,
+                              LevelFrame& frame) {
+    for (std::size_t i = 0; i < d.in_sight.size(); ++i) {
+        Subject& subject = subjects[d.in_sight[i]];
+        subject.is_fading = subject.fade_left > 0;
+        if (!subject.is_fading) continue;
+        const float share = 1 - static_cast<float>(subject.fade_left) / static_cast<float>(options.fade_frames + 1);
+        --subject.fade_left;
+        shown[i].stipple = {0, share};
+        render::Item before = d.objects[i];
+        before.cut = subject.levels->cuts[static_cast<std::size_t>(subject.fading_from)];
+        before.stipple = {share, 1};
+        shown.push_back(std::move(before));
+        layer_of.push_back(d.split.layer_of[i]);
+        frame.triangles += subject.levels->chain.triangles(subject.fading_from);
+    }
+}
+
+Result<void> LevelControl::Impl::draw_layers(const Drawing& d, LevelFrame& frame) {
+    std::vector<render::Item> shown = d.objects;
+    render::LayerSplit split_of_shown = d.split;
+    fade(d, shown, split_of_shown.layer_of, frame);
+    if (!casters.empty()) {
+        caster_layers.assign(casters.size(), -1);
+        for (std::size_t i = 0; i < d.in_sight.size(); ++i) caster_layers[d.in_sight[i]] = d.split.layer_of[i];
+        if (is_perceptual()) is_shaded = find_shaded(d.split, d.in_sight);
+        if (auto drawn = cast(casters, shadows); !drawn) return drawn.error();
+        frame.shadow_maps = shadows->counts().maps;
+    }
+    return passes->layers.draw(shown, d.background, {.view = view, .shadows = shadows ? &*shadows : nullptr},
+                               split_of_shown, glm::vec4(session.background()));
+}
+
+// Which objects are tested, and against which level.
+void LevelControl::Impl::choose_tests(Drawing& d, LevelFrame& frame) const {
+    d.tests.resize(static_cast<std::size_t>(passes->layers.combination_count()));
+    for (std::size_t layer = 0; is_perceptual() && layer < d.tests.size(); ++layer) {
+        const int number = static_cast<int>(layer), best = best_of_layer(number, d.in_sight, d.split.layer_of);
+        for (std::size_t i = 0; i < d.in_sight.size(); ++i) {
+            const std::size_t object = d.in_sight[i];
+            if (d.split.layer_of[i] != number || !is_due(object, number)) continue;
+            const int compared_with = to_compare_with(subjects[object], best);
+            if (compared_with == subjects[object].level) continue; // a chain of one level
+            d.tests[layer].push_back({i, compared_with});
+            frame.tested_with[object] = compared_with;
+        }
+    }
+}
+
+// What all other layers show together, and which steps of luminance go unseen in it. Returns for how many layers.
+Result<std::size_t> LevelControl::Impl::map_layers(const Drawing& d) {
+    std::size_t combinations = 0;
+    for (std::size_t layer = 0; is_perceptual() && layer < d.tests.size(); ++layer) {
+        if (d.tests[layer].empty() && !options.maps_all_layers) continue;
+        const int number = static_cast<int>(layer);
+        if (auto combined = combine(number); !combined) return combined.error();
+        times.end_stage();
+        if (auto mapped = map(number); !mapped) return mapped.error();
+        times.end_stage();
+        ++combinations;
+    }
+    return combinations;
+}
+
+// The depth of what is tested as it will be drawn once more, and of all else at its coarsest.
+Result<void> LevelControl::Impl::draw_compared(Drawing& d, LevelFrame& frame) {
+    d.compared = d.objects;
+    if (std::ranges::all_of(d.tests, [](const auto& of_layer) { return of_layer.empty(); })) return {};
+    for (std::size_t i = 0; i < d.in_sight.size(); ++i) {
+        const auto& cuts = subjects[d.in_sight[i]].levels->cuts;
+        const int with = frame.tested_with[d.in_sight[i]];
+        d.compared[i].cut = with < 0 ? cuts.back() : cuts[static_cast<std::size_t>(with)];
+    }
+    std::vector<render::Item> all = d.compared;
+    all.insert(all.end(), d.background.begin(), d.background.end());
+    // Shadows are those of the better levels as well, or what a better level's surface has of a worse one's shadow on
+    // itself would count. All else casts its own.
+    if (!casters.empty()) {
+        std::vector<render::Item> better = casters, receivers;
+        for (std::size_t i = 0; i < d.in_sight.size(); ++i) {
+            if (frame.tested_with[d.in_sight[i]] < 0) continue;
+            better[d.in_sight[i]].cut = d.compared[i].cut;
+            receivers.push_back(d.compared[i]);
+        }
+        if (auto drawn = cast(better, other_shadows, receivers); !drawn) return drawn.error();
+    }
+    ++frame.surface_passes;
+    return passes->counts.draw_depth(all, {.view = view,
+                                           .near_plane = passes->layers.near_plane(),
+                                           .shadows = casters.empty() ? nullptr : &*other_shadows});
+}
+
+// Draws what is tested once more, and lets the GPU count what is seen of the difference.
+Result<void> LevelControl::Impl::count_differences(const Drawing& d) {
+    for (std::size_t layer = 0; layer < d.tests.size(); ++layer)
+        for (const Drawing::Test& test : d.tests[layer]) {
+            const std::size_t object = d.in_sight[test.place];
+            const auto name = passes->counts.begin(d.compared[test.place], luminance_of(passes->layers.composite()),
+                                                   thresholds_texture(static_cast<int>(layer)));
+            if (!name) return name.error();
+            OpenTest& asked = open.emplace_back();
+            asked.name = *name;
+            asked.test = {.frame = frames,
+                          .object = object,
+                          .level = subjects[object].level,
+                          .compared_with = test.compared_with};
+            subjects[object].is_open = true;
+        }
+    return {};
+}
+
+void LevelControl::Impl::sum_up(LevelFrame& frame) const {
+    const render::LayerCounts counts = passes->layers.counts();
+    frame.surface_passes += counts.surface_passes;
+    frame.masked_layers = counts.mask_passes;
+    frame.full_screen_passes = counts.full_screen_passes;
+    frame.texture_bytes = counts.texture_bytes + (passes->modern ? passes->modern->texture_bytes() : 0) +
+                          (passes->rpg99 ? passes->rpg99->texture_bytes() : 0) +
+                          4 * static_cast<std::uint64_t>(view.width) * static_cast<std::uint64_t>(view.height) +
+                          (shadows ? shadows->counts().bytes : 0) + (other_shadows ? other_shadows->counts().bytes : 0);
+}
 
 Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     if (auto valid = vdtree::validate_perspective(from, "A choice of levels"); !valid) return valid.error();
@@ -479,181 +692,29 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     if (auto made = need_passes(from); !made) return made.error();
     view = from;
     const int maps_before = passes_done();
-    const bool is_perceptual = options.method == LevelMethod::perceptual;
 
-    std::vector<std::size_t> in_sight;
-    std::vector<render::Item> objects, background;
-    std::vector<glm::dvec3> centres;
-    frame.levels.assign(things.size(), -1);
-    frame.tested_with.assign(things.size(), -1);
-    for (std::size_t i = 0; i < things.size(); ++i) {
-        Thing& thing = things[i];
-        if (!is_in_sight(thing.sphere, view)) continue;
-        if (!is_perceptual) thing.level = chosen_level(thing, view);
-        auto made = item(i, thing.level, view);
-        if (!made) return made.error();
-        thing.lighting = made->lighting;
-        objects.push_back(std::move(*made));
-        in_sight.push_back(i);
-        centres.push_back(thing.sphere.centre);
-        frame.levels[i] = thing.level;
-        const bool has_changed = thing.drawn_level >= 0 && thing.drawn_level != thing.level;
-        frame.changed += has_changed;
-        if (has_changed && !tests_all) thing.fading_from = thing.drawn_level, thing.fade_left = options.fade_frames;
-        thing.drawn_level = thing.level;
-        frame.triangles += thing.levels->chain.triangles(thing.level);
-    }
-    for (std::size_t i = 0; i < backdrop.size(); ++i) {
-        auto lighting = session.backdrop_lighting(view, i);
-        if (!lighting) return lighting.error();
-        render::Item& made = background.emplace_back(render::Item{backdrop[i], session.scene().backdrop[i].placement});
-        made.lighting = std::move(*lighting);
-    }
-
-    // What casts shadows: also what is out of the window, at the level that it would have.
-    casters.clear();
-    caster_layers.clear();
-    is_shaded.clear();
-    if (std::ranges::any_of(objects, is_in_casting_light) || std::ranges::any_of(background, is_in_casting_light)) {
-        for (std::size_t i = 0; i < things.size(); ++i) {
-            auto made = item(i, things[i].level, view);
-            if (!made) return made.error();
-            casters.push_back(std::move(*made));
-        }
-        casters.insert(casters.end(), background.begin(), background.end());
-        if (!reach) reach = render::ball_around(casters);
-    } else {
-        shadows.reset();
-        other_shadows.reset();
-    }
-
-    // Layers.
-    auto split = render::split_into_layers(centres, view, options.layers);
-    if (!split) return split.error();
-    if (!is_perceptual) *split = {.layer_of = std::vector<int>(objects.size(), 0), .count = 0, .borders = {}};
-    frame.layers = split->count;
-    // Those that fade are drawn at both levels.
-    std::vector<render::Item> shown = objects;
-    render::LayerSplit split_of_shown = *split;
-    for (std::size_t i = 0; i < in_sight.size(); ++i) {
-        Thing& thing = things[in_sight[i]];
-        thing.is_fading = thing.fade_left > 0;
-        if (!thing.is_fading) continue;
-        const float share = 1 - static_cast<float>(thing.fade_left) / static_cast<float>(options.fade_frames + 1);
-        --thing.fade_left;
-        shown[i].stipple = {0, share};
-        render::Item before = objects[i];
-        before.cut = thing.levels->cuts[static_cast<std::size_t>(thing.fading_from)];
-        before.stipple = {share, 1};
-        shown.push_back(std::move(before));
-        split_of_shown.layer_of.push_back(split->layer_of[i]);
-        frame.triangles += thing.levels->chain.triangles(thing.fading_from);
-    }
+    Drawing d;
+    if (auto done = gather(d, frame); !done) return done.error();
+    if (auto done = gather_casters(d); !done) return done.error();
+    if (auto done = split(d, frame); !done) return done.error();
     times.begin();
     const std::uint64_t redraws_before = shadow_redraws();
-    if (!casters.empty()) {
-        caster_layers.assign(casters.size(), -1);
-        for (std::size_t i = 0; i < in_sight.size(); ++i) caster_layers[in_sight[i]] = split->layer_of[i];
-        if (is_perceptual) is_shaded = find_shaded(*split, in_sight);
-        if (auto drawn = cast(casters, shadows); !drawn) return drawn.error();
-        frame.shadow_maps = shadows->counts().maps;
-    }
-    const render::Shadows* picture_shadows = shadows ? &*shadows : nullptr;
-    render::LayerPasses& layers = passes->layers;
-    if (auto drawn = layers.draw(shown, background, {.view = view, .shadows = picture_shadows}, split_of_shown,
-                                 glm::vec4(session.background()));
-        !drawn)
-        return drawn.error();
+    if (auto done = draw_layers(d, frame); !done) return done.error();
     times.end_stage();
-
-    // Which objects are tested, and what at.
-    struct Test {
-        std::size_t place = 0; // in sight
-        int compared_with = 0;
-    };
-    std::vector<std::vector<Test>> tests(static_cast<std::size_t>(layers.combination_count()));
-    bool any = false;
-    for (std::size_t layer = 0; is_perceptual && layer < tests.size(); ++layer) {
-        const int number = static_cast<int>(layer), best = best_of_layer(number, in_sight, split->layer_of);
-        for (std::size_t i = 0; i < in_sight.size(); ++i) {
-            if (split->layer_of[i] != number || !is_due(in_sight[i], number)) continue;
-            const int compared_with = to_compare_with(things[in_sight[i]], best);
-            if (compared_with == things[in_sight[i]].level) continue; // a chain of one level
-            tests[layer].push_back({i, compared_with});
-            frame.tested_with[in_sight[i]] = compared_with;
-            any = true;
-        }
-    }
-
-    // Combinations and maps.
-    OpenTimes open_time{frames, 0};
-    for (std::size_t layer = 0; is_perceptual && layer < tests.size(); ++layer) {
-        if (tests[layer].empty() && !options.maps_all_layers) continue;
-        const int number = static_cast<int>(layer);
-        if (auto combined = combine(number); !combined) return combined.error();
-        times.end_stage();
-        if (auto mapped = map(number); !mapped) return mapped.error();
-        times.end_stage();
-        ++open_time.combinations;
-    }
-
-    // Depth: what is tested as it will be drawn once more, all else as coarsely as can be.
-    std::vector<render::Item> tested = objects;
-    if (any) {
-        for (std::size_t i = 0; i < in_sight.size(); ++i) {
-            const Thing& thing = things[in_sight[i]];
-            const int with = frame.tested_with[in_sight[i]];
-            tested[i].cut = with < 0 ? thing.levels->cuts.back() : thing.levels->cuts[static_cast<std::size_t>(with)];
-        }
-        std::vector<render::Item> all = tested;
-        all.insert(all.end(), background.begin(), background.end());
-        // Shadows are those of the better levels as well, or what a better level's surface has of a worse one's shadow on
-        // itself would count. All else casts its own.
-        if (!casters.empty()) {
-            std::vector<render::Item> better = casters, compared;
-            for (std::size_t i = 0; i < in_sight.size(); ++i) {
-                if (frame.tested_with[in_sight[i]] < 0) continue;
-                better[in_sight[i]].cut = tested[i].cut;
-                compared.push_back(tested[i]);
-            }
-            if (auto drawn = cast(better, other_shadows, compared); !drawn) return drawn.error();
-        }
-        if (auto drawn = passes->counts.draw_depth(all, {.view = view,
-                                                         .near_plane = layers.near_plane(),
-                                                         .shadows = casters.empty() ? nullptr : &*other_shadows});
-            !drawn)
-            return drawn.error();
-        ++frame.surface_passes;
-    }
+    choose_tests(d, frame);
+    const auto combinations = map_layers(d);
+    if (!combinations) return combinations.error();
+    if (auto done = draw_compared(d, frame); !done) return done.error();
     times.end_stage();
-
-    // What is seen of the difference.
-    for (std::size_t layer = 0; layer < tests.size(); ++layer)
-        for (const Test& test : tests[layer]) {
-            const std::size_t object = in_sight[test.place];
-            const auto name = passes->counts.begin(tested[test.place], luminance_of(layers.composite()),
-                                                   thresholds_texture(static_cast<int>(layer)));
-            if (!name) return name.error();
-            OpenTest& asked = open.emplace_back();
-            asked.name = *name;
-            asked.test = {
-                .frame = frames, .object = object, .level = things[object].level, .compared_with = test.compared_with};
-            things[object].is_open = true;
-        }
+    if (auto done = count_differences(d); !done) return done.error();
     times.end_stage();
     times.end();
-    open_times.push_back(open_time);
+    open_times.push_back({frames, *combinations});
     if (auto flushed = context.flush(); !flushed) return flushed.error(); // or counts that are polled never come
 
-    const render::LayerCounts counts = layers.counts();
-    frame.surface_passes += counts.surface_passes;
-    frame.masked_layers = counts.mask_passes;
+    sum_up(frame);
     frame.shadow_passes = static_cast<int>(shadow_redraws() - redraws_before);
-    frame.full_screen_passes = counts.full_screen_passes + passes_done() - maps_before;
-    frame.texture_bytes = counts.texture_bytes + (passes->modern ? passes->modern->texture_bytes() : 0) +
-                          (passes->rpg99 ? passes->rpg99->texture_bytes() : 0) +
-                          4 * static_cast<std::uint64_t>(view.width) * static_cast<std::uint64_t>(view.height) +
-                          (shadows ? shadows->counts().bytes : 0) + (other_shadows ? other_shadows->counts().bytes : 0);
+    frame.full_screen_passes += passes_done() - maps_before;
     ++frames;
     return frame;
 }
@@ -684,10 +745,10 @@ void LevelControl::set_bias(double bias) {
 
 void LevelControl::set_levels(std::span<const int> levels) {
     Impl& own = *impl_;
-    assert(own.options.method == LevelMethod::given && levels.size() == own.things.size());
+    assert(own.options.method == LevelMethod::given && levels.size() == own.subjects.size());
     for (std::size_t i = 0; i < levels.size(); ++i) {
-        const int last = own.things[i].levels->chain.size() - 1;
-        own.things[i].level = levels[i] < 0 ? last : std::min(levels[i], last);
+        const int last = own.subjects[i].levels->chain.size() - 1;
+        own.subjects[i].level = levels[i] < 0 ? last : std::min(levels[i], last);
     }
 }
 
@@ -695,9 +756,9 @@ bool LevelControl::is_settled() const noexcept {
     const Impl& own = *impl_;
     if (own.options.method != LevelMethod::perceptual) return own.frames > 0;
     if (own.frames == 0) return false;
-    return std::ranges::all_of(own.things, [&](const Impl::Thing& thing) {
-        return thing.levels->chain.size() < 2 || !is_in_sight(thing.sphere, own.view) ||
-               (thing.is_known && thing.tested >= own.last_change);
+    return std::ranges::all_of(own.subjects, [&](const Impl::Subject& subject) {
+        return subject.levels->chain.size() < 2 || !is_in_sight(subject.sphere, own.view) ||
+               (subject.is_known && subject.tested >= own.last_change);
     });
 }
 
@@ -754,9 +815,9 @@ Result<std::vector<int>> LevelControl::read_levels() {
         if (level < 0)
             for (std::size_t i = 0; i < own.backdrop.size(); ++i)
                 items.push_back({own.backdrop[i], own.session.scene().backdrop[i].placement});
-        for (const Impl::Thing& thing : own.things)
-            if (level >= 0 && thing.drawn_level == level && is_in_sight(thing.sphere, own.view))
-                items.push_back({thing.levels->cuts[static_cast<std::size_t>(level)], thing.placement});
+        for (const Impl::Subject& subject : own.subjects)
+            if (level >= 0 && subject.drawn_level == level && is_in_sight(subject.sphere, own.view))
+                items.push_back({subject.levels->cuts[static_cast<std::size_t>(level)], subject.placement});
         if (items.empty()) continue;
         if (auto drawn = render::draw(items, {.view = own.view, .near_plane = own.passes->layers.near_plane()}, *target,
                                       {.colour = std::nullopt});
@@ -788,6 +849,8 @@ Result<std::vector<float>> LevelControl::thresholds(int left_out) {
 int LevelControl::map_width() const noexcept { return impl_->passes->layers.combination().width(); }
 int LevelControl::map_height() const noexcept { return impl_->passes->layers.combination().height(); }
 
-const LevelChain& LevelControl::chain(std::size_t object) const noexcept { return impl_->things[object].levels->chain; }
+const LevelChain& LevelControl::chain(std::size_t object) const noexcept {
+    return impl_->subjects[object].levels->chain;
+}
 
 } // namespace unseen::session

@@ -1,4 +1,4 @@
-#include <unseen/session_gpu/level_pictures.h>
+#include <unseen/session_gpu/precompute_selections.h>
 
 #include <algorithm>
 #include <cmath>
@@ -91,7 +91,7 @@ struct LevelPictures::Impl {
     };
 
     Impl(const render::Context& context_, Session& session_)
-        : context(context_), session(session_), uploads(context_) {}
+        : context(context_), session(session_.share()), uploads(context_) {}
 
     Result<void> load(int level_count);
     Result<void> need_sheet(const vdtree::View& view);
@@ -106,7 +106,7 @@ struct LevelPictures::Impl {
     float value_of(float luminance, SelectionQuality quality) const;
 
     render::Context context;
-    Session& session;
+    Session session;
     SharedUploads uploads;
     std::vector<const UploadedLevels*> levels; // by object
     std::vector<WorldSphere> spheres;          // by object

@@ -277,7 +277,8 @@ Result<Lod> make_levels(Session& session, const render::Context& context, const 
         auto single = alone(session, i);
         if (!single) return single.error();
         ObjectLevels levels(*single, context, options, lod, [&](double share) {
-            return !options.progress || options.progress((static_cast<double>(i) + share) / static_cast<double>(count));
+            return !options.progress ||
+                   options.progress((static_cast<double>(i) + share) / static_cast<double>(count), "levels");
         });
         auto made = levels.make();
         if (!made) return made.error();

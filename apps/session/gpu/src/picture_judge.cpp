@@ -4,24 +4,18 @@
 #include <limits>
 #include <utility>
 
-#include <unseen/session_gpu/frame_image.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::session {
 
-std::vector<vdtree::Cut> whole_cuts(const Session& session) {
-    std::vector<vdtree::Cut> whole;
-    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) whole.emplace_back(session.tree(i)).unfold_all();
-    return whole;
-}
-
 PictureJudge::PictureJudge(const Session& session, const vdtree::View& view, int samples,
                            std::shared_ptr<SceneRenderer> renderer)
-    : session_(&session), view_(view), samples_(samples), renderer_(std::move(renderer)) {}
+    : session_(session.share()), view_(view), samples_(samples), renderer_(std::move(renderer)) {}
 
 render::DrawOptions PictureJudge::drawing() const {
     render::DrawOptions drawing;
     drawing.samples = samples_;
-    drawing.background = session_->background();
+    drawing.background = session_.background();
     return drawing;
 }
 
@@ -63,7 +57,7 @@ Result<PictureVerdict> PictureJudge::judge(std::span<const vdtree::Cut> cuts) {
 }
 
 Result<PictureVerdict> PictureJudge::judge(const render::Frame& frame) const {
-    const perception::Display& display = session_->observer().display;
+    const perception::Display& display = session_.observer().display;
     const perception::Image luminance = luminance_image(frame, display);
     auto other = std::async(std::launch::async, [&] {
         auto judgement = second_->judge(luminance);

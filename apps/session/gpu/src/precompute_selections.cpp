@@ -9,7 +9,6 @@
 #include <thread>
 #include <utility>
 
-#include <unseen/session_gpu/level_pictures.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 #include <unseen/vdtree/internal/team.h>
@@ -17,8 +16,8 @@
 namespace unseen::session {
 namespace {
 
-// Corners that a member does before all talk to each other again: what others did since is lost where the first is killed,
-// and who is done first waits.
+// Corners that a member does before all talk to each other again: what others did since is lost where the first is
+// killed, and who is done first waits.
 constexpr std::size_t corners_at_a_time = 48;
 constexpr double walker_eye = 1.7; // world units above the lowest object
 constexpr int default_cells = 10;  // along the longer side
@@ -180,7 +179,8 @@ private:
     std::size_t searching_; // threads
 };
 
-// ---- several processes ------------------------------------------------------------------------------------------------
+// ---- several processes
+// ------------------------------------------------------------------------------------------------
 
 void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
     const std::uint64_t length = bytes.size();
@@ -268,8 +268,8 @@ public:
         for (std::size_t at = 0; at < open.size();) {
             const std::size_t left = open.size() - at,
                               each = std::clamp<std::size_t>((left + members - 1) / members, 1, corners_at_a_time);
-            // Neighbours cost about the same, so members take turns, to and fro: else one would have every other column of
-            // the grid.
+            // Neighbours cost about the same, so members take turns, to and fro: else one would have every other column
+            // of the grid.
             const auto part = [&](std::size_t member) {
                 std::vector<LatticePoint> own;
                 for (std::size_t turn = 0; turn < each; ++turn) {

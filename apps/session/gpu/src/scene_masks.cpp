@@ -12,8 +12,8 @@
 namespace unseen::session {
 namespace {
 
-// People differ in how much they see of a masker, too, and models of sight do. Changes are looked for by the observer, and
-// maskers count as for somebody who sees half as much: of the default observer, as for the median person.
+// People differ in how much they see of a masker, too, and models of sight do. Changes are looked for by the observer,
+// and maskers count as for somebody who sees half as much: of the default observer, as for the median person.
 constexpr double maskers_gain = 0.5;
 
 // All but one layer's objects.

@@ -21,9 +21,15 @@ std::vector<DrawnCut> drawn_cuts(const Follower& follower, std::size_t objects) 
     return drawn;
 }
 
+std::vector<vdtree::Cut> whole_cuts(const Session& session) {
+    std::vector<vdtree::Cut> whole;
+    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) whole.emplace_back(session.tree(i)).unfold_all();
+    return whole;
+}
+
 struct SceneRenderer::Impl {
-    const render::Context& context;
-    const Session& session;
+    render::Context context;
+    Session session;
     std::vector<render::GpuCut> objects, backdrop;
     std::optional<render::SampleSum> sum;   // made for the first frame off screen, and for each of another size
     std::optional<render::Shadows> shadows; // made when a light first casts some
@@ -99,7 +105,7 @@ Result<render::Shadows*> SceneRenderer::Impl::cast(std::span<const render::Item>
 }
 
 Result<SceneRenderer> SceneRenderer::create(const render::Context& context, const Session& session) {
-    auto impl = std::make_unique<Impl>(Impl{context, session, {}, {}, {}, {}});
+    auto impl = std::make_unique<Impl>(Impl{context, session.share(), {}, {}, {}, {}});
     if (const auto loaded = impl->load(); !loaded) return loaded.error();
     return SceneRenderer(std::move(impl));
 }
@@ -167,5 +173,24 @@ SceneRenderer::SceneRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)
 SceneRenderer::SceneRenderer(SceneRenderer&&) noexcept = default;
 SceneRenderer& SceneRenderer::operator=(SceneRenderer&&) noexcept = default;
 SceneRenderer::~SceneRenderer() = default;
+
+perception::Image code_image(const render::Frame& frame, const perception::Display& display) {
+    perception::Image image{frame.width, frame.height, 3, {}};
+    image.values.reserve(frame.colour.size());
+    for (const float linear : frame.colour) {
+        const double code = perception::encode(display, static_cast<double>(linear));
+        image.values.push_back(static_cast<float>(std::clamp(code, 0.0, 1.0)));
+    }
+    return image;
+}
+
+perception::Image luminance_image(const render::Frame& frame, const perception::Display& display) {
+    perception::Image image{frame.width, frame.height, 1, {}};
+    image.values.reserve(frame.luminance.size());
+    for (const float relative : frame.luminance)
+        image.values.push_back(
+            static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
+    return image;
+}
 
 } // namespace unseen::session

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/errors.h>
 
@@ -81,6 +80,14 @@ std::string file_name(std::size_t view, const std::string& what) {
     return "view" + std::to_string(view + 1) + "-" + what;
 }
 
+// `share`: of the view that is being drawn.
+Result<void> go_on(const StudyPicturesOptions& options, std::size_t view, double share, std::size_t views) {
+    if (!options.progress ||
+        options.progress((static_cast<double>(view) + share) / static_cast<double>(views), "pictures"))
+        return {};
+    return Error{ErrorCode::cancelled, "Drawing the pictures of a study was stopped."};
+}
+
 } // namespace
 
 Result<std::vector<StudyPair>> draw_study_pairs(Session& session, const render::Context& context,
@@ -100,10 +107,10 @@ Result<std::vector<StudyPair>> draw_study_pairs(Session& session, const render::
         if (!original) return original.error();
         if (options.pairs_original) pairs.push_back({"original", *original, *original, false, {}});
         for (std::size_t i = 0; i < conditions.size(); ++i) {
-            if (options.progress)
-                options.progress(
-                    (static_cast<double>(number) + static_cast<double>(i) / static_cast<double>(conditions.size())) /
-                    static_cast<double>(views.size()));
+            if (const auto on = go_on(options, number, static_cast<double>(i) / static_cast<double>(conditions.size()),
+                                      views.size());
+                !on)
+                return on.error();
             const StudyCondition& condition = conditions[i];
             const auto other = photographer->take(condition.request, from, file_name(number, std::to_string(i + 1)));
             if (!other) return other.error();
@@ -128,7 +135,7 @@ Result<std::vector<StudyPair>> draw_level_pairs(Session& session, const render::
     std::vector<StudyPair> pairs;
     const std::vector<vdtree::View> views = views_of(view, options);
     for (std::size_t number = 0; number < views.size(); ++number) {
-        if (options.progress) options.progress(static_cast<double>(number) / static_cast<double>(views.size()));
+        if (const auto on = go_on(options, number, 0, views.size()); !on) return on.error();
         const vdtree::View& from = views[number];
         const auto settled = control->settle(from);
         if (!settled) return settled.error();

@@ -160,7 +160,7 @@ void recommend(std::vector<TradeoffPoint>& points) {
         const bool shows_nothing = point.visible_pixels == 0 && point.second_visible_pixels == 0;
         // A claim about all views like this one, not the luck of one.
         const FoldTest test = point.request.fold_test.value_or(FoldTest::error);
-        const bool is_a_claim = is_perceptual(test) && test != FoldTest::luebke_hallen &&
+        const bool is_a_claim = is_perceptual(test) && facts_of(test).is_safe &&
                                 point.request.goal.kind == Goal::Kind::imperceptible && point.request.threshold <= 1;
         if (!point.is_of_view && shows_nothing && is_a_claim && point.triangles < best->triangles) best = &point;
     }
@@ -204,7 +204,8 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     if (!samples) return samples.error();
     result.samples = *samples;
     for (std::size_t i = 0; i < all.size(); ++i) {
-        if (options.progress) options.progress(static_cast<double>(i) / static_cast<double>(all.size()));
+        if (options.progress && !options.progress(static_cast<double>(i) / static_cast<double>(all.size()), "ways"))
+            return Error{ErrorCode::cancelled, "Measuring what accuracy costs was stopped."};
         if (!result.points.empty() && vdtree::ms_since(begin) > 1e3 * options.seconds) {
             result.left_out.push_back(all[i].name);
             continue;

@@ -145,8 +145,4 @@ Result<vdtree::DistanceCriterion> error_distances(std::span<const TreeAsLit> as_
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 
-// The names that --fold-test takes.
-inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "luebke-hallen-safe", "error", "extent",
-                                                       "displacement"};
-
 } // namespace unseen::perception

@@ -1,4 +1,4 @@
-// Keeps cuts at what moving views of a session ask for.
+// Keeps the cuts of a session up to date while the view moves.
 #pragma once
 
 #include <memory>
@@ -13,27 +13,27 @@ namespace unseen::session {
 
 class Session;
 
-// One cut an object, from frame to frame. For the goals imperceptible and pixels the cost goes with what changes from
-// one call to the next; for a budget, with hysteresis 1 or several objects, each call begins anew; full: only the first
-// does. Not thread-safe. Move-only.
+// One cut for each object, from frame to frame. With the goals imperceptible and pixels, a call costs what changes
+// since the last one. With a budget and either hysteresis 1 or several objects, each call starts from scratch. With the
+// full model only the first one does. Not thread-safe. Move-only.
 class Follower {
 public:
-    explicit Follower(const Session& session); // shares what the session keeps, so the session may go or move
+    explicit Follower(const Session& session); // shares the session, which may be moved or destroyed
     Follower(Follower&&) noexcept;
     Follower& operator=(Follower&&) noexcept;
     ~Follower();
 
-    // From now on vertices glide for so long where a cut changes, and geomorph() is what to draw. Fails where that is
-    // no time, and on trees with textures.
+    // From now on, vertices glide for this time when a cut changes; draw geomorph() instead of cut(). Fails if the time
+    // is not above 0 and finite, and on trees with textures.
     Result<void> set_glide(double seconds);
-    void let_pass(double seconds); // for the glides of the next call; precondition: not negative, finite
+    void let_pass(double seconds); // advances the glides in the next call; precondition: not negative, finite
 
-    // Makes the cuts what the request asks for. Fails where Session::simplify() does.
+    // Updates the cuts for a view. Fails where Session::simplify() does.
     Result<Report> follow(const vdtree::View& view, const Request& request);
 
-    // As of the last call of follow(), from which on there is a cut.
+    // After the last call of follow(). Precondition: there was one.
     const vdtree::Cut& cut(std::size_t object = 0) const;
-    const vdtree::Geomorph* geomorph(std::size_t object = 0) const; // null: nothing glides
+    const vdtree::Geomorph* geomorph(std::size_t object = 0) const; // null without set_glide()
 
 private:
     friend class Session;

@@ -1,4 +1,4 @@
-// The gaze of every frame: from the head alone, recorded or simulated, as a tracker would tell it.
+// The gaze in every frame: from the head alone, recorded, or simulated as an eye tracker would report it.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include <optional>
 
 #include <unseen/perception/gaze.h>
-#include <unseen/session/messages.h>
+#include <unseen/session/load.h>
 #include <unseen/session/observer.h>
 
 namespace unseen::session {
@@ -31,15 +31,14 @@ public:
     // Reads the recording. Errors name its line, or the tracker's field.
     static Result<GazePlayer> create(const GazeOptions& options);
 
-    // To be called before the first frame: puts a recording into the view's window and notes what was made of its file,
-    // or simulates a gaze there, for frames up to `duration_s`; where nobody knows when they end, for an hour, after
-    // which the eye keeps still. Fails where a recording has nothing for the frames; warns where it ends before them,
-    // and its last gaze holds.
+    // Call this before the first frame. Maps a recording to the view's window and notes how its file was read, or
+    // simulates a gaze there for `duration_s`; if that is not known, for an hour, after which the eye rests. Fails if
+    // the recording has no sample for the frames. Warns if it ends before them; its last gaze then holds.
     Result<void> begin(const perception::Display& display, const vdtree::View& view, std::optional<double> duration_s,
                        const Messages& messages = {});
 
-    // What is known at an instant. `own_px`: where the program knows the viewer to look, for sources that are not
-    // played; the tracker's error is around it.
+    // The gaze at a time. `own_px`: the program's own gaze, for sources that are not played; the tracker's error is its
+    // margin.
     std::optional<Gaze> at(double time_s, const vdtree::View& view, std::optional<glm::dvec2> own_px) const;
     std::optional<Gaze> around(std::optional<glm::dvec2> px) const; // with the tracker's error, whatever is played
     bool is_moving() const noexcept { return tracker_.has_value(); }

@@ -1,5 +1,5 @@
-// Discrete levels of detail of a vertex tree, each of which differs about as visibly from the one before: for renderers
-// that choose among few meshes and not among cuts.
+// Discrete levels of detail of a vertex tree, evenly spaced in visibility: for renderers that choose among few meshes
+// instead of cuts.
 #pragma once
 
 #include <memory>
@@ -18,18 +18,18 @@ constexpr int most_levels = 16;
 
 struct LevelChainOptions {
     int levels = 6;                      // at most, 1 to most_levels; level 0 is the full mesh
-    double most_share = 0.5;             // of the triangles that level 1 keeps, above 0, at most 1
-    double least_share = 0.01;           // of those that the last level keeps, 0 to most_share
-    vdtree::Index least_triangles = 100; // but not less than so many
+    double most_share = 0.5;             // share of the triangles that level 1 keeps, above 0, at most 1
+    double least_share = 0.01;           // share that the last level keeps, 0 to most_share
+    vdtree::Index least_triangles = 100; // of the last level, even if that is more
 };
 
-// A value; refers to nothing but the tree's data, which it shares. Levels are the same from all sides: what is folded is
-// what a criterion calls invisible from a distance, wherever from. These distances grow from level to level by one factor.
-// Levels that would keep as many triangles as the one before are left out: a small mesh has fewer.
+// A value that shares the tree's data. Levels are the same from all sides: a level folds whatever a criterion calls
+// invisible from a distance, in any direction. The distance grows by the same factor from level to level. Levels with
+// as many triangles as the one before are left out, so small meshes have fewer.
 class LevelChain {
 public:
-    // Of the criterion the distances count, with lights that may move those of outlines. Fails on options out of range,
-    // and on the criterion of another tree. Cost: that of some cuts, a microsecond a node each.
+    // Uses the criterion's distances; with lights that may move, those of outlines. Fails on options out of range and
+    // on the criterion of another tree. Cost: some cuts, a microsecond a node each.
     static Result<LevelChain> create(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,
                                      const LevelChainOptions& options = {});
 
@@ -39,11 +39,11 @@ public:
 
     int size() const noexcept { return static_cast<int>(levels_.size()); } // 1 or more
     vdtree::Index triangles(int level) const noexcept { return levels_[static_cast<std::size_t>(level)].triangles; }
-    // How far the eye has to be for nobody to see the level, mesh units; 0 of the full mesh. Infinite: the criterion
-    // calls it visible from everywhere.
+    // The distance from which nobody sees the level, mesh units; 0 for the full mesh, infinite if the criterion calls
+    // the level visible from everywhere.
     double unseen_from(int level) const noexcept;
 
-    // Made anew with each call, in the time of a cut.
+    // Computed in each call, in the time of a cut.
     vdtree::Cut cut(int level) const;
 
 private:
@@ -63,8 +63,8 @@ private:
     std::vector<Level> levels_;
 };
 
-// Of an object of the session, by the fold test that the session chooses for the request, whose goal does not count.
-// Measures what that needs as Session::prepare() does, so call that for all objects before anything else.
+// The levels of an object of the session, by the fold test that the session chooses for the request. The goal is
+// ignored. Measures folds as Session::prepare() does; call that for all objects before anything else.
 Result<LevelChain> level_chain(Session& session, const vdtree::View& view, Request request, std::size_t object = 0,
                                const LevelChainOptions& options = {});
 

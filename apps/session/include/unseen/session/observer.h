@@ -1,4 +1,4 @@
-// Who looks: on which display, how well, and where.
+// The person who looks: on which display, how well, and where.
 #pragma once
 
 #include <memory>
@@ -18,59 +18,59 @@ namespace unseen::session {
 
 struct Gaze {
     glm::dvec2 px = glm::dvec2(0); // in the window, from the top left; may lie outside
-    double margin_deg = 0;         // the true gaze may be so far from it; 0 or more
+    double margin_deg = 0;         // the true gaze may be this far from it; 0 or more
 };
 
 // Error messages and reasons call these fields observer.gaze and so on.
 struct Observer {
     perception::Display display = {};
-    perception::Person person = perception::default_person; // how well they see; castleCSF times a gain
-    // This very viewer's contrast sensitivity, in the person's place; null: the person's.
+    perception::Person person = perception::default_person; // how well they see: castleCSF times a gain
+    // The contrast sensitivity of one measured viewer, instead of the person's. Null: not set.
     std::shared_ptr<const perception::CsfTable> csf = {};
-    std::optional<Gaze> gaze = {}; // none: everything counts as looked at
-    // How fast everything moves over the retina, 0 to perception::fastest_velocity. Fine things blur, coarse ones are
-    // seen better. What the eye follows hardly moves there: give what is left of it (perception/motion.h).
+    std::optional<Gaze> gaze = {}; // not set: the viewer may look anywhere, so everything counts as foveal
+    // How fast everything moves over the retina, 0 to perception::fastest_velocity. Fine detail blurs, coarse detail is
+    // seen better. The image of what the eye pursues hardly moves: give its retinal slip (perception/motion.h).
     perception::DegreesPerSecond velocity{0};
 };
 
-// Whose eyes, in words: "the default observer (castleCSF x 2: of measured people, 8.7% see more)".
+// In words: "the default observer (castleCSF x 2: of measured people, 8.7% see more)".
 std::string describe(const Observer& observer);
 
-// How judges of pictures take this observer; of a gaze its place alone.
+// The options of the judges of pictures for this observer. The gaze's margin is ignored.
 perception::JudgeOptions judge_options(const Observer& observer);
 
-// A person by name (perception/person.h), or the file of a viewer's table.
+// A person by name (perception/person.h), or the table of a viewer from a file.
 struct ObserverChoice {
     perception::Person person = perception::default_person;
-    std::shared_ptr<const perception::CsfTable> csf = {}; // of the file; else null
+    std::shared_ptr<const perception::CsfTable> csf = {}; // from the file; null for a person
 };
 Result<ObserverChoice> choose_observer(const std::string& name_or_file);
 
-// Contrast sensitivity by name: that of a model (see perception::csf_model()), or else the file of a table. A model
-// must be of luminance contrast.
+// Contrast sensitivity: a model by name (see perception::csf_model()), or a table from a file. Models must be of
+// luminance contrast.
 struct CsfChoice {
     std::optional<perception::CsfModel> model = {};
-    std::optional<perception::CsfTable> table = {}; // of the file; where a model is named, none
+    std::optional<perception::CsfTable> table = {}; // from the file; empty for a model
 };
 Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
-// Its table: of a model, for the display's distance and times the person's gain.
+// The table of that choice. The table of a model is for the display's distance and multiplied by the person's gain.
 Result<std::shared_ptr<const perception::CsfTable>>
 read_csf_table(const std::string& model_or_file, const perception::Display& display, const perception::Person& person);
 
-// The background in relative luminance: what is asked for must be possible on the display, within its black and white.
-// See Scene::background for the default.
+// The background in relative luminance. Fails if it is not between the display's black and white. See Scene::background
+// for the default.
 Result<float> relative_background(const perception::Display& display, std::optional<perception::Luminance> asked);
 
-// The pixel so far to the right of the window's centre; it may lie outside of the window.
+// The pixel at this angle to the right of the window's centre. It may lie outside of the window.
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
 inline constexpr double usual_degrees_aside = 29; // well in the periphery
 
-// The pixels so far from a gaze for who looks from the display's distance: a circle on the retina, on the flat screen
-// an ellipse around about the gaze. `count` of them in order. What would lie beside or behind the viewer is put far
-// outside. Preconditions: finite, above 0 degrees and below 180, at least one.
+// `count` pixels at this angle from a gaze, seen from the display's distance, in order. They form a circle on the
+// retina and about an ellipse on the flat screen. Points beside or behind the viewer are put far outside.
+// Preconditions: finite, above 0 degrees and below 180, at least one.
 std::vector<glm::dvec2> gaze_circle(const perception::Display& display, const vdtree::View& view, glm::dvec2 gaze_px,
                                     double degrees, int count = 72);
-inline constexpr double fovea_degrees = 1; // from its middle to its rim, about: where people see best
+inline constexpr double fovea_degrees = 1; // about the radius of the fovea, where people see best
 
 } // namespace unseen::session

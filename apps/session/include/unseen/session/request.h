@@ -1,9 +1,11 @@
-// What is wanted of a simplification.
+// What a simplification should achieve.
 #pragma once
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <unseen/perception/masking.h>
@@ -16,33 +18,42 @@ namespace unseen::session {
 // See perception/criterion.h for the first three, and vdtree/criteria.h for the others.
 enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement };
 
-// By contrast sensitivity; the others count pixels, seen or not.
-constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
-std::string name_of(FoldTest test); // "luebke-hallen", ...
+struct FoldTestFacts {
+    FoldTest test = FoldTest::error;
+    std::string_view name = {};    // "luebke-hallen"
+    std::string_view title = {};   // for people: "measured errors"
+    std::string_view summary = {}; // "perceptual: what folds change in fact"
+    bool is_perceptual = false;    // by contrast sensitivity; the others count pixels, seen or not
+    bool is_safe = false;          // every fold that can be seen costs more than 1, by the model
+};
+std::span<const FoldTestFacts> fold_tests() noexcept; // all, in the order in which to offer them
+const FoldTestFacts& facts_of(FoldTest test) noexcept;
+bool is_perceptual(FoldTest test) noexcept;
+std::string name_of(FoldTest test);
 
 // How far to fold.
 struct Goal {
     enum class Kind { imperceptible, full, budget, pixels };
 
     Kind kind = Kind::imperceptible;
-    vdtree::Index triangles = 0; // of budgets: at most so many, of all objects together; 1 or more
-    bool fill = false;           // of budgets: use all of them, even where no difference can be seen
-    double tolerance_px = 0;     // of pixels: above 0 and finite
+    vdtree::Index triangles = 0; // for budgets: at most this many in all objects together; 1 or more
+    bool fill = false;           // for budgets: use all of them, even where no difference can be seen
+    double tolerance_px = 0;     // for pixels: above 0 and finite
 
-    static Goal imperceptible() { return {}; }          // fold what nobody can see
+    static Goal imperceptible() { return {}; }          // fold whatever nobody can see
     static Goal full() { return {.kind = Kind::full}; } // fold nothing
-    // As inconspicuous as so many triangles can be.
+    // The least conspicuous cut with this many triangles.
     static Goal budget(vdtree::Index triangles, bool fill = false) {
         return {.kind = Kind::budget, .triangles = triangles, .fill = fill};
     }
-    // Fold what is smaller, seen or not.
+    // Fold everything smaller, visible or not.
     static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
 };
 
-// What the cut is for decides what may be left out of it.
+// What the cut is for.
 enum class Purpose {
-    mesh,    // may be looked at from elsewhere
-    picture, // seen from this view only: what is out of the window, faces away or is hidden in a solid is folded
+    mesh,    // it may be looked at from anywhere
+    picture, // it is seen from this view only: whatever is outside the window, faces away or is hidden in a solid folds
 };
 
 // Error messages and reasons call these fields request.goal, request.fold_test and so on.
@@ -50,26 +61,26 @@ struct Request {
     Goal goal = {};
     std::optional<FoldTest> fold_test = {};  // default: one that suits the scene and the goal, see Plan
     bool chroma = false;                     // changes of colour count, too, not only those of luminance
-    std::optional<double> milliseconds = {}; // the best cut that so much time is enough for; 0 or more
-    double threshold = 1;    // of imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
-    float hysteresis = 1.1f; // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
+    std::optional<double> milliseconds = {}; // time limit: the best cut found in it; 0 or more
+    double threshold = 1;    // for imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
+    float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;
-    // Of pictures: what this view, and no other, shows. What lies behind that is folded, too: simplify_as_seen() of
-    // <unseen/session_gpu/as_seen.h> draws it. Under lights only by the test error.
+    // For pictures: the depth of this very view. Whatever lies behind it folds, too. simplify_as_seen() in
+    // <unseen/session_gpu/as_seen.h> draws it. Under lights only the test `error` uses it.
     std::optional<vdtree::DepthPicture> shown = {};
-    // Of pictures: what the scene of this view, and of no other, masks of each object; by object, or empty: nothing.
-    // Counts for the test error, for gazes that are known for sure and where nothing moves over the retina.
+    // For pictures: how much the scene masks each object in this very view; by object, or empty. Used by the test
+    // `error`, if the gaze is known exactly and nothing moves over the retina.
     std::vector<perception::MaskingPicture> masking = {};
-    // Keep outlines whose shadows would move visibly, where lights cast some. False: a cut for the eye alone, whose
-    // shadows may show it.
+    // Keep outlines whose shadows would move visibly. False: the cut is for the eye alone; its shadows may reveal it.
     bool keeps_shadows = true;
-    // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
+    // Measure the errors of folds if the test needs them and the tree lacks them, which takes up to a minute. False:
+    // use errors only if they are there, as after Session::prepare().
     bool may_measure = true;
-    // Report::effects: some 20 us an object, which flights through scenes of many can do without.
+    // Fill in Report::effects. Cost: some 20 us an object; turn it off for flights through scenes of many objects.
     bool reasons = true;
 };
 
-// Whether the fields are in their ranges and go together, whatever the scene. The error names them.
+// Checks that the fields are in their ranges and go together, whatever the scene. The error names the field.
 Result<void> validate(const Request& request);
 
 } // namespace unseen::session

@@ -1,12 +1,18 @@
-// Levels of detail that were selected beforehand: for cameras all over a scene, how much of their pictures each level of
-// each object costs, and which levels lose least within a budget of triangles. See selection_search.h for one camera,
-// <unseen/session_gpu/precompute_selections.h> for all of them, and SelectionFollower for frames.
+// Levels of detail within a budget of triangles, chosen so that pictures lose least: Arlebrink and Linde, "Image
+// Quality-Driven Level of Detail Selection on a Triangle Budget" (2018).
+//
+// The search chooses levels for one camera. Each object is drawn alone at each level, once. A choice of levels is then
+// composed from these images by depth, and only in the rectangle of the object that changes, so a search draws nothing.
+// precompute_selections() in <unseen/session_gpu/precompute_selections.h> searches for cameras all over a scene and
+// writes Selections. A SelectionFollower chooses the levels of each frame from these.
 #pragma once
 
 #include <array>
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,11 +20,121 @@
 
 #include <glm/vec3.hpp>
 
+#include <unseen/perception/display.h>
 #include <unseen/session/level_chain.h>
 #include <unseen/session/scene.h>
-#include <unseen/session/selection_search.h>
+#include <unseen/vdtree/result.h>
 
 namespace unseen::session {
+
+// ---- one camera
+
+// What a picture loses against that of full detail. Sums over pixels; 0: nothing.
+enum class SelectionQuality {
+    ssim,     // 1 - SSIM, over all windows, as perception::ssim() counts it
+    pixels,   // that differ by more than perception::threshold_map_modern() calls unseen
+    contrast, // by how many thresholds pixels differ, beyond one
+};
+std::string name_of(SelectionQuality quality); // "ssim", ...
+
+// Pixels; the last ones excluded.
+struct PixelRect {
+    int left = 0, top = 0, right = 0, bottom = 0;
+
+    bool is_empty() const noexcept { return right <= left || bottom <= top; }
+    int width() const noexcept { return right - left; }
+    int height() const noexcept { return bottom - top; }
+    friend bool operator==(const PixelRect&, const PixelRect&) = default;
+};
+PixelRect united(const PixelRect& a, const PixelRect& b); // around both
+
+// An object alone at one level: the pixels of its rectangle, row by row.
+struct LevelImage {
+    PixelRect box; // of the pixels that it covers; empty: none
+    std::vector<float> values;
+    std::vector<float> depth; // near plane / distance along the axis; 0: the object is not there
+};
+
+struct ObjectImages {
+    std::size_t object = 0;               // of the scene
+    std::vector<LevelImage> levels;       // 0: full detail
+    std::vector<std::uint32_t> triangles; // by level, falling
+};
+
+// A camera's picture in parts. Values are what the quality compares: 8-bit codes of grey for SSIM, else cd/m2.
+struct LayeredPicture {
+    int width = 0, height = 0;
+    std::vector<float> background, background_depth; // by pixel, from the top left
+    std::vector<ObjectImages> objects;               // those in sight
+};
+
+// All objects at these levels (by entry of picture.objects), by depth; where depths are the same the first one shows.
+std::vector<float> put_together(const LayeredPicture& picture, std::span<const int> levels);
+
+// What a picture loses, kept by place so that only what changes is counted anew. A value.
+class PictureLoss {
+public:
+    // `display` counts for thresholds. Of SSIM: at least 11 x 11 pixels. Fails on smaller ones, and on values that are
+    // not finite.
+    static Result<PictureLoss> create(SelectionQuality quality, int width, int height, std::vector<float> reference,
+                                      const perception::Display& display = {});
+
+    double total() const noexcept { return total_; } // of the picture that is held; at first the reference: 0
+
+    // What another picture, which differs from the one held in the rectangle alone, would lose more than that.
+    double change(std::span<const float> picture, const PixelRect& changed) const;
+    void take(std::span<const float> picture, const PixelRect& changed); // holds that one from now on
+
+    // Of a whole picture, without what is held: the same but for the order of the sums.
+    double of(std::span<const float> picture) const;
+
+    int places() const noexcept { return columns_ * rows_; } // that the loss is summed over
+    // How far around a pixel places are that it counts for.
+    PixelRect places_of(const PixelRect& changed) const;
+
+private:
+    PictureLoss() = default;
+    void count(std::span<const float> picture, const PixelRect& places, std::vector<double>& losses) const;
+
+    SelectionQuality quality_ = SelectionQuality::ssim;
+    int width_ = 0, height_ = 0;
+    int columns_ = 0, rows_ = 0;                            // of places
+    std::vector<float> reference_, thresholds_;             // thresholds: cd/m2
+    std::vector<double> reference_mean_, reference_square_; // of SSIM's windows
+    std::vector<double> losses_;                            // by place
+    double total_ = 0;
+};
+
+struct SearchOptions {
+    std::uint64_t budget = 0; // triangles of objects in sight
+    // Candidates whose surroundings changed are counted anew when they come first, and not at once. Else all of them
+    // are.
+    bool is_lazy = true;
+};
+
+struct FoundSelection {
+    std::vector<int> levels; // by entry of the picture's objects
+    std::uint64_t triangles = 0;
+    double loss = 0;
+    bool holds = false; // the budget; else every object has its last level
+    std::uint64_t evaluations = 0;
+    // By entry, by level from 1 on: what that level loses where all others have full detail.
+    std::vector<std::vector<double>> alone;
+};
+
+// From full detail, always lowering by one level the object that loses least for each triangle saved, until the budget
+// holds; then raises again what fits into what is left, most gained first. Ties go to more triangles saved, then to the
+// first entry. `measures_alone`: fills in `alone`, one evaluation a level. Fails where PictureLoss::create() does.
+Result<FoundSelection> select_greedily(const LayeredPicture& picture, SelectionQuality quality,
+                                       const perception::Display& display, const SearchOptions& options,
+                                       bool measures_alone = false);
+
+// The best of all, by trying all. Fails above most_combinations.
+constexpr std::uint64_t most_combinations = 1'000'000;
+Result<FoundSelection> select_exhaustively(const LayeredPicture& picture, SelectionQuality quality,
+                                           const perception::Display& display, const SearchOptions& options);
+
+// ---- all cameras of a scene
 
 // A place of the lattice that all corners are on.
 struct LatticePoint {
@@ -26,7 +142,8 @@ struct LatticePoint {
     friend auto operator<=>(const LatticePoint&, const LatticePoint&) = default;
 };
 
-// Cells of a quadtree on the ground (xz), or of an octree in space, over a grid of equal ones. Lengths in lattice steps.
+// Cells of a quadtree on the ground (xz), or of an octree in space, over a grid of equal ones. Lengths in lattice
+// steps.
 struct SelectionGrid {
     glm::dvec3 origin = glm::dvec3(0); // of the lattice, world units
     double step = 1;                   // world units; above 0
@@ -99,8 +216,8 @@ std::uint64_t scene_fingerprint(const Scene& scene, std::span<const std::vector<
 // Of all that corners depend on but the place: what selections say but for their corners and cells.
 std::uint64_t search_key(const Selections& selections);
 
-// Whether the corners' selections differ by more than so many levels, in the mean over the objects that any of them has in
-// sight and that are not of the last level everywhere.
+// Whether the corners' selections differ by more than so many levels, in the mean over the objects that any of them has
+// in sight and that are not of the last level everywhere.
 bool corners_differ(std::span<const SelectionCorner* const> corners, double levels);
 
 // Binary, see docs/file-format.md. Written to a temporary name and renamed.
@@ -129,5 +246,59 @@ private:
 // For messages between processes.
 std::vector<std::byte> to_bytes(const SelectionCorner& corner);
 Result<SelectionCorner> corner_from(std::span<const std::byte> bytes);
+
+// ---- frames
+
+enum class SelectionBlend {
+    costs,   // what levels cost at the corners around the eye, weighted by place, for the objects in the frame
+    nearest, // the selections of the nearest corner's two nearest directions, as Arlebrink and Linde have it
+};
+
+struct SelectionFollowOptions {
+    std::uint64_t budget = 0; // triangles of objects in the frame; 0: that of the selections. Of costs alone.
+    SelectionBlend blend = SelectionBlend::costs;
+    // Of costs: an object gets a better level only where its loss is above so many times that of what is done for it.
+    double hysteresis = 1.25; // 1 or more
+    int most_changes = 4;     // of a frame, beyond those that the budget asks for; 1 or more
+};
+
+struct ChosenLevels {
+    std::vector<int> levels;     // by object; -1: out of the frame
+    std::uint64_t triangles = 0; // of objects in the frame
+    bool holds = true;           // the budget; else all have their coarsest levels
+    int changes = 0;             // objects that have another level than in the frame before, and were in that
+};
+
+// Move-only; refers to nothing of others.
+class SelectionFollower {
+public:
+    // `triangles`: of the scene's levels. Fails where the selections are of another scene or of other levels, and on
+    // options out of range.
+    static Result<SelectionFollower> create(Selections selections, const Scene& scene,
+                                            std::span<const std::vector<std::uint32_t>> triangles,
+                                            const SelectionFollowOptions& options = {});
+    SelectionFollower(SelectionFollower&&) noexcept;
+    SelectionFollower& operator=(SelectionFollower&&) noexcept;
+    ~SelectionFollower();
+
+    // Of the next frame. Cost: microseconds an object in the frame.
+    Result<ChosenLevels> choose(const vdtree::View& view);
+
+    const Selections& selections() const noexcept;
+
+private:
+    struct Impl;
+    explicit SelectionFollower(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+// Levels that lose least within the budget: from the finest on, always down where least is lost for each triangle, over
+// as many levels as make that least; then up again where it fits. By object: what levels cost, ascending from 0, and
+// their triangles, falling.
+struct LevelCosts {
+    std::vector<double> costs;
+    std::span<const std::uint32_t> triangles;
+};
+std::vector<int> levels_within(std::span<const LevelCosts> objects, std::uint64_t budget);
 
 } // namespace unseen::session

@@ -1,16 +1,16 @@
-// session: from a scene, an observer and a request to cuts, as the command `unseen` makes them. The header to include
-// first.
+// session: from a scene, an observer and a request to cuts, as the command `unseen` makes them. Include this first.
 //
-// A Scene is objects, lights and a background, from files or made. A Session puts an Observer (display, sensitivity,
-// gaze) before it, and is asked again and again: a Request says what is wanted, a Plan how it would be met and why, a
-// Simplification has the cuts. A Follower keeps cuts at what a moving view asks for.
+// A Scene holds objects, lights and a background, from files or made by the program. A Session puts an Observer
+// (display, sensitivity, gaze) before the scene and answers any number of requests. A Request says what is wanted, a
+// Plan how it would be met and why, and a Simplification holds the cuts. A Follower keeps cuts up to date while the
+// view moves.
 //
 //     auto scene = session::Scene::load("bunny.ply");
 //     auto session = session::Session::create(std::move(*scene));
 //     auto small = session->simplify({.goal = session::Goal::imperceptible()});
 //     meshio::write_mesh("small.ply", small->mesh().view());
 //
-// No command line, no OpenGL, and nothing is printed: Messages are told what takes long.
+// It needs no command line and no OpenGL, and prints nothing: Messages receive notes and warnings.
 #pragma once
 
 #include <memory>
@@ -23,103 +23,99 @@
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
 #include <unseen/session/level_chain.h>
-#include <unseen/session/messages.h>
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 #include <unseen/session/observer.h>
-#include <unseen/session/plan.h>
 #include <unseen/session/request.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/selection.h>
-#include <unseen/session/selection_follower.h>
-#include <unseen/session/selection_search.h>
 #include <unseen/session/simplification.h>
-#include <unseen/session/tree_cache.h>
 #include <unseen/vdtree/criteria.h>
 
 namespace unseen::session {
 
-// A sphere in the world.
 struct WorldSphere {
     glm::dvec3 centre = glm::dvec3(0);
     double radius = 0;
 };
 WorldSphere world_sphere(const Object& object); // around its triangles
-// Whether any of it may be in the window: only of spheres outside of one of its sides, or behind the eye, false.
+// Whether a part of it may be in the window. False only if it is outside of one side of the window or behind the eye.
 bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view);
-bool is_around_eye(const WorldSphere& sphere, const vdtree::View& view); // never of an orthographic view
+bool is_around_eye(const WorldSphere& sphere, const vdtree::View& view); // false for orthographic views
 
-// What Session makes the cut of one object by, for programs that make cuts themselves.
+// Everything that the cut of one object is made by, for programs that make cuts themselves.
 struct CutRecipe {
-    std::shared_ptr<const vdtree::DistanceCriterion> criterion; // one for views that differ in eye and gaze alone
+    std::shared_ptr<const vdtree::DistanceCriterion> criterion; // the same for views that differ in eye and gaze alone
     vdtree::Viewpoint viewpoint;                                // in the object's frame
     vdtree::FollowOptions options;                              // threshold, budget and time of the request
 };
 
-// A scene before an observer, with what can be kept from one request to the next. For one thread at a time. Kept are
-// criteria, sensitivity tables for unsure gazes, and what is derived from a tree alone: spheres that hide, rings of all
-// cuts, bounds under lights.
+// A scene before an observer. It caches whatever helps the next request: criteria, sensitivity tables, and what is
+// derived from a tree alone. The cache never changes an answer, except that measured errors stay
+// (Request::may_measure). For one thread at a time.
 class Session {
 public:
-    // Fails on a scene without objects that is not of a file, a background that the display does not show, and a display that is none.
-    // `messages` are told what takes long.
+    // Fails if the scene has no objects (unless it was read from a scene file), or if the display is invalid or cannot
+    // show the background. `messages` say what takes long.
     static Result<Session> create(Scene scene, Observer observer = {}, Messages messages = {});
     Session(Session&&) noexcept;
     Session& operator=(Session&&) noexcept;
     ~Session();
 
+    // Another handle to the same session, which lives as long as any of its handles.
+    Session share() const;
+
     const Scene& scene() const noexcept;
-    const vdtree::VertexTree& tree(std::size_t object = 0) const noexcept; // another one once its errors are measured
+    // Replaced when its errors are measured. Ends the program if there is no such object.
+    const vdtree::VertexTree& tree(std::size_t object = 0) const noexcept;
     const Observer& observer() const noexcept;
     float background() const noexcept; // relative luminance
 
     // From now on.
     void set_gaze(std::optional<Gaze> gaze); // precondition: finite, the margin 0 or more
     void set_time(double seconds);           // of lights that move; precondition: finite
-    // Precondition: 0 to perception::fastest_velocity. Followers refine at once what stands still again.
+    // Precondition: 0 to perception::fastest_velocity. When it falls, followers refine at once.
     void set_velocity(perception::DegreesPerSecond velocity);
 
-    std::uint64_t triangle_count() const noexcept; // of all objects' trees, shared ones counted for each
+    std::uint64_t triangle_count() const noexcept; // of all objects; shared trees count once for each object
 
-    // The sphere around all objects; without any, around the backdrop, or of no size at the world's origin.
+    // The sphere around all objects; if there are none, around the backdrop, or of radius 0 at the world's origin.
     WorldSphere bounding_sphere() const;
-    // From `direction` (towards the eye), with the sphere taking the share `fill` of the window's height; size and
-    // field of the window.
+    // A view from `direction` (towards the eye) in which the sphere takes the share `fill` of the window's height. Size
+    // and field come from `window`.
     vdtree::View frame(glm::dvec3 direction, double fill, const vdtree::View& window) const;
-    // Through the camera of the scene's file, if it has one; size of the window. The field is the camera's.
+    // A view through the camera of the scene's file, if it has one. The size comes from `window`.
     std::optional<vdtree::View> camera_view(const vdtree::View& window) const;
-    // That, or from +Z with 90% filled: 1024 x 1024 pixels, and the field that they fill on the display.
+    // That view, or one from +Z with 90% filled: 1024 x 1024 pixels, with the field that they fill on the display.
     vdtree::View default_view() const;
 
-    // How a request would be met for an object. All of the following fail where the request is not valid or asks for a
-    // fold test that does not know the scene, on views that are none, and where a light is at a vertex or inside of an
-    // object.
+    // How a request would be met for an object. All of the following fail on invalid requests and views, on objects
+    // that do not exist, on fold tests that cannot handle the scene, and if a light is at a vertex or inside an object.
     Result<Plan> plan(const vdtree::View& view, const Request& request, std::size_t object = 0) const;
 
-    // The same for all objects, and measures the errors of folds where the plan wants them: some 50 us a node, in
-    // parallel. Trees change then, so call this before making anything else of them; simplify() and Follower::follow()
-    // do so by themselves.
+    // The plans of all objects. Measures the errors of folds if a plan needs them: some 25 us a node, in parallel. That
+    // replaces trees, so call this before using them elsewhere. simplify() and Follower::follow() call it themselves.
     Result<std::vector<Plan>> prepare(const vdtree::View& view, const Request& request);
 
-    // The cuts that meet the request, from scratch: those of this view, whatever was looked at before. A budget is shared
-    // by all objects, so that the largest fold cost is the least; other goals go object by object, before the luminance
-    // of all of them. With several objects, budgets can be neither filled nor limited in time. Cost: a microsecond for
-    // each node test.
+    // The cuts that meet the request in this view, from scratch. All objects share a budget such that the largest fold
+    // cost is minimal. With several objects, budgets can be neither filled nor limited in time. Cost: a microsecond a
+    // node test.
     Result<Simplification> simplify(const vdtree::View& view, const Request& request = {});
     Result<Simplification> simplify(const Request& request = {}) { return simplify(default_view(), request); }
 
-    // Fails, too, for the full model, which needs none.
+    // Fails, too, for the full model, which needs no recipe.
     Result<CutRecipe> recipe(const vdtree::View& view, const Request& request, std::size_t object = 0);
 
-    // Where the scene's lights are, in an object's frame, at the time and for the view; none: the tree's own light.
+    // The scene's lights in an object's frame, at the session's time and for the view. Empty: the tree has its own
+    // light.
     Result<std::optional<vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t object = 0) const;
 
-    // The same of a part of the scene's backdrop.
+    // The same for a part of the backdrop.
     Result<std::optional<vdtree::Lighting>> backdrop_lighting(const vdtree::View& view, std::size_t part) const;
 
-    // What silhouettes can be seen against.
+    // The luminance that silhouettes can be seen against.
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;
-    // Spheres inside a solid, and rings of all cuts, without their colours. Made when they are first asked for; they
-    // refer to the session.
+    // Spheres inside a solid, and rings of all cuts without their colours. Computed at the first call; they live as
+    // long as the session.
     std::span<const vdtree::Sphere> inner_spheres(std::size_t object = 0) const;
     Result<const perception::CutRings*> cut_rings(std::size_t object = 0) const;
 
@@ -128,7 +124,7 @@ private:
     class State;
     explicit Session(std::shared_ptr<State> state);
 
-    std::shared_ptr<State> state_; // shared with the session's followers
+    std::shared_ptr<State> state_; // shared by all handles and followers
 };
 
 } // namespace unseen::session

@@ -1,48 +1,66 @@
-// What a simplification came to.
+// What a simplification does and why: the plan before it is made, and the report and the cuts afterwards.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <unseen/session/plan.h>
+#include <unseen/session/request.h>
 #include <unseen/vdtree/cut.h>
 
 namespace unseen::session {
 
-// Something that pictures are drawn for: whether it was called for, why, and what it took. What was not has no pass and
-// no texture.
+// Something that may or may not take part in a cut, and the reason in a sentence.
+struct Effect {
+    std::string name;
+    bool on = false;
+    Message why = {};
+    std::size_t object = 0; // of the scene
+};
+
+// A rendering pass for a simplification: whether it ran, why, and what it cost. A pass that did not run costs nothing.
 struct PassEffect {
     std::string name;
     bool on = false;
     Message why = {};
-    int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, a sample each; of planes
-    std::uint64_t texture_bytes = 0;                // on the GPU, at most at a time
-    double milliseconds = 0;                        // of wall-clock time
+    int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, with one sample each; of planes
+    std::uint64_t texture_bytes = 0;                // on the GPU, the most at a time
+    double milliseconds = 0;                        // wall-clock time
 };
 
-// Of all objects together.
+// For one object. The default fold test is `error`, if the tree has the errors of its folds or they may be measured.
+// Otherwise it is luebke-hallen-safe, and also where `error` cannot see everything: with colours that count, textures
+// over vertices of several hues, lights that move, and highlights. For goals in pixels it is `extent`.
+struct Plan {
+    FoldTest fold_test = FoldTest::error;
+    std::string why = {};  // why this test and not `error`; empty if it is `error` or was asked for
+    bool measures = false; // the errors of the tree's folds are still to be measured
+    std::vector<Effect> effects = {};
+};
+
+// For all objects together.
 struct Report {
     vdtree::Index source_triangles = 0;
-    std::uint64_t dropped = 0;       // triangles that the meshes had and the trees have not: those with a vertex twice
-    vdtree::AdjustStats stats;       // sums; the largest cost of all; complete where all are
-    double adapt_ms = 0;             // making the cuts, in wall-clock time
-    double extract_ms = 0;           // their index buffers
-    double imperceptible_from_m = 0; // infinite: from nowhere; NaN: the fold test does not know
+    std::uint64_t dropped = 0;             // triangles of the meshes that the trees lack: those that use a vertex twice
+    vdtree::AdjustStats stats;             // sums; the largest cost of all objects; complete if all are
+    double adapt_ms = 0;                   // wall-clock time for the cuts
+    double extract_ms = 0;                 // for their index buffers
+    double imperceptible_from_m = 0;       // infinite: from nowhere; NaN: the fold test does not tell
     std::vector<FoldTest> fold_tests = {}; // by object
     std::vector<Effect> effects = {};
-    std::vector<PassEffect> passes = {}; // of simplify_as_seen() of <unseen/session_gpu/as_seen.h>
-    // With geomorphs.
-    std::optional<vdtree::Index> drawn_triangles = {}; // those that wait to be folded included
-    std::size_t gliding = 0;                           // vertices that are on their way
+    std::vector<PassEffect> passes = {}; // of simplify_as_seen() in <unseen/session_gpu/as_seen.h>
+    // With geomorphs:
+    std::optional<vdtree::Index> drawn_triangles = {}; // with those that wait to be folded
+    std::size_t gliding = 0;                           // vertices on their way
 };
 
 struct Simplification : Report {
     std::vector<vdtree::Cut> cuts; // by object
 
-    // The cut of an object as a mesh of its own, in that object's own frame, as its file had it. Cost: the cut's
-    // triangles. Precondition: there is such an object.
+    // The cut of an object as a mesh, in the object's own frame as its file has it. Cost: the cut's triangles.
+    // Precondition: the object exists.
     vdtree::Mesh mesh(std::size_t object = 0) const { return vdtree::extract_mesh(cuts[object]); }
 };
 

@@ -6,17 +6,16 @@
 //         show(control->picture());
 //     }
 //
-// A frame draws each object at its level, in layers of depth. For the objects that are tested in it, it maps how large a
-// step of luminance goes unseen in what all other layers show together, draws the objects once more at a better level,
-// and counts the pixels where that looks different by more. The counts of one frame decide in a later one: nothing is
-// read back, and nothing waits for the GPU.
+// A frame draws each object at its level, in layers of depth. Some objects are tested in each frame: the frame maps the
+// smallest visible step of luminance in the combination of all other layers, draws these objects once more at a better
+// level, and counts the pixels that differ by more. The counts of one frame decide in a later one, so nothing waits for
+// the GPU.
 //
-// Pictures have the shadows of the scene's lights. What masks a layer's objects has those that all else casts on them: in
-// the combination without the layer, what is behind the objects is multiplied by the share of their light that these
-// shadows leave them.
+// Pictures have the shadows of the scene's lights. Shadows that other objects cast on a layer count as maskers: in the
+// combination without the layer, the background of its objects is multiplied by the share of light that they get.
 //
-// It is a baseline, not a promise: what it counts is how many pixels differ visibly, a few of which it allows; and what
-// lies behind an object counts as masking it. The fold tests of Session promise more, and Follower keeps that promise.
+// This is a baseline, not a guarantee: it allows a few pixels to differ visibly, and it counts whatever lies behind an
+// object as masking it. The fold tests of Session are stricter; use Follower for these.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +34,7 @@ class LayerPasses;
 
 namespace unseen::session {
 
-// Who says which level an object has.
+// How levels are chosen.
 enum class LevelMethod {
     perceptual, // what is seen of a better one, see above
     distance,   // the farthest-reaching level that nobody sees from where the eye is, LevelChain::unseen_from()
@@ -56,7 +55,8 @@ struct LevelControlOptions {
     MapRecipe maps = MapRecipe::modern;
     int map_block = 1;        // a map's threshold is of so many by so many pixels, 1 to 16
     bool half_floats = false; // pictures of layers; of modern maps 1% is lost, of rpg99 in smooth pictures more
-    // Of all pixels, how many may differ visibly: an object gets a better level above the one, a worse one below the other.
+    // Shares of all pixels that differ visibly: an object gets a better level above the upper, a coarser one below the
+    // lower.
     double upper_share = 450.0 / (512 * 512), lower_share = 170.0 / (512 * 512);
     int frames_a_layer =
         4; // objects of the nearest layer are tested every so many frames, of the second every twice so many
@@ -67,7 +67,7 @@ struct LevelControlOptions {
 
 enum class LevelDecision { better, keep, worse };
 
-// What came of the test of one object.
+// The result of testing one object.
 struct LevelTest {
     std::uint64_t frame = 0; // that it was drawn in
     std::size_t object = 0;
@@ -94,26 +94,25 @@ struct LevelFrame {
     int shadow_passes = 0; // that drew maps of shadows: for the picture, for masks, and for tests
     int changed = 0;       // objects that have another level than in the frame before
     std::uint64_t texture_bytes = 0;
-    // That became known since the frame before.
+    // Results that arrived since the frame before.
     std::vector<LevelTest> tests;
     std::vector<LevelTimes> times;
 };
 
-// Move-only. Refers to the session, whose scene must not change; keeps a handle to the context, on whose thread it is
-// used. The session's gaze, time and display count.
+// Move-only. Shares the session, whose gaze, time and display count, and the context, on whose thread it is used.
 class LevelControl {
 public:
-    // Measures what the session's fold test needs, and makes the levels of all objects: seconds. `view`: for the fold
-    // test, as in Session::recipe(). Fails where Session::prepare() does, on options out of range, and where the graphics
-    // memory does not suffice.
+    // Measures folds if the session's fold test needs that, and makes the levels of all objects, which takes seconds.
+    // `view`: for the fold test, as in Session::recipe(). Fails where Session::prepare() does, on options out of range,
+    // and if graphics memory runs out.
     static Result<LevelControl> create(const render::Context& context, Session& session, const vdtree::View& view,
                                        const LevelControlOptions& options = {}, Request request = {});
     LevelControl(LevelControl&&) noexcept;
     LevelControl& operator=(LevelControl&&) noexcept;
     ~LevelControl();
 
-    // One frame. Objects begin with the worst level and are tested against the best one in each frame until they keep
-    // one; then by turns. Fails as drawing does. Counts that are not there yet decide later.
+    // Draws one frame. Objects begin at the coarsest level and are tested against the best one in each frame until they
+    // keep a level, then by turns. Fails where drawing does.
     Result<LevelFrame> draw(const vdtree::View& view);
 
     // LevelControlOptions::bias, from the next frame on; above 0 and finite.
@@ -122,19 +121,19 @@ public:
     // Of the method `given`, from the next frame on, by object; -1 and levels that an object lacks: its last one.
     void set_levels(std::span<const int> levels);
 
-    // Waits for the GPU, and lets what it has counted decide: for programs that write each frame down, and not for those
-    // that show it. Only tests and times of what it returns are filled in.
+    // Waits for the GPU and applies its counts: for programs that write frames to files. Only `tests` and `times` of
+    // the result are filled in.
     Result<LevelFrame> wait();
 
-    // Frames of this view until nothing changes any more, at most so many; waits for the GPU after each. The last frame,
-    // with all tests and times since the first.
+    // Draws this view until nothing changes any more, at most `most_frames` times; waits for the GPU after each frame.
+    // Returns the last frame with all tests and times.
     Result<LevelFrame> settle(const vdtree::View& view, int most_frames = 200);
 
-    // Of the last frame: whether every object in sight was tested since a level last changed, and kept its own.
+    // Whether every object in sight was tested since a level last changed, and kept its level.
     bool is_settled() const noexcept;
 
-    // Preconditions of what refers to pictures: the last draw() succeeded. Of others' sizes that cannot be drawn the old
-    // picture stays; where memory runs out there is none.
+    // Precondition of the functions below: the last draw() succeeded. If a size cannot be drawn at all, the old picture
+    // stays; if memory runs out, there is no picture.
     const render::Target& picture() const noexcept;      // of the last frame: linear RGB, relative luminance
     const render::LayerPasses& layers() const noexcept;  // of the last frame
     Result<void> combine(int left_out);                  // of the last frame, for people to look at

@@ -1,4 +1,4 @@
-// Judges pictures of a session's view against the full model's: by both judges on the CPU, and SSIM.
+// Judges pictures of a view against the picture of the full model: by both judges on the CPU, and by SSIM.
 #pragma once
 
 #include <cstdint>
@@ -20,17 +20,17 @@ struct PictureVerdict {
     bool shows_nothing() const { return visible == 0 && second_visible == 0 && v < 1 && second_v < 1; }
 };
 
-// Refers to the session. Move-only.
+// Shares the session. Move-only.
 class PictureJudge {
 public:
-    // Draws the full model, with so many samples a pixel. The judges are of the session's observer and gaze.
+    // Draws the full model with `samples` a pixel. The judges see as the session's observer does, with its gaze.
     static Result<PictureJudge> create(const render::Context& context, const Session& session, const vdtree::View& view,
                                        int samples);
-    // By a renderer of that session, which several may share: its trees are uploaded once for all views.
+    // With a renderer of that session, which several judges may share.
     static Result<PictureJudge> create(std::shared_ptr<SceneRenderer> renderer, const Session& session,
                                        const vdtree::View& view, int samples);
 
-    // Others' cuts or frames of the same view and window. The judges work side by side.
+    // Cuts or frames of the same view and window. Both judges work at the same time.
     Result<PictureVerdict> judge(std::span<const vdtree::Cut> cuts);
     Result<PictureVerdict> judge(const render::Frame& frame) const;
 
@@ -42,14 +42,12 @@ private:
     PictureJudge(const Session& session, const vdtree::View& view, int samples,
                  std::shared_ptr<SceneRenderer> renderer);
 
-    const Session* session_;
+    Session session_;
     vdtree::View view_;
     int samples_;
     std::shared_ptr<SceneRenderer> renderer_;
     perception::Image full_ = {}, full_codes_ = {};
     std::unique_ptr<perception::Judge> judge_ = {}, second_ = {};
 };
-
-std::vector<vdtree::Cut> whole_cuts(const Session& session); // the full model, by object
 
 } // namespace unseen::session

@@ -1,15 +1,18 @@
 // Selects levels of detail for cameras all over a scene, beforehand: the second stage of Arlebrink and Linde (2018).
 //
-// Corners of a grid on the ground, or in space, have four or six cameras each. Cells whose corners select differently
-// are parted, as often as the grid allows. What is done is kept in a file beside the result, and an interrupted search
-// goes on from there. Several processes share the corners; the result is the same.
+// Each corner of a grid on the ground, or in space, has four or six cameras. Cells whose corners select differently are
+// split, as often as the grid allows. Finished corners are kept in a file beside the result, from which an interrupted
+// search resumes. Several processes may share the corners; the result is the same.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <functional>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include <unseen/render/context.h>
+#include <unseen/render/renderer.h>
 #include <unseen/session/selection.h>
 #include <unseen/session/session.h>
 #include <unseen/vdtree/function_ref.h>
@@ -20,6 +23,46 @@ class Team;
 
 namespace unseen::session {
 
+// Levels of an object of the session, each with half of the triangles of the one before, as in the paper. Small objects
+// have fewer. `levels`: 2 to most_levels.
+Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels = default_selected_levels);
+
+struct LevelPictureTimes {
+    double draw_ms = 0, read_ms = 0; // of all pictures so far; reading waits for the GPU
+    std::uint64_t drawings = 0, triangles = 0;
+};
+
+// Move-only. Shares the session and the context, on whose thread it is used. Shadows are not drawn: whose they are
+// changes with the levels of others.
+class LevelPictures {
+public:
+    // Makes the levels of all objects with selection_chain() and uploads them: some seconds a million triangles.
+    static Result<LevelPictures> create(const render::Context& context, Session& session,
+                                        int levels = default_selected_levels);
+    LevelPictures(LevelPictures&&) noexcept;
+    LevelPictures& operator=(LevelPictures&&) noexcept;
+    ~LevelPictures();
+
+    // The objects in the view's window, with one sample in the middle of each pixel. Objects that no level shows are
+    // left out. Fails where drawing does.
+    Result<LayeredPicture> draw(const vdtree::View& view, SelectionQuality quality);
+
+    // A frame of these levels (by object; -1: not drawn), as SceneRenderer draws it but without shadows.
+    Result<render::Frame> draw_frame(const vdtree::View& view, std::span<const int> levels, int samples = 1);
+
+    // The value that the quality compares, from a pixel's relative luminance.
+    float value_of(float luminance, SelectionQuality quality) const;
+
+    const std::vector<std::vector<std::uint32_t>>& triangles() const noexcept; // by object, by level
+    const LevelChain& chain(std::size_t object) const noexcept;
+    const LevelPictureTimes& times() const noexcept;
+
+private:
+    struct Impl;
+    explicit LevelPictures(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
 struct PrecomputeOptions {
     std::uint64_t budget = 0; // of a frame, triangles of objects; above 0
     SelectionQuality quality = SelectionQuality::ssim;
@@ -27,15 +70,14 @@ struct PrecomputeOptions {
     int window_px = 256;
     double spacing = 0;  // of the grid's corners, world units; 0: a tenth of the longer side
     int depth = 1;       // how often a cell may be parted, 0 to most_selection_depth
-    double differ = 0.5; // cells are parted whose corners differ by more levels, in the mean
+    double differ = 0.5; // cells are split if their corners differ by more levels than this in the mean
     bool is_in_space = false;
     std::optional<double> eye_height =
         {}; // y of cameras on the ground, world units; none: the scene's camera's, or 1.7
     // The box of the grid, world units; none: around the middles of all objects.
     std::optional<glm::dvec3> low = {}, high = {};
-    int threads = 0; // one draws, the others search; 1: by turns; 0: as many as there are cores
-    // With the share that is done, after each corner. Returning false stops: what is done is kept.
-    std::function<bool(double share, const char* stage)> progress = {};
+    int threads = 0;        // one draws, the others search; 1: by turns; 0: as many as there are cores
+    Progress progress = {}; // called after each corner; returning false stops, and keeps what is done
 };
 
 struct PrecomputeReport {
@@ -49,9 +91,9 @@ struct PrecomputeReport {
     int processes = 1;
 };
 
-// Writes the selections to `file`; `file`.part keeps what is done until then. Every member of a team calls this with the
-// same scene and options; the first one writes. Fails on options out of range, where drawing or writing does, and with
-// ErrorCode::cancelled where progress says so.
+// Writes the selections to `file`; until then `file`.part keeps finished corners. Every member of a team calls this
+// with the same scene and options; the first one writes. Fails on options out of range, where drawing or writing does,
+// and with ErrorCode::cancelled if the progress callback says so.
 Result<PrecomputeReport> precompute_selections(const render::Context& context, Session& session,
                                                const std::filesystem::path& file, const PrecomputeOptions& options,
                                                vdtree::Team* team = nullptr);

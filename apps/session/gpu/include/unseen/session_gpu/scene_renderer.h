@@ -1,4 +1,4 @@
-// Draws all objects of a session, and what stands around them.
+// Draws all objects of a session and what surrounds them.
 #pragma once
 
 #include <cstdint>
@@ -7,13 +7,15 @@
 #include <span>
 #include <vector>
 
+#include <unseen/perception/display.h>
+#include <unseen/perception/image.h>
 #include <unseen/render/renderer.h>
 #include <unseen/render/shadows.h>
 #include <unseen/session/session.h>
 
 namespace unseen::session {
 
-// A cut an object, and the geomorph that is drawn instead, or null.
+// The cut of an object, and the geomorph that is drawn instead, or null.
 struct DrawnCut {
     const vdtree::Cut* cut = nullptr;
     const vdtree::Geomorph* geomorph = nullptr;
@@ -21,17 +23,19 @@ struct DrawnCut {
 std::vector<DrawnCut> drawn_cuts(std::span<const vdtree::Cut> cuts);
 std::vector<DrawnCut> drawn_cuts(const Follower& follower, std::size_t objects);
 
-// What there is to draw.
+// The full model, by object.
+std::vector<vdtree::Cut> whole_cuts(const Session& session);
+
 struct SceneItems {
-    std::vector<render::Item>
-        items; // objects, but for those without triangles where there are several, then the backdrop
-    std::vector<std::size_t> objects;   // by item, of the first ones: which object it is
-    render::Shadows* shadows = nullptr; // the renderer's own, as of these items; null: no light casts any
+    // Objects, then the backdrop. Objects without triangles are left out if there are several objects.
+    std::vector<render::Item> items;
+    std::vector<std::size_t> objects;   // the object of each of the first items
+    render::Shadows* shadows = nullptr; // owned by the renderer, up to date for these items; null if no light casts any
 };
 
-// Trees are on the GPU once, however many objects share them. A scene of one object is drawn as render::Renderer does,
-// to the bit. Move-only; refers to the session, whose trees must be those that it has when this is made (see
-// Session::prepare()).
+// Uploads each tree once, however many objects share it. Draws a scene of one object exactly as render::Renderer does.
+// Move-only. Shares the session, whose trees must stay those that it has when the renderer is made: call
+// Session::prepare() first.
 class SceneRenderer {
 public:
     static Result<SceneRenderer> create(const render::Context& context, const Session& session);
@@ -39,19 +43,19 @@ public:
     SceneRenderer& operator=(SceneRenderer&&) noexcept;
     ~SceneRenderer();
 
-    // `cuts`: by object. Of the options the lighting does not count: the session says how each object is lit.
+    // `cuts`: by object. The lighting of the options is ignored: the session knows how each object is lit.
     Result<render::Frame> draw(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                const render::DrawOptions& options);
     Result<void> draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                 const render::DrawOptions& options);
 
-    // For passes of others, until the next call: what draw() draws. `view`: for lights that go with the camera.
+    // What draw() draws, for passes of your own. Valid until the next call. `view`: for lights that go with the camera.
     Result<SceneItems> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
                              const render::DrawOptions& options = {});
 
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
 
-    // Of the last draw; nothing where no light casts shadows. Waits for the GPU.
+    // Of the last draw; empty if no light casts shadows. Waits for the GPU.
     std::optional<render::ShadowFacts> shadows() const;
 
 private:
@@ -59,5 +63,9 @@ private:
     explicit SceneRenderer(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
+
+// A frame's colours as code values for the display, and its luminance on the display in cd/m2.
+perception::Image code_image(const render::Frame& frame, const perception::Display& display);
+perception::Image luminance_image(const render::Frame& frame, const perception::Display& display);
 
 } // namespace unseen::session

@@ -1,18 +1,17 @@
-// session_gpu: where a session meets OpenGL. The header to include first.
+// session_gpu: drawing sessions with OpenGL, and judging the pictures. Include this first.
 //
-// A SceneRenderer draws all objects of a session with what stands around them. simplify_as_seen() folds what lies behind
-// what a picture shows, and what the scene masks. A GpuJudge
-// is perception::Judge on the GPU. A LevelControl chooses among few levels of detail by what the rest of a picture masks;
-// precompute_selections() selects levels for cameras all over a scene. measure_tradeoff() tells what accuracy costs in one
-// view. draw_study_pairs() makes the pictures of a study. make_levels() makes levels of detail with the distances from
-// which nobody sees them, for engines that show few meshes; a PictureJudge says what cuts show in a view.
+// - SceneRenderer draws all objects of a session and what surrounds them. - simplify_as_seen() also folds whatever the
+// picture hides, and what the scene masks. - PictureJudge judges what cuts show in a view; GpuJudge is
+// perception::Judge on the GPU. - measure_tradeoff() measures what accuracy costs in one view. - make_levels() makes
+// levels of detail for engines, with the distances from which nobody sees them. - LevelControl chooses among few levels
+// by what the rest of a picture masks; precompute_selections() selects levels for
+//   cameras all over a scene.
+// - draw_study_pairs() draws the pictures of a study.
 #pragma once
 
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/frame_image.h>
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/level_control.h>
-#include <unseen/session_gpu/level_pictures.h>
 #include <unseen/session_gpu/lod.h>
 #include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/precompute_selections.h>

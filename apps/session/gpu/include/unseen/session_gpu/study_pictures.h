@@ -1,8 +1,7 @@
-// Draws the pictures of a study: pairs of an original and what is to be told from it.
+// Draws the pictures of a study: pairs of an original and a picture that people try to tell from it.
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,27 +19,27 @@ struct StudyCondition {
 };
 
 struct StudyPicturesOptions {
-    std::filesystem::path folder;              // where pictures go; it must be there
-    std::string prefix;                        // of the files' names
-    int views = 5;                             // 1 to 360, around the target
-    double degrees = 72;                       // from a view to the next one
-    std::vector<double> distances = {1};       // from the target, times the view's; all views from each, above 0
-    int samples = 64;                          // a pixel, 1 to 256
-    bool pairs_original = false;               // with itself, once a view: for StudyTask::differ
-    std::function<void(double)> progress = {}; // hears what share is done
+    std::filesystem::path folder;        // where pictures go; it must be there
+    std::string prefix;                  // of the files' names
+    int views = 5;                       // 1 to 360, around the target
+    double degrees = 72;                 // from a view to the next one
+    std::vector<double> distances = {1}; // from the target, times the view's; all views from each, above 0
+    int samples = 64;                    // a pixel, 1 to 256
+    bool pairs_original = false;         // with itself, once a view: for StudyTask::differ
+    Progress progress = {};              // returning false stops, with the error `cancelled`
 };
 
-// Pairs of the full model and of what each condition makes of it, a view each. Pictures are PNG, as the session's
-// display shows them. Fails as Session::simplify(), drawing and writing files do; what is written stays then. Cost: so
-// many pictures for each view and condition.
+// Pairs of the full model and its simplification under each condition, in each view. Pictures are PNG, as the session's
+// display shows them. Fails where Session::simplify(), drawing and writing files do; pictures already written stay.
+// Cost: a picture for each view and condition.
 Result<std::vector<calibration::StudyPair>> draw_study_pairs(Session& session, const render::Context& context,
                                                              const vdtree::View& view,
                                                              const std::vector<StudyCondition>& conditions,
                                                              const StudyPicturesOptions& options);
 
-// Of discrete levels, for StudyTask::differ: the pairs of calibration::LevelStep around the level that LevelControl keeps
-// in each view. Where it keeps the best level there is no decrease and no maintain, where the coarsest no increase. Fails
-// on scenes of several objects, where there is no pair at all, and as LevelControl does.
+// Pairs of discrete levels, for StudyTask::differ: those of calibration::LevelStep around the level that LevelControl
+// settles on in each view. Its best level has no decrease and no maintain, its coarsest no increase. Fails on scenes of
+// several objects, if there is no pair at all, and where LevelControl does.
 Result<std::vector<calibration::StudyPair>> draw_level_pairs(Session& session, const render::Context& context,
                                                              const vdtree::View& view,
                                                              const LevelControlOptions& levels,

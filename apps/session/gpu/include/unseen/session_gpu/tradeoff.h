@@ -1,8 +1,7 @@
-// What accuracy costs in one view: ways to simplify, what each takes, and what shows of it.
+// What accuracy costs in one view: ways to simplify, the time each takes, and what is seen of it.
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <span>
@@ -16,13 +15,13 @@
 namespace unseen::session {
 
 struct TradeoffOptions {
-    double seconds = 45; // of wall-clock time for all points, about; those that do not fit are left out. Above 0
-    // Of the pictures that are judged, 1 to 256, at most: where pictures take long, fewer, but not below least_samples.
-    // Fewer show steps of samples, so V is larger than it is of a finer picture.
+    double seconds = 45; // wall-clock time for all points, about; the rest is left out. Above 0
+    // Samples a pixel of judged pictures, 1 to 256, at most. If drawing is slow, fewer are taken, down to
+    // least_samples; V is then larger, because the steps of samples show.
     int samples = 64, least_samples = 8;
-    // Measured after the full model, in place of the usual ones: names, and requests of pictures.
+    // Measured after the full model, instead of the usual ways: names, and requests for pictures.
     std::vector<std::pair<std::string, Request>> requests = {};
-    std::function<void(double)> progress = {}; // hears what share of the points is done
+    Progress progress = {}; // returning false stops, with the error `cancelled`
 };
 
 // Milliseconds of some frames.
@@ -31,7 +30,7 @@ struct Timing {
     double median = unknown, low = unknown, high = unknown; // half of the frames took `low` to `high`
 };
 
-// One way, and what came of it. The judges are the session's observer's, on the CPU.
+// One way and its results. The judges see as the session's observer does, on the CPU.
 struct TradeoffPoint {
     std::string name;
     Request request;
@@ -56,10 +55,10 @@ struct Tradeoff {
     double measuring_s = 0;                 // of the errors of folds, before all points; next to 0 where they are kept
 };
 
-// World units: how far a vertex of the full model is from what stands for it in cuts of the session's trees, at most.
+// The largest distance between a vertex of the full model and the vertex that replaces it in the cuts, world units.
 double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts);
 
-// Measures points in the order of what they tell: the full model, the default test at several thresholds, the others,
+// Measures the most informative points first: the full model, the default test at several thresholds, the others,
 // budgets. Recommended is the point with the fewest triangles whose fold test is safe, which holds for moving views and
 // shows nothing to either judge; if there is none, the full model. Fails as Session::simplify() and drawing do; a fold
 // test that does not know the scene is left out. Cost: a simplification and some hundred drawings a point.

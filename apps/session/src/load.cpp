@@ -1,4 +1,4 @@
-#include <unseen/session/model_file.h>
+#include <unseen/session/load.h>
 
 #include <algorithm>
 #include <cmath>
@@ -170,11 +170,6 @@ Result<LoadedTree> load(const fs::path& file, const LoadOptions& options, bool m
 
 Result<vdtree::VertexTree> load_tree(const fs::path& file, const LoadOptions& options) {
     auto loaded = load(file, options, false);
-    return loaded ? Result<vdtree::VertexTree>(std::move(loaded->tree)) : loaded.error();
-}
-
-Result<vdtree::VertexTree> open_tree(const fs::path& file, const LoadOptions& options) {
-    auto loaded = load(file, options, true);
     return loaded ? Result<vdtree::VertexTree>(std::move(loaded->tree)) : loaded.error();
 }
 

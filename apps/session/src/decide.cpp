@@ -1,0 +1,110 @@
+// Which fold test an object's cut goes by, and whether that knows what there is to see.
+#include <algorithm>
+#include <utility>
+
+#include <unseen/perception/chroma.h>
+#include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/motion.h>
+#include <unseen/vdtree/internal/errors.h>
+
+#include "fold_test.h"
+#include "loaded_tree.h"
+
+namespace unseen::session {
+namespace {
+
+bool knows_texture(Sight& sight) {
+    std::optional<bool>& known = sight.cache.knows_texture;
+    if (!known) known = perception::knows_texture(sight.object.tree);
+    return *known;
+}
+
+bool has_chroma(Sight& sight) {
+    std::optional<bool>& known = sight.cache.has_chroma;
+    if (!known) known = perception::has_chroma(sight.object.tree);
+    return *known;
+}
+
+struct Choice {
+    FoldTest test = FoldTest::error;
+    std::string_view why = {};
+};
+
+// Of the tests by luminance one that knows the scene, and colours where they count.
+Choice suitable_test(Sight& sight, bool chroma, bool may_measure) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    if (sight.lighting && !sight.lights->stands_still())
+        return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
+    if (sight.lighting && sight.lighting->specular > 0)
+        return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
+    if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
+    if (!knows_texture(sight))
+        return {FoldTest::luebke_hallen_safe, "the test error does not know textures over vertices of several hues"};
+    if (sight.lighting && sight.is_crowded)
+        return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
+    if (sight.lighting && sight.cache.lit_folds) return {};
+    if ((!sight.lighting && perception::has_fold_measurement(tree)) ||
+        (may_measure && tree.interior_count() <= most_measured))
+        return {};
+    return {FoldTest::luebke_hallen_safe,
+            "the tree does not hold the errors of its folds, and measuring them takes long"};
+}
+
+// Whether a test knows what it would have to look at.
+Result<void> check_knowledge(Sight& sight, FoldTest test, bool chroma, bool shown) {
+    if (!is_perceptual(test)) return {};
+    if (sight.lighting && test == FoldTest::error && (!sight.lights->stands_still() || sight.lighting->specular > 0))
+        return invalid_field(
+            "{request.fold_test = }{} knows only lights of {scene.lights} that stand still and make no "
+            "highlights: use {request.fold_test = }luebke-hallen-safe.",
+            {name_of(test)});
+    if (sight.lighting && shown && test != FoldTest::error)
+        return invalid_field("{request.shown} and {scene.lights} go together with {request.fold_test = }error alone.");
+    if (sight.lighting && chroma)
+        return invalid_field("{request.chroma} and {scene.lights} exclude each other: ranges of colour are those of "
+                             "the tree's own light.");
+    if (sight.object.tree.texture().empty()) return {};
+    if (chroma)
+        return invalid_field(
+            "{request.chroma} does not look at the colours of textures: leave it out, or add {load.without_textures}.");
+    if (test == FoldTest::error && !knows_texture(sight))
+        return invalid_field("{request.fold_test = }error does not measure textures over vertices of several hues: use "
+                             "{request.fold_test = }luebke-hallen-safe, or add {load.without_textures}.");
+    return {};
+}
+
+} // namespace
+
+Result<Decision> decide(Sight& sight, const Request& request, std::size_t object) {
+    if (request.shown && request.shown->view() != sight.view)
+        return invalid_field("{request.shown} is of another view.");
+    if (!request.masking.empty() && object >= request.masking.size())
+        return invalid_field("{request.masking} has fewer pictures than the scene has objects.");
+    if (!request.masking.empty() && request.masking[object].view() != sight.view)
+        return invalid_field("{request.masking} is of another view.");
+    const bool folds = request.goal.kind != Goal::Kind::full;
+    const bool has_errors =
+        sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
+    Choice choice = suitable_test(sight, request.chroma && has_chroma(sight), folds && request.may_measure);
+    if (!folds) return Decision{request, choice.test, choice.why};
+    if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
+    if (request.fold_test) choice = {*request.fold_test};
+    if (const auto known = check_knowledge(sight, choice.test, request.chroma, request.shown.has_value()); !known)
+        return known.error();
+    const bool measures = choice.test == FoldTest::error && !has_errors;
+    if (measures && !request.may_measure)
+        return invalid_field(
+            "{request.fold_test = }error goes by errors that the tree does not hold: allow {request.may_measure}, or "
+            "call {session::measured()}.");
+    const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
+    return Decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
+}
+
+const char* why_unmasked(const Sight& sight) {
+    if (sight.observer.gaze && sight.observer.gaze->margin_deg > 0) return "the gaze is not known for sure";
+    if (sight.observer.velocity > perception::least_velocity) return "what moves over the retina masks otherwise";
+    if (is_translucent(sight)) return "what is behind the object may show through it";
+    return nullptr;
+}
+
+} // namespace unseen::session

@@ -1,0 +1,136 @@
+// The fold tests: what each is called, what it looks at and how its criterion is made. A new test is a value of
+// FoldTest and a row here.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <unseen/vdtree/internal/light_bounds.h>
+
+#include "kept_criterion.h"
+
+namespace unseen::session {
+namespace {
+
+using Criterion = Result<vdtree::DistanceCriterion>;
+
+struct Row {
+    FoldTestFacts facts;
+    std::string (*looks_at)(const Sight& sight);
+    Criterion (*make)(Sight& sight, const Decision& decision, const Key& key);
+};
+
+Criterion make_luebke_hallen(Sight& sight, const Decision& decision, const Key& key) {
+    const perception::FoldTestOptions options = test_options(sight, decision, key);
+    return sight.lighting ? perception::lit_distances(sight.object.tree, sight.cache.light_bounds, sight.view, options)
+                          : perception::luebke_hallen_distances(sight.object.tree, sight.view, options);
+}
+
+Criterion make_luebke_hallen_safe(Sight& sight, const Decision& decision, const Key& key) {
+    const perception::FoldTestOptions options = test_options(sight, decision, key);
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const auto rings = cut_rings(sight.object, sight.cache, decision.request.chroma);
+    if (!rings) return rings.error();
+    if (!sight.lighting) return perception::luebke_hallen_safe_distances(tree, **rings, sight.view, options);
+    auto bounds = lit_cut_rings(sight.object, sight.cache);
+    if (!bounds) return bounds.error();
+    return perception::lit_safe_distances(tree, **rings, std::move(*bounds), sight.view, options);
+}
+
+// The lights that are left when a set of those that cast shadows is hidden, for each set that leaves some light.
+std::vector<vdtree::Lighting> without_hidden(const vdtree::Lighting& lighting) {
+    std::vector<vdtree::Lighting> all;
+    const std::size_t casting = vdtree::shadow_lights(lighting);
+    for (unsigned hidden = 1; hidden < 1u << casting; ++hidden) {
+        vdtree::Lighting left = lighting;
+        left.lights.clear();
+        unsigned number = 0;
+        for (const vdtree::LightSource& light : lighting.lights)
+            if (!light.casts_shadow || (hidden >> number++ & 1) == 0) left.lights.push_back(light);
+        if (vdtree::validate(left)) all.push_back(std::move(left));
+    }
+    return all;
+}
+
+Criterion make_error(Sight& sight, const Decision& decision, const Key& key) {
+    const perception::FoldTestOptions options = test_options(sight, decision, key);
+    const auto by_errors = [&](const auto& of) {
+        return decision.masking ? perception::masked_error_distances(of, sight.object.placement, *decision.masking,
+                                                                     sight.view, options)
+                                : perception::error_distances(of, sight.view, options);
+    };
+    const vdtree::VertexTree& tree = sight.object.tree;
+    if (!sight.lighting) return by_errors(tree);
+    const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
+    if (!lit) return lit.error();
+    if (!casts_shadows(sight)) return by_errors(*lit);
+    std::vector<perception::TreeAsLit> all;
+    all.push_back({lit->share(), *sight.lighting});
+    for (vdtree::Lighting& left : without_hidden(*sight.lighting)) {
+        const auto darker = sight.cache.lit_folds->under(tree, left);
+        if (!darker) return darker.error();
+        all.push_back({darker->share(), std::move(left)});
+    }
+    return by_errors(std::span<const perception::TreeAsLit>(all));
+}
+
+Criterion make_extent(Sight& sight, const Decision&, const Key& key) {
+    return vdtree::extent_criterion(sight.object.tree, sight.view, key.pixels);
+}
+
+Criterion make_displacement(Sight& sight, const Decision&, const Key& key) {
+    return vdtree::displacement_criterion(sight.object.tree, sight.view, key.pixels);
+}
+
+std::string pixels_on_the_screen(const Sight&) { return "pixels on the screen, whether they can be seen or not"; }
+
+constexpr Row rows[] = {
+    {{FoldTest::error, "error", "measured errors", "perceptual: what folds change in fact; default", true, true},
+     [](const Sight& sight) {
+         return std::string("what each fold changes in luminance and outline, ") +
+                (sight.lighting ? "from whichever side the lights come, " : "") + "against the contrast sensitivity";
+     },
+     make_error},
+    {{FoldTest::luebke_hallen_safe, "luebke-hallen-safe", "Luebke-Hallen, safe",
+      "perceptual: what they could change at most, more triangles", true, true},
+     [](const Sight& sight) {
+         return std::string("the worst grating of each fold with any neighbours folded, ") +
+                (sight.lighting ? "under the lights, " : "and the shift of the mean, ") +
+                "against the contrast sensitivity";
+     },
+     make_luebke_hallen_safe},
+    {{FoldTest::luebke_hallen, "luebke-hallen", "Luebke-Hallen", "as published, unsafe: some folds can be seen", true,
+      false},
+     [](const Sight&) { return std::string("the worst grating of each fold against the contrast sensitivity"); },
+     make_luebke_hallen},
+    {{FoldTest::extent, "extent", "extent in pixels", "in pixels; the default with --pixels", false, false},
+     pixels_on_the_screen,
+     make_extent},
+    {{FoldTest::displacement, "displacement", "displacement in pixels", "in pixels", false, false},
+     pixels_on_the_screen,
+     make_displacement},
+};
+
+constexpr auto all_facts = [] {
+    std::array<FoldTestFacts, std::size(rows)> all{};
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = rows[i].facts;
+    return all;
+}();
+
+const Row& row_of(FoldTest test) {
+    return *std::ranges::find_if(rows, [&](const Row& row) { return row.facts.test == test; });
+}
+
+} // namespace
+
+std::span<const FoldTestFacts> fold_tests() noexcept { return all_facts; }
+const FoldTestFacts& facts_of(FoldTest test) noexcept { return row_of(test).facts; }
+bool is_perceptual(FoldTest test) noexcept { return facts_of(test).is_perceptual; }
+std::string name_of(FoldTest test) { return std::string(facts_of(test).name); }
+
+std::string what_it_looks_at(const Sight& sight, FoldTest test) { return row_of(test).looks_at(sight); }
+
+Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Decision& decision, const Key& key) {
+    return row_of(decision.test).make(sight, decision, key);
+}
+
+} // namespace unseen::session

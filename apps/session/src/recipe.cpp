@@ -1,0 +1,149 @@
+// What a cut is made by: a criterion, a viewpoint and options.
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include <glm/geometric.hpp>
+
+#include <unseen/vdtree/internal/light_bounds.h>
+
+#include "shadow_outlines.h"
+
+namespace unseen::session {
+namespace {
+
+bool is_wholly_in_window(const Sight& sight) {
+    const vdtree::Sphere sphere = sight.object.tree.bounding_sphere();
+    const vdtree::Frustum frustum = vdtree::frustum_of(sight.object.tree, sight.view, sight.object.placement);
+    return std::all_of(frustum.planes.begin(), frustum.planes.end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset > static_cast<double>(sphere.radius);
+    });
+}
+
+vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
+    // Where all is seen, a turning window must not cost anything.
+    const bool window_only = decision.request.purpose == Purpose::picture && !may_cast_anything(sight, decision) &&
+                             !is_wholly_in_window(sight);
+    vdtree::Viewpoint viewpoint = perception::viewpoint_of(
+        sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
+    if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
+    if (folds_hidden(sight, decision)) {
+        const auto spheres = inner_spheres(sight.object, sight.cache);
+        // An orthographic view that shows a small part stands for eyes so near that they may lie among the spheres.
+        std::copy_if(spheres.begin(), spheres.end(), std::back_inserter(viewpoint.occluders), [&](const auto& sphere) {
+            return glm::length(glm::dvec3(sphere.centre) - viewpoint.eye) >
+                   static_cast<double>(sphere.radius) + viewpoint.eye_spread;
+        });
+    }
+    return viewpoint;
+}
+
+vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
+    vdtree::FollowOptions options;
+    options.threshold = static_cast<float>(request.threshold);
+    options.milliseconds = request.milliseconds;
+    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
+    if (request.goal.kind == Goal::Kind::budget) {
+        options.triangle_budget = request.goal.triangles;
+        options.fill_budget = request.goal.fill;
+        options.hysteresis = request.hysteresis;
+    }
+    return options;
+}
+
+} // namespace
+
+perception::FoldTestOptions test_options(const Sight& sight, const Request& request) {
+    perception::FoldTestOptions options;
+    options.display = sight.observer.display;
+    options.scene = sight.luminance;
+    options.csf = sight.csf;
+    options.chroma = request.chroma;
+    options.gaze_px = sight.gaze_px;
+    return options;
+}
+
+bool casts_shadows(const Sight& sight) { return sight.lighting && vdtree::shadow_lights(*sight.lighting) > 0; }
+
+bool may_cast_anything(const Sight& sight, const Decision& decision) {
+    return casts_shadows(sight) && !(is_perceptual(decision) && decision.request.keeps_shadows);
+}
+
+bool is_perceptual(const Decision& decision) {
+    return decision.request.goal.kind != Goal::Kind::full && is_perceptual(decision.test);
+}
+
+bool is_translucent(const Sight& sight) {
+    return sight.object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
+}
+
+bool culls_back_faces(const Sight& sight) {
+    const WorldSphere sphere = world_sphere(sight.object);
+    return !is_translucent(sight) && sight.object.tree.closedness() != vdtree::Closedness::open &&
+           !is_around_eye(sphere, sight.view);
+}
+
+bool is_out_of_sight(Sight& sight, const Decision& decision) {
+    if (decision.request.purpose != Purpose::picture || may_cast_anything(sight, decision)) return false;
+    const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
+    const glm::dvec3 away = sphere.centre - sight.view.eye;
+    // Far more than planes and spheres in single floats are off by.
+    const double margin = 1e-3 * sphere.radius + 1e-5 * glm::length(away);
+    const bool is_out = std::any_of(sight.window->begin(), sight.window->end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, away) + plane.offset < -(sphere.radius + margin);
+    });
+    if (!is_out || !casts_shadows(sight)) return is_out;
+    const Key key = key_of(sight, decision);
+    const std::shared_ptr<const KeptCriterion>& last = last_criterion(sight, key);
+    const WorldSphere cast{sphere.centre, cast_radii * sphere.radius};
+    return last && last->key == key && last->edges &&
+           std::isinf(reach_of(sight, decision, last->edges)->unseen_shift(cast));
+}
+
+// Extent and displacement look at supports, which do not contain all that a fold changes.
+bool folds_hidden(const Sight& sight, const Decision& decision) {
+    return decision.request.purpose == Purpose::picture && is_perceptual(decision) &&
+           !may_cast_anything(sight, decision) && culls_back_faces(sight);
+}
+
+bool folds_unseen(const Sight& sight, const Decision& decision) {
+    return decision.request.shown && is_perceptual(decision) && !is_translucent(sight);
+}
+
+Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
+    const Key key = key_of(sight, decision);
+    // What a view masks is of that view alone.
+    std::shared_ptr<const KeptCriterion>& last = last_criterion(sight, key);
+    std::shared_ptr<const KeptCriterion> masked;
+    if (decision.masking || !last || !(last->key == key)) {
+        auto made = make_criterion(sight, decision, key);
+        if (!made) return made.error();
+        auto edges = edges_of(sight, decision, key);
+        if (!edges) return edges.error();
+        (decision.masking ? masked : last) =
+            std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
+    }
+    const auto& kept = decision.masking ? masked : last;
+    CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    if (!folds_unseen(sight, decision)) {
+        if (!kept->edges || !decision.request.keeps_shadows) return recipe;
+        auto with_outlines = keep_outlines(sight, decision, kept);
+        if (!with_outlines) return with_outlines.error();
+        recipe.criterion = std::move(*with_outlines);
+        return recipe;
+    }
+    const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
+    if (!hidden) return hidden.error();
+    auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
+    if (!without) return without.error();
+    if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
+        find_shadowing_outlines(sight, decision, kept);
+        shadow_of(sight).criterion.reset();
+        without = vdtree::keeping(sight.object.tree, *without, shadow_of(sight).kept);
+        if (!without) return without.error();
+    }
+    recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));
+    return recipe;
+}
+
+} // namespace unseen::session

@@ -1,0 +1,128 @@
+#include <unseen/vdtree/internal/light_bounds.h>
+
+#include "shadow_outlines.h"
+
+#include <algorithm>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::session {
+namespace {
+
+// Of what may move unseen: so much is left to a moving eye before a criterion is made anew.
+constexpr double share_left_to_motion = 0.7;
+// More nodes than this share beyond those that have to be are not kept.
+constexpr double most_kept_too_many = 0.25;
+
+vdtree::Lighting in_world(vdtree::Lighting lighting, const Object& object) {
+    const vdtree::Similarity& placement = object.placement;
+    for (vdtree::LightSource& light : lighting.lights) {
+        light.direction = glm::normalize(placement.rotation * light.direction);
+        light.position = placement.to_world(object.tree.origin() + light.position);
+        light.distance *= placement.scale;
+    }
+    return lighting;
+}
+
+std::vector<Standing> all_standing(const SceneShadows& all) {
+    std::vector<Standing> standing;
+    for (std::size_t i = 0; i < all.scene.objects.size(); ++i) {
+        const Object& object = all.scene.objects[i];
+        Standing one{&object, all.caches[i]->light_bounds.get()};
+        const bool shows_through = object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
+        one.hides_back_faces = !shows_through && object.tree.closedness() != vdtree::Closedness::open;
+        standing.push_back(one);
+    }
+    for (const Object& object : all.scene.backdrop) standing.push_back({&object});
+    return standing;
+}
+
+// Of lights that move: everywhere. To look at them anew in each frame takes longer than it spares.
+LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting, bool stands_still) {
+    LitReceivers lit{std::move(lighting), {}};
+    for (const vdtree::LightSource& light : lit.lighting.lights)
+        if (light.casts_shadow)
+            lit.of_lights.push_back(stands_still ? receivers.find_lit(light)
+                                                 : std::vector<bool>(receivers.balls().size(), true));
+    return lit;
+}
+
+} // namespace
+
+Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(Sight& sight, const Decision& decision,
+                                                                const Key& key) {
+    if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::shared_ptr<const perception::ShadowEdges>();
+    // A highlight may be all there is on what is otherwise black.
+    const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
+    const SceneShadows::EdgesKey edges_key{key.lens, ambient, key.farthest_gaze_px, key.csf};
+    SceneShadows& all = sight.scene_shadows;
+    std::erase_if(all.known_edges, [](const auto& known) { return known.edges.expired(); });
+    const auto found = std::ranges::find(all.known_edges, edges_key, &SceneShadows::KnownEdges::key);
+    if (found != all.known_edges.end()) return all.last_edges = found->edges.lock();
+    auto made = perception::ShadowEdges::create(sight.view, test_options(sight, decision, key), ambient);
+    if (!made) return made.error();
+    all.last_edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
+    all.known_edges.push_back({edges_key, all.last_edges});
+    return all.last_edges;
+}
+
+std::shared_ptr<const ShadowReach> reach_of(Sight& sight, const Decision& decision,
+                                            const std::shared_ptr<const perception::ShadowEdges>& edges) {
+    SceneShadows& all = sight.scene_shadows;
+    std::shared_ptr<const ShadowReach>& reach = sight.memory.reach;
+    const vdtree::Lighting lighting = in_world(*sight.lighting, sight.object);
+    std::span<const vdtree::Plane> window;
+    if (decision.request.purpose == Purpose::picture) window = *sight.window;
+    if (reach && reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return reach;
+    if (!all.receivers) all.receivers.emplace(all_standing(all));
+    if (!all.lit || !is_alike(all.lit->lighting, lighting))
+        all.lit = lit_by(*all.receivers, lighting, sight.lights->stands_still());
+    const bool moves = reach && !reach->is_of(sight.view.eye, window); // the first view may be the only one
+    reach = std::make_shared<const ShadowReach>(*all.receivers, *all.lit, edges, sight.view.eye, window, moves);
+    return reach;
+}
+
+bool find_shadowing_outlines(Sight& sight, const Decision& decision, const std::shared_ptr<const KeptCriterion>& base) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const vdtree::DistanceCriterion::Parts& parts = base->criterion.parts();
+    const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
+    const auto still = is_measured ? sight.lighting : nullptr;
+    const double threshold = decision.request.threshold;
+    ShadowState& state = shadow_of(sight);
+    const bool is_new = state.of != base || state.lighting != still || state.threshold != threshold;
+    if (is_new) {
+        state = {base, still, {}, nullptr, threshold, {}, nullptr};
+        state.shifts = is_measured ? outline_shifts(tree, parts.silhouette_lengths, parts.facing, still.get())
+                                   : outline_shifts(tree, tree.displacement(), {}, nullptr);
+    }
+    const auto reach = reach_of(sight, decision, base->edges);
+    const bool is_first = !state.reach;
+    if (state.reach == reach) return false;
+    state.reach = reach;
+    if (!is_first) {
+        const auto needed = shadowing_outlines(sight.object, state.shifts, *reach, threshold);
+        const auto most = static_cast<std::size_t>((1 + most_kept_too_many) * static_cast<double>(count(needed)));
+        if (contains(state.kept, needed) && count(state.kept) <= most) return false;
+    }
+    const double share = reach->moves() ? share_left_to_motion : 1;
+    auto kept = shadowing_outlines(sight.object, state.shifts, *reach, share * threshold);
+    const bool is_other = is_first || kept != state.kept;
+    state.kept = std::move(kept);
+    return is_other;
+}
+
+Result<std::shared_ptr<const vdtree::DistanceCriterion>>
+keep_outlines(Sight& sight, const Decision& decision, const std::shared_ptr<const KeptCriterion>& base) {
+    ShadowState& state = shadow_of(sight);
+    if (!find_shadowing_outlines(sight, decision, base) && state.criterion) return state.criterion;
+    if (count(state.kept) == 0) {
+        state.criterion = {base, &base->criterion};
+        return state.criterion;
+    }
+    auto kept = vdtree::keeping(sight.object.tree, base->criterion, state.kept);
+    if (!kept) return kept.error();
+    state.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*kept));
+    return state.criterion;
+}
+
+} // namespace unseen::session

@@ -1,0 +1,228 @@
+// A session remembers criteria, tables, trees, spheres and shadows from one request to the next. What it was asked before
+// never decides: every field of what can be asked is varied, two at a time, in one session, and each answer is that of a
+// session that has never been asked anything.
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <unseen/session/session.h>
+
+#include "built.h"
+#include "measured.h"
+#include "shapes.h"
+#include "temp_folder.h"
+
+namespace session_memory_test {
+
+using namespace unseen;
+using session::FoldTest;
+using session::Goal;
+using session::Session;
+
+// Everything that a session can be asked with.
+struct Question {
+    vdtree::View view;
+    session::Request request;
+    std::optional<session::Gaze> gaze;
+    perception::DegreesPerSecond velocity{0};
+    double seconds = 0;
+    bool is_shown = false, is_masked = false; // pictures of the view and of no other
+};
+
+// Makes the change of a number, and returns how many there are. A new field of any of these structs does not compile here
+// before it has a name, and then wants a change below.
+int change(Question& q, int number) {
+    int count = 0;
+    const auto set = [&](auto& field, const auto& value) {
+        if (count++ == number) field = value;
+    };
+    auto& [eye, target, up, fov_y_degrees, width, height, shift, orthographic_height] = q.view;
+    set(eye, glm::dvec3(0.3, 0.2, 4));
+    set(target, glm::dvec3(0.4, 0, 0));
+    set(up, glm::dvec3(1, 1, 0));
+    set(fov_y_degrees, 20.0);
+    set(width, 300);
+    set(height, 150);
+    set(shift, glm::dvec2(0.3, -0.2));
+    set(orthographic_height, 3.0);
+    set(orthographic_height, 30.0);
+
+    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, shown, masking, keeps_shadows,
+           may_measure, reasons] = q.request;
+    set(goal, Goal::full());
+    set(goal, Goal::budget(400));
+    set(goal, Goal::budget(400, true));
+    set(goal, Goal::pixels(2));
+    for (const session::FoldTestFacts& facts : session::fold_tests()) set(fold_test, facts.test);
+    set(chroma, true);
+    set(milliseconds, 1e6);
+    set(threshold, 3.0);
+    set(hysteresis, 2.0f);
+    set(purpose, session::Purpose::picture);
+    set(keeps_shadows, false);
+    set(may_measure, false);
+    set(reasons, false);
+    set(q.is_shown, true);
+    set(q.is_masked, true);
+    static_cast<void>(shown), static_cast<void>(masking); // made of the view when it is known
+
+    const session::Observer whole;
+    [[maybe_unused]] const auto& [display, person, csf, gaze, velocity] = whole; // the first three stay with a session
+    auto [px, margin_deg] = session::Gaze{glm::dvec2(60, 100), 0};
+    set(q.gaze, session::Gaze{px, margin_deg});
+    set(q.gaze, session::Gaze{glm::dvec2(5000, 100), 0});
+    set(q.gaze, session::Gaze{px, 3});
+    set(q.velocity, perception::DegreesPerSecond(20));
+    set(q.seconds, 1.5);
+    return count;
+}
+
+session::Request with_pictures(const Question& q, const Session& session) {
+    session::Request request = q.request;
+    const auto pixels = static_cast<std::size_t>(q.view.width) * static_cast<std::size_t>(q.view.height);
+    if (q.is_shown) { // a wall through the middle
+        const auto shown = vdtree::DepthPicture::create(q.view, std::vector<float>(pixels, 4));
+        if (shown) request.shown = *shown;
+    }
+    if (q.is_masked) {
+        perception::Elevations e{32, (q.view.width + 31) / 32, (q.view.height + 31) / 32, {}, {}};
+        e.bands.emplace_back(8);
+        e.elevation.assign(static_cast<std::size_t>(e.columns) * static_cast<std::size_t>(e.rows), 4);
+        const auto masking = perception::MaskingPicture::create(q.view, {&e, 1});
+        if (masking) request.masking.assign(session.scene().objects.size(), *masking);
+    }
+    return request;
+}
+
+// The triangles of each object's cut, which test, and why; or the complaint.
+struct Answer {
+    std::vector<std::vector<vdtree::Index>> indices;
+    std::string words;
+    bool operator==(const Answer&) const = default;
+};
+
+Answer ask(Session& session, const Question& q) {
+    session.set_gaze(q.gaze);
+    session.set_velocity(q.velocity);
+    session.set_time(q.seconds);
+    const auto made = session.simplify(q.view, with_pictures(q, session));
+    if (!made) return {{}, made.error().message};
+    Answer answer;
+    for (const vdtree::Cut& cut : made->cuts) {
+        const auto indices = cut.indices();
+        answer.indices.emplace_back(indices.begin(), indices.end());
+    }
+    for (const FoldTest test : made->fold_tests) answer.words += session::name_of(test) + "\n";
+    for (const session::Effect& effect : made->effects) answer.words += effect.name + ": " + effect.why + "\n";
+    return answer;
+}
+
+// A scene a time, with the lights that the other scenes lack.
+struct SceneCase {
+    const char* name;
+    std::function<session::Scene()> make;
+};
+
+vdtree::Mesh coloured_ball() {
+    vdtree::Mesh mesh = shapes::bumpy_sphere(3, 0.03);
+    for (const glm::dvec3& p : mesh.positions)
+        mesh.colours.emplace_back(0.5 + 0.4 * std::sin(3 * p.x), 0.5 + 0.3 * p.y, 0.5, 1);
+    return mesh;
+}
+
+// Two objects of one tree and one of another, with a wall behind.
+session::Scene three_balls(const vdtree::VertexTree& coloured, const vdtree::VertexTree& grey) {
+    session::Scene scene = session::Scene::of(coloured.share());
+    scene.objects.push_back({coloured.share(), {.scale = 0.3, .translation = {1.1, 0.2, 0.3}}, "small"});
+    scene.objects.push_back({grey.share(), {.scale = 0.5, .translation = {-1.2, -0.3, -0.5}}, "grey"});
+    scene.backdrop.push_back({grey.share(), {.scale = 2, .translation = {0, -2.5, -3}}, "behind"});
+    return scene;
+}
+
+session::Scene measured_balls() {
+    static const vdtree::VertexTree coloured = *session::measured_under_lights(
+                                        *session::measured(support::built(coloured_ball()))),
+                                    grey = *session::measured_under_lights(
+                                        *session::measured(support::built(shapes::bumpy_sphere(3, 0.02))));
+    return three_balls(coloured, grey);
+}
+
+vdtree::Lighting lighting(bool casts_shadow, double specular) {
+    vdtree::Lighting lighting;
+    lighting.ambient = 0.15;
+    lighting.specular = specular;
+    for (const glm::dvec3 towards : {glm::dvec3(0.3, 1, 0.5), glm::dvec3(-1, 0.3, 0.6)}) {
+        vdtree::LightSource light;
+        light.direction = glm::normalize(towards);
+        light.intensity = 0.4;
+        light.casts_shadow = casts_shadow && lighting.lights.empty();
+        lighting.lights.push_back(light);
+    }
+    return lighting;
+}
+
+session::Scene lit(bool casts_shadow, double specular) {
+    session::Scene scene = measured_balls();
+    scene.lights = *calibration::LightRig::of(lighting(casts_shadow, specular), "lights of the test");
+    return scene;
+}
+
+session::Scene under_moving_lights() {
+    const support::TempFolder folder;
+    const auto file = folder.path() / "lights.json";
+    std::ofstream(file) << R"({"ambient": 0.1, "material": {"specular": 0.04, "shininess": 40}, "lights": [
+        {"type": "directional", "direction": [0.4, 0.7, 0.6], "intensity": 0.6, "shadow": true,
+         "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}},
+        {"type": "headlight", "intensity": 0.2}]})";
+    session::Scene scene = measured_balls();
+    scene.lights = *calibration::LightRig::read(file);
+    return scene;
+}
+
+class SessionMemory : public testing::TestWithParam<SceneCase> {};
+
+TEST_P(SessionMemory, DecidesNothing) {
+    session::Observer observer;
+    observer.person = perception::median_person;
+    const auto fresh = [&] { return *Session::create(GetParam().make(), observer); };
+    Question plain;
+    plain.view = {.eye = {0.2, 0.1, 5}, .width = 200, .height = 200};
+    const auto changed = [&](int first, int second) {
+        Question q = plain;
+        change(q, first);
+        change(q, second);
+        return q;
+    };
+    const int count = change(plain, -1);
+    std::vector<Answer> alone;
+    for (int i = 0; i < count; ++i) {
+        Session session = fresh();
+        alone.push_back(ask(session, changed(i, i)));
+    }
+    Session asked = fresh();
+    int others = 0;
+    for (int i = 0; i < count; ++i)
+        for (int k = 0; k < i; ++k) {
+            Session session = fresh();
+            const Answer both = ask(session, changed(i, k));
+            others += both != alone[static_cast<std::size_t>(i)];
+            ASSERT_EQ(ask(asked, changed(i, i)).words, alone[static_cast<std::size_t>(i)].words) << i << " after " << k;
+            ASSERT_TRUE(ask(asked, changed(i, k)) == both) << "changes " << i << " and " << k;
+            ASSERT_TRUE(ask(asked, changed(k, k)) == alone[static_cast<std::size_t>(k)]) << k << " after " << i;
+        }
+    EXPECT_GT(others, count) << "most changes change something";
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SessionMemory,
+                         testing::Values(SceneCase{"OwnLight", measured_balls},
+                                         SceneCase{"StillLights", [] { return lit(false, 0); }},
+                                         SceneCase{"Shadows", [] { return lit(true, 0); }},
+                                         SceneCase{"Highlights", [] { return lit(true, 0.05); }},
+                                         SceneCase{"MovingLights", under_moving_lights}),
+                         [](const auto& of) { return of.param.name; });
+
+} // namespace session_memory_test
