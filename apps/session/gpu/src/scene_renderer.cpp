@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <unseen/render/sample_sum.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
