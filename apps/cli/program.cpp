@@ -193,7 +193,7 @@ void check(const CLI::App& app, const Program& program, const std::vector<Comman
     const CLI::App& verb = last_parsed(app);
     if (program.setup && *program.setup) (*program.setup)->check(verb);
     for (const Command& command : commands)
-        if (command.parser->parsed()) check_rules(verb, command.rules);
+        if (command.parser->parsed()) check_rules(*command.parser, command.rules);
 }
 
 int run(const std::vector<Command>& commands) {
