@@ -445,7 +445,6 @@ Command scenes_command(CLI::App& app) {
 
 struct SelectionArguments {
     SelectionBenchOptions options;
-    std::string csv;
     std::vector<std::string> qualities;
     std::vector<int> size;
     ReportArguments report;
@@ -456,11 +455,10 @@ Result<int> run(SelectionArguments& a) {
     std::vector<std::string> inputs = a.options.scenes;
     inputs.insert(inputs.end(), a.options.selections.begin(), a.options.selections.end());
     inputs.insert(inputs.end(), a.options.statues.begin(), a.options.statues.end());
-    auto bench = BenchRun::open(inputs, {a.csv}, a.report);
+    auto bench = BenchRun::open(inputs, {}, a.report);
     if (!bench) return bench.error();
     auto result = bench_selection(a.options);
     if (!result) return result.error();
-    if (auto ok = write_text(a.csv, to_csv(result->frames)); !ok) return ok.error();
     result->json["budget"] = a.options.budget;
     result->json["width"] = a.options.width;
     result->json["height"] = a.options.height;
@@ -496,11 +494,6 @@ Command selection_command(CLI::App& app) {
         ->type_name("PIXELS")
         ->check(whole(11, 8192))
         ->excludes(selections);
-    verb->add_flag_function(
-            "--no-growth", [a](std::int64_t) { a->options.measures_growth = false; },
-            "Do not search the first scene again with other numbers of objects, levels and cameras: minutes")
-        ->excludes(selections);
-    verb->add_option("--csv", a->csv, "One line a judged frame")->type_name("FILE.csv");
     verb->add_option("--mesh", o.statues, "A statue of the default scenes; may be given again")
         ->type_name("FILE")
         ->allow_extra_args(false);
@@ -519,14 +512,11 @@ Command selection_command(CLI::App& app) {
         ->expected(2)
         ->check(whole(16, 8192));
     verb->add_option("--samples", o.samples, "A pixel (default: 4)")->type_name("N")->check(whole(1, 256));
-    verb->add_option("--plots", o.plots, "Figures by frame, two plots a scene")->type_name("FOLDER");
     verb->add_flag("--masked-tree", o.has_masked_tree, "The tree's budget with masking, too: seconds a frame");
     verb->add_flag("--quick", a->quick, "Few frames, one sample a pixel");
     add_report_options(*verb, a->report);
     verb->callback([a] {
-        if (a->quick)
-            a->options.judged_every = 100, a->options.samples = 1, a->options.gap_cameras = 2,
-            a->options.measures_growth = false;
+        if (a->quick) a->options.judged_every = 100, a->options.samples = 1;
         if (!a->qualities.empty()) {
             using session::SelectionQuality;
             a->options.qualities.clear();
@@ -538,8 +528,8 @@ Command selection_command(CLI::App& app) {
     });
     verb->footer(
         "Examples:\n  unseen-bench selection --quick\n"
-        "  unseen-bench selection --mesh bunny.ply --mesh dragon.ply --mesh armadillo.ply --plots plots\n"
-        "  unseen-bench selection --quality ssim --quality pixels --csv frames.csv\n"
+        "  unseen-bench selection --mesh bunny.ply --mesh dragon.ply --mesh armadillo.ply\n"
+        "  unseen-bench selection --quality ssim --quality pixels\n"
         "  unseen-bench selection mine.glb --selection mine.sel --every 1 --size 1920 1080 --json flight.json");
     return {verb, [a] { return run(*a); }};
 }

@@ -24,7 +24,6 @@ Result<PointsBenchResult> bench_points(const PointsBenchOptions&) { return no_pi
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }
 Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions&) { return no_pictures(); }
-std::string to_csv(const std::vector<SelectionFrame>&) { return {}; }
 Result<AccuracyBenchResult> bench_accuracy(const AccuracyBenchOptions&) { return no_pictures(); }
 std::string to_csv(const AccuracyBenchResult&) { return {}; }
 std::string to_html(const AccuracyBenchResult&) { return {}; }

@@ -7,8 +7,6 @@
 #include <functional>
 #include <limits>
 #include <numbers>
-#include <numeric>
-#include <optional>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -20,19 +18,15 @@
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
-#include <unseen/vdtree/internal/csv.h>
-#include <unseen/vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
 #include "made_scenes.h"
 #include "make_scene.h"
-#include "panel_plot.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
-namespace fs = std::filesystem;
 using session::LevelPictures;
 using session::SelectionFollower;
 
@@ -130,15 +124,11 @@ double correlation(const MethodFigures& m) {
 
 // ---- ways to choose levels --------------------------------------------------------------------------------------------
 
-// Of a scene's first objects; others are left out.
-Result<session::Session> session_of(const std::string& file,
-                                    std::size_t objects = std::numeric_limits<std::size_t>::max()) {
+Result<session::Session> session_of(const std::string& file) {
     session::LoadOptions load;
     load.as = session::LoadAs::scene;
     auto scene = session::Scene::load(file, load);
     if (!scene) return scene.error();
-    if (scene->objects.size() > objects)
-        scene->objects.erase(scene->objects.begin() + static_cast<std::ptrdiff_t>(objects), scene->objects.end());
     return session::Session::create(std::move(*scene));
 }
 
@@ -148,7 +138,7 @@ public:
         auto session = session_of(file);
         if (!session) return session.error();
         Scene made;
-        made.name = fs::path(file).stem().string();
+        made.name = std::filesystem::path(file).stem().string();
         made.session = std::make_unique<session::Session>(std::move(*session));
         auto pictures = LevelPictures::create(context, *made.session, levels);
         if (!pictures) return pictures.error();
@@ -359,43 +349,7 @@ private:
     std::vector<std::vector<int>> last_; // levels of the frame before, by way
 };
 
-// ---- how far the search is from the best --------------------------------------------------------------------------------
-
-struct Gap {
-    int cameras = 0;
-    double greedy = 0, best = 0; // lost, sums
-};
-
-// At cameras that have few objects in sight, a third of whose triangles is the budget.
-Result<Gap> gap_of(Scene& scene, const session::Selections& selections, int most_cameras) {
-    constexpr std::size_t most_objects = 4; // 625 choices of 5 levels
-    constexpr int window_px = 96;
-    Gap gap;
-    for (const session::SelectionCorner& corner : selections.corners)
-        for (std::size_t d = 0; d < corner.cameras.size() && gap.cameras < most_cameras; ++d) {
-            const std::size_t objects = corner.cameras[d].objects.size();
-            if (objects < 3 || objects > most_objects) continue;
-            vdtree::View view;
-            view.eye = selections.grid.place(corner.at);
-            view.target = view.eye + session::selection_directions[d];
-            if (std::abs(session::selection_directions[d].y) > 0.5) view.up = {0, 0, 1};
-            view.fov_y_degrees = 90, view.width = view.height = window_px;
-            const auto picture = scene.pictures->draw(view, selections.quality);
-            if (!picture) return picture.error();
-            std::uint64_t all = 0;
-            for (const session::ObjectImages& o : picture->objects) all += o.triangles.front();
-            const auto& display = scene.session->observer().display;
-            const auto greedy = session::select_greedily(*picture, selections.quality, display, {.budget = all / 3});
-            const auto best = session::select_exhaustively(*picture, selections.quality, display, {.budget = all / 3});
-            if (!greedy) return greedy.error();
-            if (!best) return best.error();
-            gap.greedy += greedy->loss, gap.best += best->loss;
-            ++gap.cameras;
-        }
-    return gap;
-}
-
-// ---- tables and plots -----------------------------------------------------------------------------------------------------
+// ---- tables -----------------------------------------------------------------------------------------------------
 
 BenchTable table_of(const std::string& scene, const std::vector<MethodFigures>& methods) {
     BenchTable table;
@@ -435,83 +389,6 @@ const MethodFigures& figures_of(const std::vector<MethodFigures>& methods, Way w
     return *std::ranges::find(methods, way, &MethodFigures::way);
 }
 
-// Of these methods, one panel each.
-Result<void> write_plots(const std::string& folder, const std::string& scene,
-                         const std::vector<MethodFigures>& methods) {
-    constexpr std::array<Way, 4> shown = {Way::selected, Way::thresholds, Way::area, Way::tree};
-    constexpr std::array<glm::vec3, 4> colours = {glm::vec3(0.1F, 0.4F, 0.8F), glm::vec3(0.75F, 0.45F, 0.1F),
-                                                  glm::vec3(0.8F, 0.2F, 0.2F), glm::vec3(0.1F, 0.55F, 0.25F)};
-    for (const bool is_ssim : {true, false}) {
-        PanelPlot plot;
-        plot.title = scene + (is_ssim ? ": what SSIM is below 1, thousandths" : ": visible pixels");
-        plot.x_label = "judged frame";
-        for (std::size_t i = 0; i < shown.size(); ++i) {
-            const MethodFigures& method = figures_of(methods, shown[i]);
-            Panel& panel = plot.panels.emplace_back();
-            panel.label = method.name;
-            panel.colour = colours[i];
-            for (const FrameFigures& f : method.frames)
-                panel.values.push_back(is_ssim ? 1e3 * std::max(1 - f.ssim, 0.0) : static_cast<double>(f.visible));
-        }
-        const auto file = fs::path(folder) / ("selection_" + scene + (is_ssim ? "_ssim.svg" : "_pixels.svg"));
-        if (auto written = write_plot(file, plot); !written) return written;
-    }
-    return {};
-}
-
-// ---- what the search costs ----------------------------------------------------------------------------------------------
-
-// One thing is changed at a time. Fewer objects: the first ones. The ground of cameras is always that of all.
-Result<BenchTable> growth(const render::Context& context, const Scene& scene, const std::string& file,
-                          const session::Selections& selections, const SelectionBenchOptions& options,
-                          const std::string& out) {
-    struct Case {
-        std::size_t objects;
-        int levels, depth;
-    };
-    const std::size_t all = scene.spheres.size();
-    constexpr int usual = session::default_selected_levels;
-    const std::vector<Case> cases = {{(all + 3) / 4, usual, 0},
-                                     {(all + 1) / 2, usual, 0},
-                                     {all, usual, 0},
-                                     {all, 2, 0},
-                                     {all, 3, 0},
-                                     {all, 8, 0},
-                                     {all, usual, 1}};
-    const session::SelectionGrid& grid = selections.grid;
-    const std::int32_t side = grid.cell_size();
-    BenchTable table;
-    table.title = scene.name + ": what the search costs, by objects, levels and cameras";
-    table.rows.push_back({"objects", "levels", "halvings", "cameras", "s", "ms a camera", "of it drawing",
-                          "reading back", "searching, all threads", "drawings", "evaluations"});
-    for (const Case& c : cases) {
-        auto session = session_of(file, c.objects);
-        if (!session) return session.error();
-        const auto done =
-            session::precompute_selections(context, *session, out,
-                                           {.budget = options.budget,
-                                            .quality = selections.quality,
-                                            .levels = c.levels,
-                                            .window_px = selections.window_px,
-                                            .spacing = grid.step * side,
-                                            .depth = c.depth,
-                                            .eye_height = grid.origin.y,
-                                            .low = grid.place({0, 0, 0}),
-                                            .high = grid.place({grid.cells.x * side, 0, grid.cells.z * side})});
-        if (!done) return done.error();
-        const double per_camera = 1e3 / static_cast<double>(std::max<std::size_t>(done->cameras, 1));
-        table.rows.push_back({grouped(c.objects), std::to_string(c.levels), std::to_string(c.depth),
-                              grouped(done->cameras), rounded(done->seconds - done->load_seconds, 3),
-                              rounded(per_camera * (done->seconds - done->load_seconds), 3),
-                              rounded(per_camera * done->draw_seconds, 3), rounded(per_camera * done->read_seconds, 3),
-                              rounded(per_camera * done->search_seconds, 3), grouped(done->drawings),
-                              grouped(done->evaluations)});
-    }
-    table.notes.push_back(
-        "Without loading and levels. At level 0 of the grid's halvings all cameras stand at its corners.");
-    return table;
-}
-
 // Scene by scene.
 class SelectionBench {
 public:
@@ -527,8 +404,6 @@ public:
                         "within the budget", "selected", "tree"}};
         correlations_.title = "Correlation of SSIM and visible pixels, levels selected";
         correlations_.rows = {{"scene", "Pearson's", "the thesis"}};
-        gaps_.title = "What the search loses, against the best of all choices";
-        gaps_.rows = {{"scene", "cameras", "times the best"}};
     }
 
     // `selected`: levels that are given for it; empty: they are searched.
@@ -542,22 +417,11 @@ public:
         Json json = {{"scene", scene->name}};
         if (selected.empty())
             if (auto searched = search(*scene, selections, json); !searched) return searched;
-        if (result_.tables.empty() && selected.empty() && options_.measures_growth) {
-            auto table = growth(context_, *scene, file, selections.front(), options_, made_.file("growth.sel"));
-            if (!table) return table.error();
-            grown_ = std::move(*table);
-        }
         const auto methods = Flight(context_, *scene, selections, options_).run();
         if (!methods) return methods.error();
         result_.tables.push_back(table_of(scene->name, *methods));
-        for (const MethodFigures& m : *methods)
-            for (const FrameFigures& f : m.frames)
-                result_.frames.push_back({scene->name, m.name, f.number, f.triangles, f.ssim, f.visible});
         json["methods"] = to_json(*methods);
         add_means(scene->name, *methods);
-        if (auto added = add_gap(*scene, selections.front(), json); !added) return added;
-        if (!options_.plots.empty())
-            if (auto written = write_plots(options_.plots, scene->name, *methods); !written) return written;
         result_.json["scenes"].push_back(std::move(json));
         return {};
     }
@@ -565,12 +429,7 @@ public:
     SelectionBenchResult take() {
         result_.tables.push_back(std::move(means_));
         result_.tables.push_back(std::move(correlations_));
-        for (BenchTable* const table : {&gaps_, &before_})
-            if (table->rows.size() > 1) result_.tables.push_back(std::move(*table));
-        if (grown_) {
-            result_.json["growth"] = grown_->rows;
-            result_.tables.push_back(std::move(*grown_));
-        }
+        if (before_.rows.size() > 1) result_.tables.push_back(std::move(before_));
         return std::move(result_);
     }
 
@@ -629,21 +488,11 @@ private:
             {scene, rounded(correlation(methods.front()), 3), there ? rounded(there->correlation, 3) : ""});
     }
 
-    Result<void> add_gap(Scene& scene, const session::Selections& selections, Json& json) {
-        const auto gap = gap_of(scene, selections, options_.gap_cameras);
-        if (!gap) return gap.error();
-        if (gap->cameras == 0 || !(gap->best > 0)) return {};
-        gaps_.rows.push_back({scene.name, std::to_string(gap->cameras), rounded(gap->greedy / gap->best, 3)});
-        json["gap"] = {{"cameras", gap->cameras}, {"greedy", gap->greedy}, {"best", gap->best}};
-        return {};
-    }
-
     const render::Context& context_;
     const MadeScenes& made_;
     const SelectionBenchOptions& options_;
     SelectionBenchResult result_;
-    BenchTable before_, means_, correlations_, gaps_;
-    std::optional<BenchTable> grown_;
+    BenchTable before_, means_, correlations_;
 };
 
 } // namespace
@@ -666,14 +515,6 @@ Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& option
         if (auto added = bench.add(files[i], options.selections.empty() ? "" : options.selections[i]); !added)
             return added.error();
     return bench.take();
-}
-
-std::string to_csv(const std::vector<SelectionFrame>& frames) {
-    std::string text = "scene,levels,frame,triangles,ssim,visible_pixels\n";
-    for (const SelectionFrame& f : frames)
-        text += csv_field(f.scene) + "," + csv_field(f.levels) + "," + std::to_string(f.number) + "," +
-                std::to_string(f.triangles) + "," + number_text(f.ssim) + "," + std::to_string(f.visible_pixels) + "\n";
-    return text;
 }
 
 } // namespace unseen::app

@@ -23,33 +23,17 @@ struct SelectionBenchOptions {
     int width = 640, height = 360; // pixels
     int samples = 4;               // a pixel
     bool has_masked_tree = false;  // one more row, seconds a frame
-    int gap_cameras = 6;           // at which the search is held against all choices
     // By which levels are selected, each for itself; without `selections` alone.
     std::vector<session::SelectionQuality> qualities = {session::SelectionQuality::ssim};
-    double spacing = 0;          // of the search's grid, as in session::PrecomputeOptions
-    int window_px = 256;         // of the search's cameras
-    std::string plots;           // a folder; empty: none
-    bool measures_growth = true; // of the first scene, where selections are made here; minutes
-};
-
-// A frame that was judged, as one way of choosing levels has it.
-struct SelectionFrame {
-    std::string scene, levels;
-    int number = 0;              // of the flight, from 0
-    std::uint64_t triangles = 0; // of objects
-    double ssim = 0;             // against full detail
-    std::uint64_t visible_pixels = 0;
+    double spacing = 0;  // of the search's grid, as in session::PrecomputeOptions
+    int window_px = 256; // of the search's cameras
 };
 
 struct SelectionBenchResult {
     std::vector<BenchTable> tables;
-    std::vector<SelectionFrame> frames;
     Json json;
 };
 
 Result<SelectionBenchResult> bench_selection(const SelectionBenchOptions& options);
-
-// A line a frame.
-std::string to_csv(const std::vector<SelectionFrame>& frames);
 
 } // namespace unseen::app

@@ -124,28 +124,9 @@ TEST_F(SelectCommandTest, WhatIsWrongIsSaid) {
 
 TEST_F(SelectCommandTest, AFlightIsMeasured) {
     ASSERT_EQ(run(words("scene.sel")).status, 0);
-    const Outcome measured = run_program({UNSEEN_BENCH_COMMAND,
-                                          "selection",
-                                          "scene.glb",
-                                          "--selection",
-                                          "scene.sel",
-                                          "--triangles",
-                                          "6000",
-                                          "--frames",
-                                          "40",
-                                          "--every",
-                                          "20",
-                                          "--size",
-                                          "96",
-                                          "54",
-                                          "--samples",
-                                          "1",
-                                          "--plots",
-                                          ".",
-                                          "--csv",
-                                          "frames.csv",
-                                          "--json",
-                                          "-"});
+    const Outcome measured =
+        run_program({UNSEEN_BENCH_COMMAND, "selection", "scene.glb", "--selection", "scene.sel", "--triangles", "6000",
+                     "--frames", "40", "--every", "20", "--size", "96", "54", "--samples", "1", "--json", "-"});
     ASSERT_EQ(measured.status, 0) << measured.err;
     const Json scene = measured.json()["scenes"][0];
     EXPECT_EQ(scene["scene"], "scene");
@@ -159,34 +140,18 @@ TEST_F(SelectCommandTest, AFlightIsMeasured) {
             EXPECT_LE(frame["triangles"], is_within ? 6000 : 12'000) << method["levels"];
         }
     }
-    const std::string csv = read_text(path("frames.csv"));
-    EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + 6 * 2);
-    EXPECT_THAT(csv, HasSubstr("\nscene,the tree's budget,20,"));
-    EXPECT_TRUE(fs::exists(path("selection_scene_ssim.svg")));
-    EXPECT_TRUE(fs::exists(path("selection_scene_pixels.svg")));
-    EXPECT_GE(scene["gap"].value("greedy", 1.0), 0.999 * scene["gap"].value("best", 1.0));
 }
 
-TEST_F(SelectCommandTest, QualitiesAndTheGrowthOfCostAreMeasured) {
+TEST_F(SelectCommandTest, QualitiesAreMeasured) {
     const Outcome measured = run_shell("exec '" UNSEEN_BENCH_COMMAND
                                        "' selection scene.glb --triangles 6000 --spacing 25 --window 32 --frames 10 "
                                        "--every 10 --size 96 54 --samples 1 --quality pixels --quality ssim --json -");
     ASSERT_EQ(measured.status, 0) << measured.err;
-    const Json report = measured.json(), scene = report["scenes"][0];
+    const Json scene = measured.json()["scenes"][0];
     ASSERT_EQ(scene["precompute"].size(), 2u);
     ASSERT_EQ(scene["methods"].size(), 7u);
     EXPECT_EQ(scene["methods"][0]["levels"], "selected, by ssim");
     EXPECT_EQ(scene["methods"][1]["levels"], "selected, by pixels");
-    const Json growth = report["growth"]; // first the columns' names
-    ASSERT_EQ(growth.size(), 8u);
-    const auto drawings = [&](std::size_t row) {
-        std::string count = growth[row][9];
-        std::erase(count, ',');
-        return std::stoi(count);
-    };
-    EXPECT_LT(drawings(1), drawings(3)); // objects
-    EXPECT_LT(drawings(4), drawings(6)); // levels
-    EXPECT_EQ(growth[4][1], "2");
 }
 
 TEST_F(SelectCommandTest, LevelsAreAsManyAsAreAskedFor) {
