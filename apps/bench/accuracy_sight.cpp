@@ -11,12 +11,11 @@
 #include <glm/gtc/packing.hpp>
 
 #include <unseen/perception/csf.h>
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/judge_tables.h>
 #include <unseen/render/internal/elevation.h>
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/session_gpu/gpu_judge.h>
-#include <unseen/session_gpu/internal/pass_tables.h>
 #include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
@@ -228,7 +227,7 @@ public:
         if (variant.bands > 0 && tables->bands.size() > variant.bands) tables->bands.resize(variant.bands);
         auto up = upload(variant.picture);
         if (!up) return up.error();
-        auto passes = render::VisibilityPasses::create(context_, session::visibility_tables(*tables), up->texture());
+        auto passes = render::VisibilityPasses::create(context_, *tables, up->texture());
         if (!passes) return passes.error();
         return timed(*passes, std::to_string(tables->bands.size()) + " bands", [&]() -> Result<void> {
             if (auto set = passes->set_reference(up->texture()); !set) return set;
@@ -242,7 +241,7 @@ public:
         if (!tables) return tables.error();
         auto up = upload(variant.picture);
         if (!up) return up.error();
-        auto passes = render::ElevationPasses::create(context_, width, height, session::elevation_tables(*tables));
+        auto passes = render::ElevationPasses::create(context_, width, height, *tables);
         if (!passes) return passes.error();
         return timed(*passes, "against rpg99's", [&] { return passes->map_thresholds(up->texture()); });
     }

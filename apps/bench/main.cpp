@@ -372,7 +372,7 @@ Command fit_command(CLI::App& app) {
         ->check(one_of(fit_factors()));
     verb->add_flag("--quick", a->options.quick, "Few views of small meshes: rough figures");
     add_report_options(*verb, a->report);
-    verb->footer("Examples:\n  unseen-bench fit --quick --factor peak_of_shift\n  unseen-bench fit --json fit.json");
+    verb->footer("Examples:\n  unseen-bench fit --quick --factor contact_reach\n  unseen-bench fit --json fit.json");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include <unseen/calibration/internal/people.h>
-#include <unseen/perception/person.h>
+#include <unseen/perception/csf.h>
 
 #include "terminal.h"
 

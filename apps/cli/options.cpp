@@ -10,7 +10,7 @@
 #include <memory>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 #include "option_names.h"

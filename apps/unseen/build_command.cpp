@@ -12,7 +12,7 @@
 #endif
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/session/load.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 

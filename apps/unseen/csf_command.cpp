@@ -11,7 +11,7 @@
 #include <unseen/calibration/observer_profile.h>
 #include <unseen/perception/csf.h>
 #include <unseen/perception/image.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 #include <unseen/session/observer.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/input_file.h>

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include <unseen/perception/change.h>
 #include <unseen/perception/image.h>
+#include <unseen/perception/internal/change.h>
 #include <unseen/render/renderer.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/session.h>

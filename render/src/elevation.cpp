@@ -1,6 +1,7 @@
 // As perception's rpg99_map() computes it on the CPU in doubles, which is the reference: levels are of two floats.
 #include <unseen/render/internal/elevation.h>
 
+#include <cassert>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 #include <glm/vec4.hpp>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/judge_tables.h>
 
 #include "gl.h"
 #include "gpu_plane.h"
@@ -17,18 +19,10 @@
 namespace unseen::render {
 namespace {
 
-constexpr std::size_t band_count = ElevationTables::band_count, level_count = ElevationTables::level_count;
+constexpr std::size_t band_count = Rpg99Tables::band_count, level_count = Rpg99Tables::level_count;
 
-Result<void> check(const ElevationTables& t) {
-    const auto refuse = [](const std::string& what) { return judge_error("the tables are none: " + what); };
-    if (t.adaptation_level < 0 || t.adaptation_level >= ElevationTables::level_count)
-        return refuse("the level of adaptation is 0 to 7");
-    if (t.luminances < 2 || t.log2_tvi.size() != static_cast<std::size_t>(t.luminances) ||
-        t.log2_csf.size() != band_count * t.log2_tvi.size())
-        return refuse("they have not as many nodes as luminances by bands");
-    if (!(t.floor > 0 && t.nodes_an_octave > 0 && t.masking_scale > 0 && t.masking_gain > 0 &&
-          t.largest_elevation >= 1))
-        return refuse("a number that must be above 0 is not");
+Result<void> check(const Rpg99Tables& t) {
+    assert(t.log2_csf.size() == band_count * t.log2_tvi.size());
     if (t.luminances > largest_target_side())
         return unsupported("judge: the tables are larger than this GPU's textures; map on the CPU");
     return {};
@@ -37,7 +31,7 @@ Result<void> check(const ElevationTables& t) {
 } // namespace
 
 struct ElevationPasses::Impl {
-    Impl(const Context& context_, glm::ivec2 size_, const ElevationTables& tables_)
+    Impl(const Context& context_, glm::ivec2 size_, const Rpg99Tables& tables_)
         : context(context_), size(size_), tables(tables_) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
@@ -48,7 +42,7 @@ struct ElevationPasses::Impl {
 
     Context context; // first, and so gone last
     glm::ivec2 size;
-    ElevationTables tables;
+    Rpg99Tables tables;
     Texture2d sensitivities;
     // High, low, and, but for the first, the level before less this one.
     std::vector<GpuPlanes> levels;
@@ -150,7 +144,7 @@ ElevationPasses& ElevationPasses::operator=(ElevationPasses&&) noexcept = defaul
 ElevationPasses::~ElevationPasses() = default;
 
 Result<ElevationPasses> ElevationPasses::create(const Context& context, int width, int height,
-                                                const ElevationTables& tables) {
+                                                const Rpg99Tables& tables) {
     auto impl = std::make_unique<Impl>(context, glm::ivec2(width, height), tables);
     auto made = in_context(context, "Preparing maps of thresholds", [&] { return impl->prepare(); });
     if (!made) return made.error();

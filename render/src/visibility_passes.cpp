@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/judge_tables.h>
 
 #include "context_impl.h"
 #include "gl.h"
@@ -25,7 +27,6 @@ namespace {
 constexpr std::size_t most_bands = 16;             // of pool.frag: what a fragment shader can read at least
 constexpr std::size_t few_bands = 8;               // of its variant for usual sizes
 constexpr std::size_t most_taps = 12;              // of blur.frag
-constexpr int most_halvings = 30;                  // shifts of a whole number
 constexpr int group_columns = 64, group_rows = 16; // of examine.comp
 
 constexpr int largest_cell_px = 64;
@@ -34,26 +35,10 @@ constexpr std::array<float, 5> pooling_kernel = {0.26656f, 0.21344f, 0.10959f, 0
 
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
 
-glm::vec4 taps(const VisibilityTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
+glm::vec4 taps(const JudgeTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
 
-Result<void> check(const VisibilityTables& t) {
-    const auto refuse = [](const std::string& what) { return judge_error("the tables are none: " + what); };
-    if (t.bands.empty() || t.bands.size() > most_bands) return refuse("they need 1 to 16 bands");
-    if (t.luminances < 2 || t.eccentricities < 1) return refuse("they need two luminances and an eccentricity");
-    if (!t.gaze && t.eccentricities != 1) return refuse("without a gaze there is one eccentricity");
-    if (!(t.floor_cdm2 > 0 && t.beta > 0 && t.most_thresholds > 0 && t.masking_knee > 0 && t.least_masker > 0 &&
-          t.most_masker >= t.least_masker && t.eccentricity_step > 0))
-        return refuse("a number that must be above 0 is not");
-    if (t.luminance_shift < 1 || t.luminance_shift > 23) return refuse("luminances are shifted by 1 to 23 bits");
-    const auto nodes = static_cast<std::size_t>(t.luminances) * static_cast<std::size_t>(t.eccentricities);
-    for (const VisibilityTables::Band& band : t.bands) {
-        if (band.nodes.size() != nodes) return refuse("a band has not as many nodes as luminances by eccentricities");
-        for (const VisibilityTables::Gaussian& g : band.window)
-            if (g.kernel.empty() || g.kernel.size() > most_taps || g.halvings < 0 || g.halvings > most_halvings)
-                return refuse("a window's Gaussian has 1 to 12 taps, and up to 30 halvings");
-        if (band.window[0].halvings < band.window[1].halvings || band.window[1].halvings < band.window[2].halvings)
-            return refuse("a window's Gaussians are given from the widest on");
-    }
+Result<void> check(const JudgeTables& t) {
+    assert(!t.bands.empty() && t.bands.size() <= most_bands && t.luminances >= 2 && t.eccentricities >= 1);
     const std::size_t rows = static_cast<std::size_t>(t.eccentricities) * t.bands.size();
     const auto most = static_cast<std::size_t>(largest_target_side());
     if (static_cast<std::size_t>(t.luminances) > most || rows > most)
@@ -179,7 +164,7 @@ Result<LuminanceExtent> luminance_extent(const Context& context, const Luminance
 // ---- VisibilityPasses -------------------------------------------------------------------------------------------------
 
 struct VisibilityPasses::Impl {
-    Impl(const Context& context_, const VisibilityTables& tables_)
+    Impl(const Context& context_, const JudgeTables& tables_)
         : context(context_), tables(tables_), size(tables.width, tables.height) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
@@ -240,7 +225,7 @@ struct VisibilityPasses::Impl {
     std::uint64_t texture_bytes() const;
 
     Context context; // first, and so gone last
-    VisibilityTables tables;
+    JudgeTables tables;
     glm::ivec2 size;
     Texture2d nodes; // of all bands
     GpuPlanes reference;
@@ -299,9 +284,8 @@ Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
 
 void VisibilityPasses::Impl::upload_nodes() {
     std::vector<glm::vec4> texels;
-    for (const VisibilityTables::Band& band : tables.bands)
-        for (const VisibilityTables::Node& node : band.nodes)
-            texels.emplace_back(node.log2_s, node.own, node.smoothed, 0);
+    for (const JudgeTables::Band& band : tables.bands)
+        for (const JudgeTables::Node& node : band.nodes) texels.emplace_back(node.log2_s, node.own, node.smoothed, 0);
     const auto rows = static_cast<GLsizei>(static_cast<std::size_t>(tables.eccentricities) * tables.bands.size());
     nodes = Texture2d::create("sensitivity");
     glTextureStorage2D(nodes.id(), 1, GL_RGBA32F, tables.luminances, rows);
@@ -372,7 +356,7 @@ void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const G
     program.set(3, glm::ivec2(static_cast<int>(level) * tables.eccentricities, tables.luminance_shift));
     program.set(4, glm::vec4(tables.bands[level].of_patch, 0, 0, 0));
     if (tables.gaze) {
-        program.set(5, glm::vec4(tables.gaze->direction, tables.gaze->tangent_per_pixel));
+        program.set(5, glm::vec4(tables.gaze->direction, static_cast<float>(tables.gaze->tangent_per_pixel)));
         program.set(6, glm::vec4(tables.first_eccentricity, 1 / tables.eccentricity_step,
                                  static_cast<float>(tables.eccentricities), 0));
         program.set(7, size);
@@ -553,7 +537,8 @@ void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level
         blur(passes, from->texture(), from_size, window[i].kernel, judging->blurred_rows, judging->blurred[i]);
         sizes[i] = from_size;
     }
-    raise->set(0, glm::vec4(window[0].weight, window[1].weight, window[2].weight, 0));
+    raise->set(0, glm::vec4(static_cast<float>(window[0].weight), static_cast<float>(window[1].weight),
+                            static_cast<float>(window[2].weight), 0));
     raise->set(1, glm::vec4(window[0].halvings, window[1].halvings, window[2].halvings, tables.beta));
     for (std::size_t i = 0; i < sizes.size(); ++i) raise->set(2 + static_cast<int>(i), sizes[i]);
     const auto& blurred = judging->blurred;
@@ -714,7 +699,7 @@ VisibilityPasses::VisibilityPasses(VisibilityPasses&&) noexcept = default;
 VisibilityPasses& VisibilityPasses::operator=(VisibilityPasses&&) noexcept = default;
 VisibilityPasses::~VisibilityPasses() = default;
 
-Result<VisibilityPasses> VisibilityPasses::create(const Context& context, const VisibilityTables& tables,
+Result<VisibilityPasses> VisibilityPasses::create(const Context& context, const JudgeTables& tables,
                                                   const LuminanceTexture& reference) {
     auto impl = std::make_unique<Impl>(context, tables);
     auto made = in_context(context, "Preparing a judge's reference", [&] { return impl->prepare(reference); });

@@ -12,7 +12,7 @@
 
 #include <gmock/gmock.h>
 
-#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/renderer.h>
 

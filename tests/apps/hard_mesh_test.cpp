@@ -15,7 +15,8 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/cut_rings.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
 #include <unseen/session/observer.h>

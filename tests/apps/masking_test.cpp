@@ -11,8 +11,8 @@
 
 #include <gmock/gmock.h>
 #include <unseen/calibration/light_rig.h>
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/judge_tables.h>
 #include <unseen/perception/masking.h>
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/session_gpu/gpu_judge.h>
@@ -28,7 +28,6 @@ namespace {
 
 using perception::Elevations;
 using perception::Image;
-using perception::JudgeTables;
 using perception::MaskingPicture;
 using ::testing::Each;
 using ::testing::HasSubstr;
@@ -187,9 +186,9 @@ TEST_F(MaskingTest, ElevationsAreTheLeastOfWhatTheTablesSay) {
 }
 
 TEST_F(MaskingTest, BarsMaskWhereTheyAreAtTheirOwnFrequency) {
-    const double ppd = 2 * tables().bands[0].nominal.value();
+    const double ppd = 2 * tables().bands[0].nominal_cpd;
     for (const std::size_t own : {std::size_t{1}, std::size_t{2}}) {
-        const double period = ppd / tables().bands[own].nominal.value();
+        const double period = ppd / tables().bands[own].nominal_cpd;
         const render::ElevationGrid weak = elevations_of(bars(period, 0.1, side / 2)),
                                     strong = elevations_of(bars(period, 0.6, side / 2));
         const std::size_t row = grid_side / 2, among = 3 * grid_side / 4;

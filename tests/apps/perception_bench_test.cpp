@@ -147,15 +147,15 @@ TEST_F(PerceptionBenchTest, NothingIsSeenWhereverTheViewerLooks) {
     EXPECT_LT(views[7]["triangles"], views[0]["triangles"]);
 }
 
-// A factor cut to a quarter keeps fewer triangles; the more it is, the more are kept.
+// A factor cut to a third keeps fewer triangles; the more it is, the more are kept.
 TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
-    const Outcome outcome = bench({"fit", "--quick", "--factor", "peak_of_shift", "--json", "-"});
+    const Outcome outcome = bench({"fit", "--quick", "--factor", "needed_by_outlines", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const Json rows = outcome.json()["rows"];
     ASSERT_EQ(rows.size(), 5u);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-        EXPECT_EQ(rows[i]["factor"], "peak_of_shift");
-        EXPECT_EQ(rows[i]["is_own"], rows[i]["value"] == 1.2);
+        EXPECT_EQ(rows[i]["factor"], "needed_by_outlines");
+        EXPECT_EQ(rows[i]["is_own"], rows[i]["value"] == 0.3);
         ASSERT_EQ(rows[i]["seen"].size(), 4u); // looked at, and aside
         EXPECT_GT(rows[i]["seen"][0]["largest_v"], 0);
         EXPECT_LT(rows[i]["seen"][3]["largest_v"], 1);

@@ -1,4 +1,4 @@
-// The observers of <unseen/perception/person.h> against what people were measured to see.
+// The observers of <unseen/perception/csf.h> against what people were measured to see.
 #include <unseen/calibration/internal/people.h>
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unseen/perception/change.h>
+#include <unseen/perception/csf.h>
+#include <unseen/perception/internal/change.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/person.h>
 
 #include "judge/band_weights.h"
 
@@ -35,7 +35,7 @@ TEST(People, AreHeldAgainstEightStudies) {
     EXPECT_EQ(people().size(), 253u);
 }
 
-// What <unseen/perception/person.h> says of each, to the digits that it gives.
+// What <unseen/perception/csf.h> says of each, to the digits that it gives.
 TEST(People, SeeMoreThanEachObserverAsOftenAsItSays) {
     for (const perception::Person& person : perception::people) {
         const auto compared = compare(people(), [&](const Stimulus& s) { return person.gain * castle(s); });
@@ -65,7 +65,7 @@ double barten_of(CsfModel model, Stimulus s) {
 }
 constexpr auto barten = [](const Stimulus& s) { return barten_of(CsfModel::barten_fitted, s); };
 
-// The gains of <unseen/perception/person.h>: of Barten's, as large a share of people lies above as of castleCSF's.
+// The gains of <unseen/perception/csf.h>: of Barten's, as large a share of people lies above as of castleCSF's.
 TEST(People, SeeMoreThanEachObserverOfBartensAsOften) {
     for (const perception::Person& person : perception::people) {
         constexpr double digits = 0.005; // of three and of the steps between single sensitivities
@@ -210,7 +210,7 @@ double flicker_sensitivity_to(const Stimulus& s) {
     return std::pow(sum / pooled_deg2, 1 / pooling) * perception::flicker_share(s.frequency);
 }
 
-// What the judge of changes rests on (<unseen/perception/change.h>): coarse gratings are seen much better while they flicker,
+// What the judge of changes rests on (<unseen/perception/internal/change.h>): coarse gratings are seen much better while they flicker,
 // and the judge sees that, with a margin of 4 dB. As medians over people, in decibels.
 TEST(People, SeeCoarseFlickerBetterThanWhatStandsStill) {
     std::vector<MeasuredSensitivity> flickering = *read_sensitivities("data/people/achromatic_thresholds.csv");

@@ -1,5 +1,5 @@
 // Changes over time: elaTCSF against its published program, and the judge of changes against closed forms.
-#include <unseen/perception/change.h>
+#include <unseen/perception/internal/change.h>
 
 #include <array>
 #include <cmath>

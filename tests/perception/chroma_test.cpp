@@ -1,6 +1,7 @@
 // Colour as a source of contrast: isoluminant patterns that luminance alone would fold.
-#include <unseen/perception/chroma.h>
 #include <unseen/perception/criterion.h>
+#include <unseen/perception/internal/chroma.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <cmath>
 
@@ -11,6 +12,8 @@
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
+
+#include "cone_contrast.h"
 
 namespace unseen::perception::chroma_test {
 namespace {
@@ -119,7 +122,7 @@ TEST(Chroma, IsNoneOfGreysAndThatOfTheConesOtherwise) {
     for (const glm::dvec3 rgb :
          {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0.3, 0.5, 0.1)}) {
         const glm::dvec3 delta = lms_of_xyz * (xyz_of_rgb * rgb) - white * glm::dot(rgb, rec709);
-        const OpponentContrast contrast = opponent_contrast(white, delta);
+        const support::OpponentContrast contrast = support::opponent_contrast(white, delta);
         const glm::dvec2 chroma = opponent_chroma(rgb);
         // Published for another white and for L + M as the luminance: these are the differences.
         EXPECT_NEAR(std::abs(chroma.x), contrast.red_green, 0.01) << rgb.r;
@@ -137,7 +140,7 @@ TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
     cycles.luminance = to_luminance(Display(), 0.3);
     cycles.area = patch_area(cycles.frequency);
     const glm::dvec2 chroma = opponent_chroma(glm::dvec3(red_or_green(0.2))) / 0.3;
-    EXPECT_GT(castle_visibility({0, std::abs(chroma.x), std::abs(chroma.y)}, cycles), 5);
+    EXPECT_GT(support::castle_visibility({0, std::abs(chroma.x), std::abs(chroma.y)}, cycles), 5);
 
     for (const bool safe : {false, true}) {
         const int whole = 2 * 27 * 27;

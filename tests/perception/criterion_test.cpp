@@ -1,5 +1,6 @@
 // The fold test of Luebke and Hallen in its safe form: known gratings, monotony, and the holes of the literal rule.
 #include <unseen/perception/criterion.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -423,8 +424,8 @@ TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
     }
 }
 
-// The part of a window is the same view off centre: a gaze at the same place has the same direction. And an orthographic
-// view has none.
+// The part of a window is the same view off centre: a gaze at the same place has the same direction. And an
+// orthographic view has none.
 TEST(ViewpointOf, TakesGazesOffCentreAndNoneInParallel) {
     const vdtree::VertexTree tree = *vdtree::build_tree(shapes::bumpy_sphere(2).view());
     FoldTestOptions options;

@@ -1,7 +1,7 @@
 // The table: how near it comes to the closed form, how it interpolates, and that its conservative form is monotone and
 // inverted exactly.
 #include <unseen/perception/csf.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // The rings of all cuts: whatever is folded, no triangle leaves the bounds of the largest of its nodes.
-#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <cmath>
 #include <random>

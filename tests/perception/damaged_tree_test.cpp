@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unseen/perception/chroma.h>
-#include <unseen/perception/cut_rings.h>
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/internal/chroma.h>
+#include <unseen/perception/internal/cut_rings.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "built.h"

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include <unseen/perception/person.h>
+#include <unseen/perception/csf.h>
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"
@@ -186,19 +186,12 @@ TEST(ErrorDistances, RefuseFactorsThatAreNone) {
     view.eye = {0, 0, 5};
     EXPECT_TRUE(error_distances(tree, view, options));
     for (const double none : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
-        for (double FoldModel::*factor :
-             {&FoldModel::needed_by_areas, &FoldModel::peak_of_shift, &FoldModel::moved_by_neighbours,
-              &FoldModel::contact_reach, &FoldModel::least_sine, &FoldModel::sampled_shift_px,
-              &FoldModel::amplitude_of_point_mean, &FoldModel::amplitude_of_shift_mean, &FoldModel::longest_ring,
-              &FoldModel::between_directions, &FoldModel::contrast_of_textures}) {
+        for (double FoldModel::*factor : {&FoldModel::neighbourhood, &FoldModel::needed_by_outlines,
+                                          &FoldModel::contact_reach, &FoldModel::least_sine}) {
             options.model = {};
             options.model.*factor = none;
             EXPECT_FALSE(error_distances(tree, view, options));
         }
-    for (const int none : {0, FoldModel::largest_side_by_side + 1}) {
-        options.model = {.most_side_by_side = none};
-        EXPECT_FALSE(error_distances(tree, view, options));
-    }
 }
 
 } // namespace

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "judge/masking.h"
+#include "judge/modern_masking.h"
 
 namespace unseen::perception::fast_math_test {
 namespace {

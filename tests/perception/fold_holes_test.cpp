@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <unseen/perception/internal/cut_rings.h>
 #include <unseen/perception/judge.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>

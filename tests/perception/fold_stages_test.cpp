@@ -5,9 +5,12 @@
 #include "measure/lit_stages.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <span>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +18,7 @@
 
 #include "fold/fold_errors.h"
 #include "measure/pyramid.h"
+#include "measure/stage_picture.h"
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"
@@ -74,8 +78,8 @@ float found(const std::vector<FoldStage>& stages, float of_background) {
 TEST(LitStages, AreThoseOfTheSharesAndBackgroundsAround) {
     const LitStages all = numbered();
     ASSERT_EQ(all.stage_count(), 1u);
-    // A fifth is ambient, as in one of the tables. Before black nothing lies around black but itself; white is a quarter
-    // of the brightest of the pictures, between 0.2 and 0.3 of it.
+    // A fifth is ambient, as in one of the tables. Before black nothing lies around black but itself; white is a
+    // quarter of the brightest of the pictures, between 0.2 and 0.3 of it.
     const auto fifth = all.under({.ambient = 0.2f, .least = 0.8f, .most = 0.8f});
     EXPECT_FLOAT_EQ(found(fifth, 0), 0.03f + 0.1f);
     EXPECT_FLOAT_EQ(found(fifth, 1), 0.03f + 0.7f);
@@ -216,6 +220,88 @@ TEST(FoldStages, AreKeptInFiles) {
     for (const auto& read : {read_tree(folder / "tree.vdt"), map_tree(folder / "tree.vdt")}) {
         ASSERT_TRUE(read) << read.error().message;
         EXPECT_TRUE(std::ranges::equal(stages_of(*read), stages_of(tree)));
+    }
+}
+
+// ---- large triangles behind, on and through each other
+
+// Pages on one edge.
+Mesh pages(int count) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, -1}, {0, 0, 1}};
+    for (int i = 0; i < count; ++i) {
+        const double u = 2 * std::numbers::pi * i / count;
+        mesh.positions.emplace_back(std::cos(u), std::sin(u), 0.3 * std::sin(7 * u));
+        mesh.triangles.push_back({0, 1, static_cast<Index>(2 + i)});
+    }
+    return mesh;
+}
+
+// One triangle several times, each with vertices of its own.
+Mesh repeated(int count) {
+    Mesh mesh;
+    for (int i = 0; i < count; ++i) {
+        const auto first = static_cast<Index>(mesh.positions.size());
+        mesh.positions.insert(mesh.positions.end(), {{0, 0, 0}, {1, 0, 0}, {0, 1, 0.5}});
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    return mesh;
+}
+
+// Triangles through each other, in a ball.
+Mesh crossing(int count) {
+    Mesh mesh;
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < 3 * count; ++i)
+        mesh.positions.push_back(glm::normalize(glm::dvec3(normal(random), normal(random), normal(random))));
+    for (Index i = 0; i < static_cast<Index>(count); ++i) mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    return mesh;
+}
+
+// Times that a picture's samples are drawn on average, and the picture.
+struct Drawn {
+    double layers;
+    StagePicture picture;
+};
+Drawn draw(const VertexTree& tree, std::span<const Triangle> triangles, std::size_t direction) {
+    const StageCamera camera = stage_camera(tree.bounding_sphere(), direction);
+    const TexturedLight untextured;
+    StageSurfaces surfaces;
+    StagePainter painter(tree, untextured, camera, surfaces);
+    auto pictures =
+        painter.draw<1>(triangles, [&](NodeId node) { return std::array<float, 1>{tree.luminance()[node]}; });
+    return {static_cast<double>(painter.drawn()) / (stage_samples * stage_samples), std::move(pictures[0])};
+}
+
+double largest_difference(const Raster& a, const Raster& b) {
+    double largest = 0;
+    for (std::size_t i = 0; i < a.values.size(); ++i)
+        largest = std::max(largest, static_cast<double>(std::abs(a.values[i] - b.values[i])));
+    return largest;
+}
+
+// Every picture shows the same in whichever order its triangles are drawn, and most of what is hidden is not drawn.
+TEST(StagePictures, DrawLittleOfWhatIsHidden) {
+    constexpr int count = 600;
+    for (const auto& [name, mesh, layers_at_most] : {std::tuple("pages", pages(count), 50.0),
+                                                     {"repeated", repeated(count), 8.0},
+                                                     {"crossing", crossing(count), 40.0}}) {
+        const VertexTree tree = support::built(mesh, {.prelit = true, .threads = 1});
+        std::vector<Triangle> triangles(support::sound(tree).triangles().begin(),
+                                        support::sound(tree).triangles().end());
+        for (Triangle& t : triangles)
+            for (Index& corner : t) corner += tree.interior_count();
+        for (const std::size_t direction : {0, 5, 12, 20}) {
+            const Drawn drawn = draw(tree, triangles, direction);
+            EXPECT_LT(drawn.layers, layers_at_most) << name << ", direction " << direction;
+            std::vector<Triangle> shuffled = triangles;
+            std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937_64(direction));
+            const Drawn again = draw(tree, shuffled, direction);
+            EXPECT_EQ(largest_difference(drawn.picture.cover, again.picture.cover), 0) << name;
+            EXPECT_LT(largest_difference(drawn.picture.light, again.picture.light), 0.1) << name;
+            EXPECT_NEAR(sum(drawn.picture.light), sum(again.picture.light), 1e-3 * sum(drawn.picture.light)) << name;
+        }
     }
 }
 

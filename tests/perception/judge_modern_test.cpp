@@ -338,7 +338,8 @@ TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
     EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
 }
 
-// Of small patches a viewer's table knows how well they are seen; of large ones so many times as well as by castle's law.
+// Of small patches a viewer's table knows how well they are seen; of large ones so many times as well as by castle's
+// law.
 TEST(JudgeModern, SumsOverSpaceAsTheViewerDoes) {
     const Gabor small{4, 0.005, 20, 0, 0, 1.5}, large{4, 0.002, 20, 0, 0, 12};
     const auto seen = [](const Gabor& g, double summation) {

@@ -1,5 +1,5 @@
 // What folds change under lights, against what is measured of a tree that these light.
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 
 #include <algorithm>
 #include <cmath>
@@ -90,8 +90,8 @@ TEST(LitFolds, AreHardlyEverLessThanWhatIsMeasuredUnderTheLight) {
     }
 }
 
-// Under several lights, from wherever they come, as many nodes folded. The measurement under the very light folds them in
-// another order, and the directions of the lights are few.
+// Under several lights, from wherever they come, as many nodes folded. The measurement under the very light folds them
+// in another order, and the directions of the lights are few.
 TEST(LitFolds, StagesAreHardlyEverLessThanThoseUnderTheLights) {
     const VertexTree tree = support::built(shapes::bumpy_sphere(4, 0.04));
     const auto folds = LitFolds::measure(tree);

@@ -1,6 +1,6 @@
-// Whole runs that must come to the same: the scene moved, scaled, turned or renumbered, the eye a bit aside, a view that stands
-// still, and a path that closes. Each run goes from a mesh to the cuts that the perceptual fold test makes along a path. The
-// entries of docs/numerics.md by these names say what may differ.
+// Whole runs that must come to the same: the scene moved, scaled, turned or renumbered, the eye a bit aside, a view
+// that stands still, and a path that closes. Each run goes from a mesh to the cuts that the perceptual fold test makes
+// along a path. The entries of docs/numerics.md by these names say what may differ.
 #include <algorithm>
 #include <cmath>
 #include <numeric>

@@ -194,7 +194,7 @@ TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
     const VertexTree tree = support::built(shapes::unwelded(shapes::random_soup(72000, 24000, 1)));
     const SoundTree sound = support::sound(tree);
     const LeafTriangles of_leaf(sound);
-    const BorderShifts shifts(sound, of_leaf);
+    BorderShifts shifts(sound, of_leaf);
     NodeId node = 1; // with most leaves, but for the root
     const auto leaves = [&](NodeId n) { return sound.leaf_end()[n] - sound.first_leaf()[n]; };
     for (NodeId other = 1; other < tree.interior_count(); ++other)

@@ -1,4 +1,5 @@
-// What holds of displays, sensitivity and judges whatever the numbers are. As many cases as tests/vdtree/properties_test.cpp says.
+// What holds of displays, sensitivity and judges whatever the numbers are. As many cases as
+// tests/vdtree/properties_test.cpp says.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -13,7 +14,7 @@
 #include "any_number.h"
 #include "fold/fold_classes.h"
 #include "judge/fast_math.h"
-#include "judge/masking.h"
+#include "judge/modern_masking.h"
 
 namespace unseen::perception {
 namespace {

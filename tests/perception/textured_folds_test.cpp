@@ -7,7 +7,7 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/tree_io.h>
 

@@ -1,5 +1,5 @@
 // What rings of textured trees can show in any cut.
-#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,6 @@
 // Behind what is translucent lies anything in the scene: a fold there may show as much as one on an outline.
 #include <unseen/perception/criterion.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <cmath>
 

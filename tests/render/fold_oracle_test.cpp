@@ -13,6 +13,7 @@
 #include <unseen/meshio/mesh_io.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/display.h>
+#include <unseen/perception/internal/cut_rings.h>
 #include <unseen/perception/judge.h>
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>

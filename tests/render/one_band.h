@@ -9,12 +9,13 @@
 
 #include <unseen/render/context.h>
 #include <unseen/render/internal/visibility_passes.h>
+#include <unseen/vdtree/internal/judge_tables.h>
 
 namespace unseen::render::testing {
 
 // One band, one pixel's window, S = 8 everywhere: V = sqrt 2 times the difference in thresholds.
-inline VisibilityTables tables(int width, int height) {
-    VisibilityTables t;
+inline JudgeTables tables(int width, int height) {
+    JudgeTables t;
     t.width = width, t.height = height;
     t.floor_cdm2 = 0.5f;
     t.beta = 2, t.most_thresholds = 1e8f;
@@ -23,7 +24,7 @@ inline VisibilityTables tables(int width, int height) {
     t.luminance_shift = 19, t.first_luminance = 0;
     t.luminances = 2, t.eccentricities = 1;
     t.eccentricity_step = 2;
-    VisibilityTables::Band band;
+    JudgeTables::Band band;
     band.window = {{{0.5f, 0, {1}}, {0.25f, 0, {1}}, {0.25f, 0, {1}}}};
     band.nodes = {{3, 1, 0}, {3, 1, 0}};
     t.bands = {band};

@@ -11,8 +11,8 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/lit_folds.h>
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
 

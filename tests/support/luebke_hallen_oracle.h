@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/person.h>
+#include <unseen/perception/csf.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 

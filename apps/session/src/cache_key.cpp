@@ -15,7 +15,7 @@
 #include <xxhash.h>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/names.h>
 

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <utility>
 
-#include <unseen/perception/chroma.h>
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/chroma.h>
+#include <unseen/perception/internal/motion.h>
 #include <unseen/vdtree/internal/errors.h>
 
 #include "fold_test.h"

@@ -1,4 +1,4 @@
-#include <unseen/perception/chroma.h>
+#include <unseen/perception/internal/chroma.h>
 
 #include "effects.h"
 
@@ -7,7 +7,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/number_format.h>

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/session/load.h>
 #include <unseen/session/scene.h>
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <queue>
 
+#include <unseen/perception/internal/ssim_window.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/ssim_window.h>
 #include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {

@@ -10,7 +10,7 @@
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/gaze.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 #include <unseen/session/follower.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/errors.h>

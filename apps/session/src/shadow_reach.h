@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include <unseen/perception/shadow_edges.h>
+#include <unseen/perception/internal/shadow_edges.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/session.h>
 #include <unseen/vdtree/criteria.h>

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/cut_rings.h>
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/cut_rings.h>
+#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/session/observer.h>
 #include <unseen/session/scene.h>
 #include <unseen/session/session.h>

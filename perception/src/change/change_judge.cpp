@@ -1,5 +1,5 @@
 // The judge of changes: what lasts by the Judge, and the flicker of the moment by elaTCSF over the whole field.
-#include <unseen/perception/change.h>
+#include <unseen/perception/internal/change.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // elaTCSF. Its response over time is the difference of two cascades of equal low-pass stages, whose response to a step
 // has a closed form. How fast time runs follows from luminance and eccentricity.
-#include <unseen/perception/change.h>
+#include <unseen/perception/internal/change.h>
 
 #include <algorithm>
 #include <array>

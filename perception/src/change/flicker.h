@@ -17,7 +17,8 @@ inline constexpr std::array flicker_blurs = {FlickerBlur{0.561601, 2.803293}, Fl
                                              FlickerBlur{0.12902, 23.132176}};
 
 // Sensitivity is flicker_scale() times the response of the filter, whose time runs flicker_speed() times as fast as in
-// the fovea at the luminance where that is 1. (elaTCSF also shifts frequencies aside, by up to 3 Hz, for flicker alone.)
+// the fovea at the luminance where that is 1. (elaTCSF also shifts frequencies aside, by up to 3 Hz, for flicker
+// alone.)
 double flicker_scale(double eccentricity_deg, double cdm2);
 double flicker_speed(double eccentricity_deg, double cdm2);
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 
 #include "csf/csf_model.h"
 

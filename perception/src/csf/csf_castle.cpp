@@ -231,21 +231,4 @@ Luminance castle_transient_kink() {
     return Luminance(std::pow(10.0, (omega0_floor_hz - k.omega0_at_1_cdm2) / k.omega0_per_decade));
 }
 
-// ---- all three directions -------------------------------------------------------------------------------------------
-
-OpponentContrast opponent_contrast(const glm::dvec3& background, const glm::dvec3& delta) {
-    // Wuerger, Ashraf, Kim, Martinovic, Perez-Ortiz, Mantiuk 2020: L + M, L - 2.3112 M, 50.9875 S - (L + M). All are
-    // taken relative to the background's luminance.
-    const double luminance = background.x + background.y;
-    if (!(luminance > 0)) return {nan, nan, nan};
-    return {std::abs(delta.x + delta.y) / luminance, std::abs(delta.x - 2.3112 * delta.y) / luminance,
-            std::abs(50.9875 * delta.z - delta.x - delta.y) / luminance};
-}
-
-double castle_visibility(const OpponentContrast& contrast, const Stimulus& stimulus) {
-    return std::hypot(contrast.luminance * sensitivity(CsfModel::castle, stimulus),
-                      contrast.red_green * sensitivity(CsfModel::castle_red_green, stimulus),
-                      contrast.yellow_violet * sensitivity(CsfModel::castle_yellow_violet, stimulus));
-}
-
 } // namespace unseen::perception

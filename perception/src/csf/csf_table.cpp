@@ -9,7 +9,7 @@
 #include <limits>
 
 #include <unseen/perception/csf.h>
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 
 #include "csf/csf_model.h"
 #include <unseen/vdtree/internal/number_text.h>

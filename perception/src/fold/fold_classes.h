@@ -10,8 +10,8 @@
 
 #include <glm/common.hpp>
 
-#include <unseen/perception/chroma.h>
 #include <unseen/perception/display.h>
+#include <unseen/perception/internal/chroma.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/luminance_classes.h"

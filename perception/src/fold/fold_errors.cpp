@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "fold/fold_factors.h"
 #include "fold/pooling.h"
 #include "measure/measurement.h"
 #include "measure/pyramid.h"
@@ -20,20 +21,20 @@ using Amplitudes = decltype(FoldRecord::amplitudes);
 
 // What waves see of a patch, `waves` of theirs wide, of one grating's amplitude: of patches side by side, and of its
 // parts half as wide, four times the amplitude.
-float share_in_wave(float waves, int most_side_by_side) {
-    return waves >= 1 ? std::exp2(2 * std::floor(std::log2(waves))) : share_of_patches(waves, most_side_by_side);
+float share_in_wave(float waves) {
+    return waves >= 1 ? std::exp2(2 * std::floor(std::log2(waves)))
+                      : share_of_patches(waves, factors::most_side_by_side);
 }
 
 struct BandShares {
     Amplitudes of_wave; // by picture and band
 
-    explicit BandShares(int most_side_by_side) {
+    BandShares() {
         for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
             for (std::size_t band = 0; band < measurement::picture_bands; ++band)
                 of_wave[size][band] =
                     share_in_wave(measurement::picture_side * static_cast<float>(nominal_frequency(band)) /
-                                      measurement::picture_sizes[size],
-                                  most_side_by_side);
+                                  measurement::picture_sizes[size]);
     }
 };
 
@@ -67,35 +68,31 @@ Error refused(const std::string& what) {
 std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const FoldRecord> records,
                                      std::span<const FoldFacing> facing, std::span<const FoldTexture> textures,
                                      const FoldModel& model) {
-    const BandShares shares(model.most_side_by_side);
-    // Errors are floats, and so are the factors of them.
-    const auto peak_of_shift = static_cast<float>(model.peak_of_shift),
-               moved_by_neighbours = static_cast<float>(model.moved_by_neighbours),
-               amplitude_of_point_mean = static_cast<float>(model.amplitude_of_point_mean),
-               longest_ring = static_cast<float>(model.longest_ring),
-               contact_reach = static_cast<float>(model.contact_reach),
-               least_sine = static_cast<float>(model.least_sine),
-               contrast_of_textures = static_cast<float>(model.contrast_of_textures);
+    const BandShares shares;
+    const auto contact_reach = static_cast<float>(model.contact_reach),
+               least_sine = static_cast<float>(model.least_sine);
     std::vector<FoldError> errors(records.size());
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         const FoldRecord& record = records[node];
         FoldError& error = errors[node]; // it has the children's distance, extent and directions
         const float ring = tree.bounds()[node].ring.radius,
                     width = std::max(tree.support_spheres()[node].radius, record.extent);
-        const float shift = peak_of_shift * record.shift, moved_point = moved_by_neighbours * record.farthest;
+        const float shift = factors::peak_of_shift * record.shift,
+                    moved_point = factors::moved_by_neighbours * record.farthest;
         error.mean_distance = record.mean_distance;
         find_luminance(record, shares, error);
-        const bool is_shown = facing[node].is_height_field != 0 && ring <= longest_ring * width;
+        const bool is_shown = facing[node].is_height_field != 0 && ring <= factors::longest_ring * width;
         if (is_shown) {
             error.distance = std::max({error.distance, shift, record.mean_distance});
         } else { // something may be under what was drawn, or beside it
             error.distance = std::max({error.distance, shift, moved_point});
             error.luminance = std::max(error.luminance, record.largest_luminance);
-            error.wide_luminance = std::max(error.wide_luminance, amplitude_of_point_mean * record.mean_luminance);
+            error.wide_luminance =
+                std::max(error.wide_luminance, factors::amplitude_of_point_mean * record.mean_luminance);
         }
         if (!textures.empty()) {
             find_texture(textures[node], tree.ring_luminance()[node], error);
-            error.luminance *= contrast_of_textures, error.wide_luminance *= contrast_of_textures;
+            error.luminance *= factors::contrast_of_textures, error.wide_luminance *= factors::contrast_of_textures;
         }
         error.extent = std::max(error.extent, record.extent);
         error.outline = std::max(error.outline, record.border);

@@ -1,11 +1,12 @@
-// What folding a node gets wrong, by the model (<unseen/perception/fold_model.h>), of what was measured of it (measure/fold_record.h).
+// What folding a node gets wrong, by the model (<unseen/perception/criterion.h>), of what was measured of it
+// (measure/fold_record.h).
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include <unseen/perception/fold_model.h>
+#include <unseen/perception/criterion.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/fold_record.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/person.h>
+#include <unseen/perception/csf.h>
 
 namespace unseen::perception {
 
@@ -64,8 +64,8 @@ struct Screen {
         pixel_deg = 1 / coarsest_pixels_per_degree(options.display).value();
         highest_cpd = nyquist(finest_pixels_per_degree(options.display)).value();
         pitch_over_distance = options.display.pixel_pitch.value() / options.display.distance.value();
-        // From the axis to the farthest corner of the window, or to the gaze if that is farther. The viewer's eye is before
-        // the point of the screen where the line of sight meets it.
+        // From the axis to the farthest corner of the window, or to the gaze if that is farther. The viewer's eye is
+        // before the point of the screen where the line of sight meets it.
         const double aspect = static_cast<double>(view.width) / view.height;
         double farthest = tan_camera * std::hypot(aspect * (1 + std::abs(view.shift.x)), 1 + std::abs(view.shift.y));
         if (options.gaze_px) {

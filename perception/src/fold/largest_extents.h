@@ -11,8 +11,8 @@
 namespace unseen::perception {
 
 // In degrees on the screen; infinite where the row shows nothing at any extent. Smaller is what comes first: bins in
-// ascending eccentricity. `Visibility`: of a grating, by its frequency in cpd and its eccentricity in degrees; 1 is just
-// visible. It must not grow with either.
+// ascending eccentricity. `Visibility`: of a grating, by its frequency in cpd and its eccentricity in degrees; 1 is
+// just visible. It must not grow with either.
 template <class Visibility>
 class LargestExtents {
 public:

@@ -13,6 +13,7 @@
 
 #include "fold/fold_screen.h"
 #include "fold/largest_extents.h"
+#include "fold/luminance_classes.h"
 #include "fold/safe_rings.h"
 
 namespace unseen::perception {
@@ -21,12 +22,6 @@ namespace {
 
 using vdtree::ContrastClasses;
 using vdtree::DistanceCriterion;
-
-// In cd/m2.
-vdtree::AbsoluteScale scale_of(const Display& display) {
-    const double black = black_level(display).value();
-    return {.offset = black, .span = to_luminance(display, 1).value() - black};
-}
 
 // The largest extents of a class, by eccentricity.
 void find_extents(double contrast, double luminance_cdm2, const Screen& screen, const CsfTable& csf,
@@ -99,7 +94,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, Distanc
                                          std::shared_ptr<const vdtree::LightBounds> bounds, const CsfTable& csf,
                                          const vdtree::View& view, const FoldTestOptions& options) {
     const Screen screen(view, options);
-    const vdtree::AbsoluteScale scale = scale_of(options.display);
+    const vdtree::AbsoluteScale scale = LuminanceClasses(options.display).scale();
     const ContrastClasses classes(scale);
     const SceneLuminance scene = options.scene;
     parts.spheres = DistanceCriterion::Spheres::ring;

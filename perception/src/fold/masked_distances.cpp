@@ -1,6 +1,7 @@
-// The test by errors under a scene's masking. Nodes differ in what masks them, and a table of switch distances holds for
-// one such way. So a few ways are chosen that most nodes are masked by at least; for each there is a table, and each node
-// goes by one that masks no more than what it has. What comes out is the unmasked criterion with shorter lengths.
+// The test by errors under a scene's masking. Nodes differ in what masks them, and a table of switch distances holds
+// for one such way. So a few ways are chosen that most nodes are masked by at least; for each there is a table, and
+// each node goes by one that masks no more than what it has. What comes out is the unmasked criterion with shorter
+// lengths.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,7 +25,8 @@ using vdtree::NodeId;
 constexpr std::size_t most_bands = 16;
 // Elevations are rounded down to quarters of octaves, and up to eight: what is masked by more is rare.
 constexpr int steps_per_octave = 4, most_steps = 12;
-// Ways of being masked that a criterion knows, that of not being masked included. Eight have nearly all that more would.
+// Ways of being masked that a criterion knows, that of not being masked included. Eight have nearly all that more
+// would.
 constexpr std::size_t most_ways = 8;
 // The ways that these are chosen from: the most frequent ones.
 constexpr std::size_t most_candidates = 256;
@@ -84,8 +86,8 @@ std::vector<Way> choose_ways(std::span<const Way> of_nodes) {
     return chosen;
 }
 
-// By node, the one of the chosen that masks the most of what the node has, and no less than its parent's: so costs do not
-// fall towards the root.
+// By node, the one of the chosen that masks the most of what the node has, and no less than its parent's: so costs do
+// not fall towards the root.
 std::vector<std::uint8_t> assign_ways(std::span<const Way> of_nodes, std::span<const Way> chosen,
                                       std::span<const NodeId> parents) {
     std::vector<std::uint8_t> assigned(of_nodes.size(), 0);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 namespace unseen::perception {
 

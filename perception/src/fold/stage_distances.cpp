@@ -9,7 +9,8 @@
 #include <limits>
 #include <numbers>
 
-#include "judge/masking.h"
+#include "fold/fold_factors.h"
+#include "judge/modern_masking.h"
 
 namespace unseen::perception {
 
@@ -115,7 +116,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
     // On darker displays contrasts are larger than those of the pictures.
     const double least = std::max(black / span, 1.0 / 4096);
     const double contrast_factor =
-        std::max(1.0, static_cast<double>(FoldStage::black) / least) * options.model.between_directions;
+        std::max(1.0, static_cast<double>(FoldStage::black) / least) * factors::between_directions;
     const CsfTable& csf = csf_of(options);
     const double diameter = 2 * static_cast<double>(tree.bounding_sphere().radius);
 

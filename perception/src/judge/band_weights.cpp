@@ -29,8 +29,8 @@ constexpr double least_beta = 1, largest_beta = 8; // beyond, powers of what is 
 // frequency.
 constexpr int fraction_bits = BandTable::fraction_bits;
 
-// Where own and smoothed are fitted, in units of the band's nominal frequency. Band 0 has no band above it; it is fitted
-// on the way down to band 1, where it answers alone.
+// Where own and smoothed are fitted, in units of the band's nominal frequency. Band 0 has no band above it; it is
+// fitted on the way down to band 1, where it answers alone.
 constexpr std::array fit_ratios = {0.5, 1 / std::numbers::sqrt2, 1.0, std::numbers::sqrt2};
 constexpr std::array first_band_fit_ratios = {0.4, 0.55, 0.7, 0.85, 1.0};
 constexpr double largest_weight = 1e6; // of a band that is blind to its nominal frequency
@@ -71,7 +71,7 @@ double answer(const BandConditions& c, double freq_cpd, int level, Orientation o
            band_response(nominal_frequency(c.ppd, level), c.ppd, level, Orientation::axis);
 }
 
-// ---- sensitivity at the nodes of a table -------------------------------------------------------------------------------
+// ---- sensitivity at the nodes of a table --------------------------------------------------------------------------
 
 int luminance_cell(float luminance) {
     return static_cast<int>(std::bit_cast<std::uint32_t>(luminance) >> fraction_bits);
@@ -102,7 +102,7 @@ std::vector<double> sensitivities(const BandConditions& c, double freq_cpd, cons
     return all;
 }
 
-// ---- the fit of a band's weights ---------------------------------------------------------------------------------------
+// ---- the fit of a band's weights ----------------------------------------------------------------------------------
 
 // One grating, and what the fit knows of it before it knows S.
 struct FitPoint {
@@ -135,8 +135,8 @@ std::vector<FitPoint> fit_points(const BandConditions& c, int level, std::span<c
 struct Fitted {
     double own = 0, smoothed = 0;
 };
-// Least squares of weight (scale (own + smoothed smooth) / s - 1)^2. s is the sensitivity by frequency, over that to the
-// nominal one, which is `of_nominal`. What no contrast makes visible, S being below 1, counts for less and less.
+// Least squares of weight (scale (own + smoothed smooth) / s - 1)^2. s is the sensitivity by frequency, over that to
+// the nominal one, which is `of_nominal`. What no contrast makes visible, S being below 1, counts for less and less.
 Fitted fit(std::span<const FitPoint> points, std::span<const double> s, double of_nominal) {
     double xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0;
     for (const FitPoint& p : points) {
@@ -297,7 +297,7 @@ namespace {
 // Calls `use(row, degrees)` for each row of a window.
 template <class Use>
 void for_each_row_of_eccentricities(const GazeOnScreen& gaze, int width, int height, Use use) {
-    const auto [gaze_x, gaze_y, gaze_z] = gaze.direction;
+    const float gaze_x = gaze.direction.x, gaze_y = gaze.direction.y, gaze_z = gaze.direction.z;
     std::vector<float> xs, degrees(static_cast<std::size_t>(width));
     for (int x = 0; x < width; ++x) xs.push_back(static_cast<float>(gaze.tangent(x + 0.5, width)));
     constexpr auto per_radian = static_cast<float>(180 / std::numbers::pi);

@@ -1,8 +1,8 @@
 // What the judge knows of the bands of a Laplacian pyramid: how they answer to gratings, how well an eye sees them by
 // luminance and eccentricity, and which eccentricity is where in a picture.
 //
-// - A band's gain is below 1 (and below the gain for other frequencies). Contrasts are divided by the band's response to
-//   a grating of its nominal frequency, which follows from the kernel.
+// - A band's gain is below 1 (and below the gain for other frequencies). Contrasts are divided by the band's response
+//   to a grating of its nominal frequency, which follows from the kernel.
 // - Bands are an octave and more wide, and S changes within one: at 10 degrees it halves between 5.5 and 8 cpd. One
 //   number per band is then wrong by up to 5 dB between the nominal frequencies. So each band's contrast C passes a
 //   3 x 3 binomial filter h and counts as own C + smoothed (h*C): tilted along the slope of S.
@@ -19,8 +19,8 @@
 
 #include <unseen/perception/csf.h>
 #include <unseen/perception/image.h>
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/judge_tables.h>
 #include <unseen/vdtree/result.h>
 
 #include "judge/plane.h"

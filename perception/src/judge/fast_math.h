@@ -1,5 +1,5 @@
-// Functions of float that loops over samples run as vectors, since they neither branch nor set errno. Each is within 4e-7
-// of its result, or of 1 where the result is a logarithm or an angle.
+// Functions of float that loops over samples run as vectors, since they neither branch nor set errno. Each is within
+// 4e-7 of its result, or of 1 where the result is a logarithm or an angle.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // The modern judge: a decimated Laplacian pyramid of the reference and of the difference, each band weighted by the
-// sensitivity to unlimited gratings (judge/band_weights.h) and masked by the reference. How much there is of one decides
-// how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of area
-// (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The bands
-// are pooled.
+// sensitivity to unlimited gratings (judge/band_weights.h) and masked by the reference. How much there is of one
+// decides how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of
+// area (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The
+// bands are pooled.
 #include <unseen/perception/judge.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 #include "judge/band_weights.h"
 #include "judge/fast_math.h"
 #include "judge/judge_input.h"
-#include "judge/masking.h"
+#include "judge/modern_masking.h"
 #include "judge/summation.h"
 #include "pyramid_kernel.h"
 

@@ -2,8 +2,8 @@
 // for comparison with older results. Three of its faults are kept on purpose, since without them it would be another
 // judge: the field in degrees, not the pixels of a degree, chooses the adaptation level; its "pyramid" blurs at full
 // resolution, so the bands are no octaves; with `masked_by_both` the error masks itself.
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/judge_tables.h>
 
 #include <algorithm>
 #include <array>

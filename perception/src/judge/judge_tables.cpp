@@ -1,10 +1,10 @@
-#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/internal/judge_tables.h>
 
 #include <cmath>
 
 #include "judge/band_weights.h"
 #include "judge/judge_input.h"
-#include "judge/masking.h"
+#include "judge/modern_masking.h"
 #include "judge/summation.h"
 #include "pyramid_kernel.h"
 
@@ -37,9 +37,9 @@ Result<JudgeTables> judge_tables(int width, int height, float darkest_cdm2, floa
         tables.first_eccentricity = band.first_eccentricity();
         tables.luminances = static_cast<int>(band.luminances());
         tables.eccentricities = static_cast<int>(band.eccentricities());
-        tables.bands.push_back(
-            {CyclesPerDegree(nominal_frequency(conditions.ppd, level)), static_cast<float>(band.of_patch()),
-             SummationWindow(summation_area_in_samples(conditions, level)).gaussians(), band.nodes()});
+        tables.bands.push_back({nominal_frequency(conditions.ppd, level), static_cast<float>(band.of_patch()),
+                                SummationWindow(summation_area_in_samples(conditions, level)).gaussians(),
+                                band.nodes()});
     }
     return tables;
 }

@@ -1,5 +1,5 @@
+#include <unseen/perception/internal/ssim_window.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/ssim_window.h>
 
 #include <array>
 #include <cmath>

@@ -1,7 +1,7 @@
 // Summation over space: how much of what is around a place helps to see it.
 //
-// castleCSF's law of area says that a patch of area A is seen sqrt(A / (A + Ac)) times as well as an unlimited one. This
-// law follows where energies, squares of contrasts in thresholds, are summed with the weight
+// castleCSF's law of area says that a patch of area A is seen sqrt(A / (A + Ac)) times as well as an unlimited one.
+// This law follows where energies, squares of contrasts in thresholds, are summed with the weight
 //   w(r) = Ac / (Ac + pi r^2)^2
 // at the distance r: a disc of area A holds A / (A + Ac) of it, and all of the plane holds 1.
 #pragma once
@@ -9,14 +9,15 @@
 #include <array>
 #include <vector>
 
-#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/internal/judge_tables.h>
 
 #include "judge/plane.h"
 
 namespace unseen::perception {
 
-// The window w as a sum of Gaussians: w(r) is the integral of t e^-t e^(-t pi r^2 / Ac) over t > 0, of which three points
-// are taken (Gauss and Laguerre). Of discs of up to twice Ac it holds what w does within 9%, at its middle exactly.
+// The window w as a sum of Gaussians: w(r) is the integral of t e^-t e^(-t pi r^2 / Ac) over t > 0, of which three
+// points are taken (Gauss and Laguerre). Of discs of up to twice Ac it holds what w does within 9%, at its middle
+// exactly.
 class SummationWindow {
 public:
     // Ac in samples; above 0.

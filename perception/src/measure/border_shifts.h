@@ -1,6 +1,7 @@
 // By how far folds move the border of an open surface.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -21,10 +22,11 @@ public:
     // neighbour folded, and with those that `stand_in` gives for leaves outside of the support. And how far triangles
     // that turn over reach beyond the border, in any state of the neighbours that are no larger than the node.
     // `crossing`: triangles with a corner in the support, among them all with one outside. 0 where the node is nowhere
-    // near a border. Threads may ask at once. Cost: some products for each edge of the border below the node, as long as
-    // the mesh's parts do not lie through each other; at most some hundreds, after which the answer errs upwards.
+    // near a border. Ask about the children before; threads may ask about different nodes at once. Cost: some products
+    // for each edge of the border below the node, as long as the mesh's parts do not lie through each other; at most some
+    // hundreds, after which the answer errs upwards.
     float shift(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
-                const FunctionRef<vdtree::NodeId(vdtree::Index leaf)>& stand_in) const;
+                const FunctionRef<vdtree::NodeId(vdtree::Index leaf)>& stand_in);
 
 private:
     struct Scratch {
@@ -61,6 +63,7 @@ private:
     std::span<const vdtree::NodeId> parents_;
     std::span<const vdtree::Triangle> triangles_;
     std::span<const vdtree::Sphere> support_;
+    std::vector<std::uint8_t> gave_up_; // by interior node: there was too much to be looked at, or below
 };
 
 } // namespace unseen::perception

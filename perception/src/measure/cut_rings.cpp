@@ -1,6 +1,6 @@
 // Bounds the rings of all cuts: from every triangle corner up the tree, and along each edge up the tree on both sides
 // at once.
-#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <algorithm>
 #include <cmath>

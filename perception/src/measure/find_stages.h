@@ -15,9 +15,9 @@
 namespace unseen::perception {
 
 // Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no
-// extent. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that. Cost: some hundred
-// pictures of up to half of the triangles; in parallel. Goes on to all of what is to be done; where that says to stop,
-// the answer is of no use.
+// extent. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that. Cost: some
+// hundred pictures of up to half of the triangles; in parallel. Goes on to all of what is to be done; where that says
+// to stop, the answer is of no use.
 std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, const TexturedLight& light,
                                    std::span<const FoldTexture> textures, std::span<FoldError> errors,
                                    MeasuringProgress& progress);

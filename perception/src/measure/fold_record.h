@@ -69,8 +69,8 @@ inline constexpr float most_texture_contrast = 8;
 struct FoldTexture {
     using Component = float;
 
-    // Contrasts of gratings over the local mean, by how many octaves their waves are narrower than what changes is wide;
-    // narrower ones count as the last.
+    // Contrasts of gratings over the local mean, by how many octaves their waves are narrower than what changes is
+    // wide; narrower ones count as the last.
     float contrast[texture_octaves] = {};
     float mean = 0;  // of the texture's luminance on the mesh around the node, 0..1
     float slide = 0; // of the texture over the surface, in the mean over some cells: as a share of the width, 0..1

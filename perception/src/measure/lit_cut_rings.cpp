@@ -1,5 +1,5 @@
 // The vertices of all cuts' rings, one by one: bound_cut_rings() has their luminances' ranges, which lights change.
-#include <unseen/perception/cut_rings.h>
+#include <unseen/perception/internal/cut_rings.h>
 
 #include <vector>
 
@@ -16,8 +16,8 @@ using namespace vdtree;
 namespace {
 
 // Trees are some tens of nodes deep, and chains of so many nodes that are no larger than those of another have some
-// hundreds of pairs. Where there are more, as in made-up trees, whatever is above counts as reaching everywhere, so that
-// no tree costs the square of its depth.
+// hundreds of pairs. Where there are more, as in made-up trees, whatever is above counts as reaching everywhere, so
+// that no tree costs the square of its depth.
 constexpr std::size_t most_added = 4096;
 
 class ChainWalker {

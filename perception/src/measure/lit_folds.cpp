@@ -1,5 +1,5 @@
 // Luminances in the pictures are (2 + a n_k) / 4: what measures them takes them for positive.
-#include <unseen/perception/lit_folds.h>
+#include <unseen/perception/internal/lit_folds.h>
 
 #include <algorithm>
 #include <array>
@@ -31,9 +31,9 @@ using namespace vdtree;
 namespace {
 
 constexpr float offset = 2, scale = 4; // of luminances in the pictures of a n
-// Within a ring of the angular radius x, seen from a light, its light is a quadratic of the place but for less than this
-// times x^2, as a share: 1/8 of the square of the ring's diameter times the second derivatives of 1 / d^2 and of the
-// direction, 6 / d^2 and 1 / d^2, rounded up.
+// Within a ring of the angular radius x, seen from a light, its light is a quadratic of the place but for less than
+// this times x^2, as a share: 1/8 of the square of the ring's diameter times the second derivatives of 1 / d^2 and of
+// the direction, 6 / d^2 and 1 / d^2, rounded up.
 constexpr float falloff_curvature = 4;
 constexpr float least_lit = 1e-5f; // what is less lit is dark: below a step of stored luminances
 

@@ -16,16 +16,17 @@ struct Illumination {
 };
 
 // Pictures are taken under single lights, from before the mesh as it is seen, from aside and from behind, in turn all
-// around it, and of these with several shares of ambient light. Kept is the largest contrast of any of the lights, for each
-// share.
+// around it, and of these with several shares of ambient light. Kept is the largest contrast of any of the lights, for
+// each share.
 //
-// That serves all other lights, too. Let a mesh's picture be m and a change of it d, both of a light alone. Under several
-// lights the contrast is sum d / sum m, which is no more than the largest d / m of one of the lights with its part of the
-// ambient light. And with a share of ambient light between two of these here, or with the mesh partly in shadow, a
-// contrast is no more than the larger one of the two: d and m are linear in the share. That is so of each place. What
-// masks a change there is taken from the picture of the single light: a measurement, as all of the stages.
+// That serves all other lights, too. Let a mesh's picture be m and a change of it d, both of a light alone. Under
+// several lights the contrast is sum d / sum m, which is no more than the largest d / m of one of the lights with its
+// part of the ambient light. And with a share of ambient light between two of these here, or with the mesh partly in
+// shadow, a contrast is no more than the larger one of the two: d and m are linear in the share. That is so of each
+// place. What masks a change there is taken from the picture of the single light: a measurement, as all of the stages.
 struct LitStages {
-    // Of what white that faces the light has of it, which is 1 in the pictures. Ascending; the last one: no other light.
+    // Of what white that faces the light has of it, which is 1 in the pictures. Ascending; the last one: no other
+    // light.
     static constexpr std::array<float, 5> ambient_shares = {0, 0.1f, 0.2f, 0.4f, 1};
     static constexpr std::size_t lights = 3; // of a direction
     // What FoldStage::backgrounds are shares of, for a mesh in the shade may stand before what is not.

@@ -116,8 +116,8 @@ private:
         const float vertices = (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
         return of_texture_.with_texture(vertices, mean_texture_) * mesh_.vector_area(t);
     }
-    // No more light comes and goes with a texture than lies where it slides to; what is measured of it above that is what
-    // means over parts of triangles are wrong by.
+    // No more light comes and goes with a texture than lies where it slides to; what is measured of it above that is
+    // what means over parts of triangles are wrong by.
     glm::vec3 from_slide(NodeId node, const glm::vec3& measured, float area) const {
         constexpr float perimeter = 2; // of a disc, over its area, in radii
         const LuminanceRange drawn = tree_.ring_luminance()[node];

@@ -30,10 +30,11 @@ struct MeasuredShadings {
     LitStages stages; // none where measure_folds() finds none
 };
 
-// As measure_folds(), but for shifts of the mean, for several luminances at once: first along each axis what light from there makes of the vertices,
-// then their albedo where they differ. Which neighbours are folded with a node is the same for all, so they share what is
-// measured of lengths, and where surfaces touch. Precondition: three or four of them; of a textured tree four. `dark`: by
-// shading, what it is where a texture is black. `to_light`: from the shadings' luminances to those under a light.
+// As measure_folds(), but for shifts of the mean, for several luminances at once: first along each axis what light from
+// there makes of the vertices, then their albedo where they differ. Which neighbours are folded with a node is the same
+// for all, so they share what is measured of lengths, and where surfaces touch. Precondition: three or four of them; of
+// a textured tree four. `dark`: by shading, what it is where a texture is black. `to_light`: from the shadings'
+// luminances to those under a light.
 Result<MeasuredShadings> measure_shadings(const vdtree::VertexTree& tree, std::span<const Shading> shadings,
                                           std::span<const float> dark, float to_light, int threads,
                                           const Progress& progress);

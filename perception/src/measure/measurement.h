@@ -1,5 +1,6 @@
 // How folds are measured: what decides how fine and how dear a measurement is. The numbers are kept with it, and a
-// criterion refuses those of a measurement with others. Factors that a criterion applies stand in perception/fold_model.h.
+// criterion refuses those of a measurement with others. Factors that a criterion applies stand in
+// perception/criterion.h.
 //
 // Where a comment does not say otherwise, a number was chosen by trial: larger ones cost more and changed little on the
 // meshes of the tests. None was fitted, and there is no script that finds them again.
@@ -30,9 +31,9 @@ inline constexpr int most_steps = 1024;
 inline constexpr std::size_t most_stand_ins = 16; // nodes, each above the last, that may stand for a leaf
 inline constexpr std::size_t most_border_ends =
     4096; // of edges of the mesh's own border; of more, these at equal steps
-// Looks at the own border for one node: so many, and so many for each of its edges there and each triangle around it.
-// Twice what any mesh took whose parts do not lie through each other; after them, shifts are taken as too large. Not
-// kept with a measurement: no mesh for use comes there.
+// Looks at the mesh's own border for one node: this many, and this many for each of its edges there and each triangle
+// around it. Twice what any mesh took whose parts do not lie through each other. After them shifts are taken as too
+// large, for the nodes above, too, which would look at the same. Not kept with a measurement.
 inline constexpr std::size_t most_border_looks = 1u << 16;
 inline constexpr std::size_t border_looks_an_edge = 256;
 

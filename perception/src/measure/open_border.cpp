@@ -1,6 +1,7 @@
 #include "measure/open_border.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -11,84 +12,109 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
+namespace {
+
+// Nodes that may touch a border. The tree does not say so for nodes of coincident vertices alone, whose merging moves
+// nothing: they are like the node above them.
+std::vector<bool> nodes_near_border(const SoundTree& tree) {
+    std::vector<bool> is_near(tree.interior_count());
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        const bool is_point = node > 0 && tree.support_spheres()[node].radius == 0;
+        is_near[node] = (tree.bounds()[node].flags & irregular_ring) || (is_point && is_near[tree.parents()[node]]);
+    }
+    return is_near;
+}
+
+// Leaves at one position are one place, named after the first of them.
+struct Places {
+    std::vector<Index> leaves; // those at the same place side by side
+    std::vector<Index> of;     // by leaf
+
+    explicit Places(std::span<const glm::vec3> positions) : leaves(positions.size()), of(positions.size()) {
+        std::iota(leaves.begin(), leaves.end(), Index{0});
+        std::sort(leaves.begin(), leaves.end(), [&](Index a, Index b) {
+            const glm::vec3 &p = positions[a], &q = positions[b];
+            if (p.x != q.x) return p.x < q.x;
+            if (p.y != q.y) return p.y < q.y;
+            return p.z != q.z ? p.z < q.z : a < b;
+        });
+        for (std::size_t i = 0; i < leaves.size(); ++i) {
+            const bool is_first = i == 0 || positions[leaves[i - 1]] != positions[leaves[i]];
+            of[leaves[i]] = is_first ? leaves[i] : of[leaves[i - 1]];
+        }
+    }
+};
+
+// An edge from a place.
+struct Edge {
+    Index to, opposite; // places: the other end, and the triangle's third corner
+    Index triangle;
+    unsigned number; // of the triangle's edges
+};
+
+void add_edges(Index from, Index triangle, const std::array<Index, 3>& at, std::vector<Edge>& edges) {
+    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) return;
+    for (unsigned k = 0; k < 3; ++k) {
+        const unsigned next = (k + 1) % 3;
+        if (at[k] == from) edges.push_back({at[next], at[(k + 2) % 3], triangle, k});
+        if (at[next] == from) edges.push_back({at[k], at[(k + 2) % 3], triangle, k});
+    }
+}
+
+// Marks those of an odd number of triangles; triangles with the same corners are one.
+void mark_odd(std::vector<Edge>& edges, std::vector<std::uint8_t>& edges_of) {
+    std::sort(edges.begin(), edges.end(),
+              [](const Edge& a, const Edge& b) { return a.to != b.to ? a.to < b.to : a.opposite < b.opposite; });
+    for (std::size_t begin = 0, next = 0; begin < edges.size(); begin = next) {
+        bool is_odd = false;
+        for (; next < edges.size() && edges[next].to == edges[begin].to; ++next)
+            if (next == begin || edges[next].opposite != edges[next - 1].opposite) is_odd = !is_odd;
+        for (std::size_t k = begin; k < next && is_odd; ++k)
+            edges_of[edges[k].triangle] |= static_cast<std::uint8_t>(1u << edges[k].number);
+    }
+}
+
+} // namespace
+
 OpenBorder::OpenBorder(const SoundTree& tree, const LeafTriangles& of_leaf) {
-    if (tree.bounds()[VertexTree::root()].flags & irregular_ring) find_edges(tree, of_leaf);
+    if (!(tree.bounds()[VertexTree::root()].flags & irregular_ring)) return;
+    find_edges(tree, of_leaf);
+    collect_ends(tree);
+    if (ends_.empty()) edges_of_ = {};
 }
 
 void OpenBorder::find_edges(const SoundTree& tree, const LeafTriangles& of_leaf) {
     const NodeId interior = tree.interior_count();
-    const std::span<const glm::vec3> positions = tree.positions().subspan(interior);
-    const std::span<const Triangle> triangles = tree.triangles();
-    // Nodes that may touch a border. Of coincident vertices alone, whose merging moves nothing, the tree does not say:
-    // they are as the node above them.
-    std::vector<bool> is_near(interior);
-    for (NodeId node = 0; node < interior; ++node) {
-        const bool is_point = node > 0 && tree.support_spheres()[node].radius == 0;
-        is_near[node] = (tree.bounds()[node].flags & irregular_ring) || (is_point && is_near[tree.parents()[node]]);
-    }
-    std::vector<Index> leaves(tree.leaf_count()); // those at the same position side by side
-    std::iota(leaves.begin(), leaves.end(), Index{0});
-    std::sort(leaves.begin(), leaves.end(), [&](Index a, Index b) {
-        const glm::vec3 &p = positions[a], &q = positions[b];
-        if (p.x != q.x) return p.x < q.x;
-        if (p.y != q.y) return p.y < q.y;
-        return p.z != q.z ? p.z < q.z : a < b;
-    });
-    std::vector<Index> place(leaves.size()); // the first leaf at the position
-    for (std::size_t i = 0; i < leaves.size(); ++i) {
-        const bool is_first = i == 0 || positions[leaves[i - 1]] != positions[leaves[i]];
-        place[leaves[i]] = is_first ? leaves[i] : place[leaves[i - 1]];
-    }
-
-    edges_of_.assign(triangles.size(), 0);
-    struct Edge {
-        Index to, opposite; // places: the other end, and the triangle's third corner
-        Index triangle;
-        unsigned number; // of the triangle's edges
-    };
+    const std::vector<bool> is_near = nodes_near_border(tree);
+    const Places places(tree.positions().subspan(interior));
+    edges_of_.assign(tree.triangles().size(), 0);
     std::vector<Edge> edges;
-    for (std::size_t first = 0, end = 0; first < leaves.size(); first = end) {
-        const Index here = place[leaves[first]];
-        while (end < leaves.size() && place[leaves[end]] == here) ++end;
-        const std::span<const Index> at_place = std::span(leaves).subspan(first, end - first);
+    for (std::size_t first = 0, end = 0; first < places.leaves.size(); first = end) {
+        const Index here = places.of[places.leaves[first]];
+        while (end < places.leaves.size() && places.of[places.leaves[end]] == here) ++end;
+        const std::span<const Index> at_place = std::span(places.leaves).subspan(first, end - first);
         if (std::none_of(at_place.begin(), at_place.end(),
                          [&](Index leaf) { return is_near[tree.parents()[interior + leaf]]; }))
             continue;
         edges.clear();
         for (const Index leaf : at_place) {
             for (const Index triangle : of_leaf.around(leaf)) {
-                const Triangle& t = triangles[triangle];
-                const Index at[3] = {place[t[0]], place[t[1]], place[t[2]]};
-                if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
-                for (unsigned k = 0; k < 3; ++k) {
-                    const unsigned next = (k + 1) % 3;
-                    if (at[k] == here) edges.push_back({at[next], at[(k + 2) % 3], triangle, k});
-                    if (at[next] == here) edges.push_back({at[k], at[(k + 2) % 3], triangle, k});
-                }
+                const Triangle& t = tree.triangles()[triangle];
+                add_edges(here, triangle, {places.of[t[0]], places.of[t[1]], places.of[t[2]]}, edges);
             }
         }
-        std::sort(edges.begin(), edges.end(),
-                  [](const Edge& a, const Edge& b) { return a.to != b.to ? a.to < b.to : a.opposite < b.opposite; });
-        for (std::size_t begin = 0, next = 0; begin < edges.size(); begin = next) {
-            bool is_odd = false;
-            for (; next < edges.size() && edges[next].to == edges[begin].to; ++next)
-                if (next == begin || edges[next].opposite != edges[next - 1].opposite) is_odd = !is_odd;
-            for (std::size_t k = begin; k < next && is_odd; ++k)
-                edges_of_[edges[k].triangle] |= static_cast<std::uint8_t>(1u << edges[k].number);
-        }
+        mark_odd(edges, edges_of_);
     }
-    for (Index triangle = 0; triangle < triangles.size(); ++triangle) {
+}
+
+void OpenBorder::collect_ends(const SoundTree& tree) {
+    for (Index triangle = 0; triangle < tree.triangles().size(); ++triangle) {
+        const Triangle& t = tree.triangles()[triangle];
         for (unsigned k = 0; k < 3; ++k) {
             if (!((edges_of_[triangle] >> k) & 1)) continue;
-            const Index a = triangles[triangle][k], b = triangles[triangle][(k + 1) % 3];
-            const Index opposite = triangles[triangle][(k + 2) % 3];
-            ends_.push_back({a, b, opposite});
-            ends_.push_back({b, a, opposite});
+            ends_.push_back({t[k], t[(k + 1) % 3], t[(k + 2) % 3]});
+            ends_.push_back({t[(k + 1) % 3], t[k], t[(k + 2) % 3]});
         }
-    }
-    if (ends_.empty()) {
-        edges_of_ = {};
-        return;
     }
     std::sort(ends_.begin(), ends_.end());
     first_end_.assign(std::size_t{tree.leaf_count()} + 1, 0);

@@ -41,6 +41,7 @@ public:
 
 private:
     void find_edges(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+    void collect_ends(const vdtree::SoundTree& tree);
 
     std::vector<std::uint8_t> edges_of_; // by triangle; empty: there is no border
     std::vector<End> ends_;

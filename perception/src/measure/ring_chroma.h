@@ -4,7 +4,7 @@
 #include <glm/common.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/perception/chroma.h>
+#include <unseen/perception/internal/chroma.h>
 
 namespace unseen::perception {
 

@@ -14,12 +14,12 @@
 
 namespace unseen::perception {
 
-// Level l has texels 2^l times as wide as the texture's own. What a level shows and the next one does not is its detail:
-// patterns of about four of its texels a wave.
+// Level l has texels 2^l times as wide as the texture's own. What a level shows and the next one does not is its
+// detail: patterns of about four of its texels a wave.
 class TextureDetail {
 public:
-    // Of a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count). Cost:
-    // some passes over the texels; 6 bytes of memory for each.
+    // Of a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count).
+    // Cost: some passes over the texels; 6 bytes of memory for each.
     explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
 
     std::size_t level_count() const { return levels_.size(); }

@@ -8,8 +8,9 @@ namespace unseen::perception {
 
 namespace {
 
-// Of a triangle's side: equal parts of about so many texels each, in whose middles the texture's mean is looked up. With
-// coarser ones, what the means are wrong by looks like light that folds add; more than so many cost more than they tell.
+// Of a triangle's side: equal parts of about so many texels each, in whose middles the texture's mean is looked up.
+// With coarser ones, what the means are wrong by looks like light that folds add; more than so many cost more than they
+// tell.
 constexpr float texels_of_part = 1;
 constexpr int fewest_parts = 3, most_parts = 32;
 

@@ -171,10 +171,6 @@ PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre
     return PixelsPerDegree(lo.pixels_per_degree + t * (hi.pixels_per_degree - lo.pixels_per_degree));
 }
 
-Degrees display_field(const Display& display) {
-    return display.field_deg > 0 ? Degrees(display.field_deg) : physical_field(display, display.width_px);
-}
-
 void set_pixels_per_degree(Display& display, PixelsPerDegree ppd) {
     const double half_pixel_rad = to_radians(Degrees(1 / ppd.value())).value() / 2;
     display.pixel_pitch = 2 * std::tan(half_pixel_rad) * display.distance;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <unseen/perception/gaze.h>
-#include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
 
@@ -551,16 +550,6 @@ Result<GazeRecording> read_gaze_recording(const std::filesystem::path& file) {
     const auto text = read_text_file(file);
     if (!text) return text.error();
     return GazeFileReader(file).read(*text);
-}
-
-Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
-    std::string text = "time_s,x_px,y_px\n";
-    for (const GazeSample& s : trace.samples())
-        text += number_text(s.time_s) + "," + number_text(s.px.x) + "," + number_text(s.px.y) + "\n";
-    auto whole = vdtree::AtomicFile::create(file);
-    if (!whole) return whole.error();
-    if (auto written = whole->write(text); !written) return written;
-    return whole->commit();
 }
 
 } // namespace unseen::perception

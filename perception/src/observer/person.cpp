@@ -1,4 +1,4 @@
-#include <unseen/perception/person.h>
+#include <unseen/perception/csf.h>
 
 #include <cassert>
 #include <string>

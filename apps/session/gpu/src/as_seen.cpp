@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include <unseen/perception/motion.h>
+#include <unseen/perception/internal/motion.h>
 #include <unseen/render/internal/depth.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/internal/visibility_passes.h>
-#include <unseen/session_gpu/internal/pass_tables.h>
 
 namespace unseen::session {
 namespace {
@@ -27,50 +27,6 @@ Result<render::LuminanceImage> upload(const render::Context& context, const perc
 }
 
 } // namespace
-
-render::VisibilityTables visibility_tables(const perception::JudgeTables& tables) {
-    render::VisibilityTables to;
-    to.width = tables.width, to.height = tables.height;
-    to.floor_cdm2 = tables.floor_cdm2;
-    to.beta = tables.beta, to.most_thresholds = tables.most_thresholds;
-    to.kernel = tables.kernel;
-    to.masking_power = tables.masking_power, to.masking_knee = tables.masking_knee;
-    to.least_masker = tables.least_masker, to.most_masker = tables.most_masker;
-    to.luminance_shift = tables.luminance_shift, to.first_luminance = tables.first_luminance;
-    to.luminances = tables.luminances, to.eccentricities = tables.eccentricities;
-    to.first_eccentricity = tables.first_eccentricity, to.eccentricity_step = tables.eccentricity_step;
-    if (tables.gaze) {
-        const auto& [right, down, forward] = tables.gaze->direction;
-        to.gaze = {{right, down, forward}, static_cast<float>(tables.gaze->tangent_per_pixel)};
-    }
-    for (const perception::JudgeTables::Band& band : tables.bands) {
-        render::VisibilityTables::Band& out = to.bands.emplace_back();
-        out.of_patch = band.of_patch;
-        for (std::size_t i = 0; i < band.window.size(); ++i)
-            out.window[i] = {static_cast<float>(band.window[i].weight), band.window[i].halvings, band.window[i].kernel};
-        for (const perception::JudgeTables::Node& node : band.nodes)
-            out.nodes.push_back({node.log2_s, node.own, node.smoothed});
-    }
-    return to;
-}
-
-render::ElevationTables elevation_tables(const perception::Rpg99Tables& t) {
-    static_assert(render::ElevationTables::band_count == perception::Rpg99Tables::band_count &&
-                  render::ElevationTables::level_count == perception::Rpg99Tables::level_count);
-    return {.kernel = t.kernel,
-            .frequency_factor = t.frequency_factor,
-            .adaptation_level = t.adaptation_level,
-            .floor = t.floor,
-            .largest_elevation = t.largest_elevation,
-            .masking_scale = t.masking_scale,
-            .masking_gain = t.masking_gain,
-            .masking_power = t.masking_power,
-            .first_log2 = t.first_log2,
-            .nodes_an_octave = t.nodes_an_octave,
-            .luminances = t.luminances,
-            .log2_tvi = t.log2_tvi,
-            .log2_csf = t.log2_csf};
-}
 
 struct GpuJudge::Impl {
     render::Context context;
@@ -98,7 +54,7 @@ Result<GpuJudge> GpuJudge::create(const render::Context& context, const render::
     const auto tables =
         perception::judge_tables(reference.width, reference.height, extent->least, extent->largest, options);
     if (!tables) return tables.error();
-    auto passes = render::VisibilityPasses::create(context, visibility_tables(*tables), reference);
+    auto passes = render::VisibilityPasses::create(context, *tables, reference);
     if (!passes) return passes.error();
     return GpuJudge(
         std::make_unique<Impl>(Impl{context, std::move(*passes), reference.width, reference.height, std::nullopt}));

@@ -12,7 +12,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/draw.h>
 #include <unseen/render/internal/difference_count.h>
 #include <unseen/render/internal/elevation.h>
@@ -21,7 +21,6 @@
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/shadows.h>
 #include <unseen/session_gpu/gpu_judge.h>
-#include <unseen/session_gpu/internal/pass_tables.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 
@@ -278,8 +277,7 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
             combination.width(), {.field_degrees = perception::physical_field(display, combination.width()).value(),
                                   .masked_by_both = false});
         if (!tables) return tables.error();
-        auto maps = render::ElevationPasses::create(context, combination.width(), combination.height(),
-                                                    elevation_tables(*tables));
+        auto maps = render::ElevationPasses::create(context, combination.width(), combination.height(), *tables);
         if (!maps) return maps.error();
         made.rpg99 = std::move(*maps);
     } else {
@@ -293,7 +291,7 @@ Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
                            std::numeric_limits<float>::infinity()),
             judging);
         if (!tables) return tables.error();
-        auto maps = render::VisibilityPasses::create(context, visibility_tables(*tables), luminance_of(combination));
+        auto maps = render::VisibilityPasses::create(context, *tables, luminance_of(combination));
         if (!maps) return maps.error();
         made.modern = std::move(*maps);
     }

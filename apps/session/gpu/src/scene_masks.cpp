@@ -4,10 +4,10 @@
 #include <optional>
 #include <utility>
 
-#include <unseen/perception/judge_tables.h>
+#include <unseen/perception/internal/judge_tables.h>
+#include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/sample_sum.h>
 #include <unseen/session_gpu/gpu_judge.h>
-#include <unseen/session_gpu/internal/pass_tables.h>
 
 namespace unseen::session {
 namespace {
@@ -51,7 +51,7 @@ public:
         picture.scale *= static_cast<float>(white_ - black_);
         picture.offset = static_cast<float>(black_ + static_cast<double>(picture.offset) * (white_ - black_));
         if (!passes_) {
-            auto made = render::VisibilityPasses::create(context_, visibility_tables(tables_), picture);
+            auto made = render::VisibilityPasses::create(context_, tables_, picture);
             if (!made) return made.error();
             passes_ = std::move(*made);
         } else if (auto set = passes_->set_reference(picture); !set) {
@@ -61,7 +61,7 @@ public:
         auto grid = passes_->read_elevations();
         if (!grid) return grid.error();
         perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
-        for (const perception::JudgeTables::Band& band : tables_.bands) elevations.bands.push_back(band.nominal);
+        for (const JudgeTables::Band& band : tables_.bands) elevations.bands.emplace_back(band.nominal_cpd);
         return elevations;
     }
 
@@ -75,14 +75,14 @@ public:
 
 private:
     Masks(const render::Context& context, const vdtree::View& view, const render::Sampling& sampling,
-          perception::JudgeTables tables, render::SampleSum sum, double black, double white)
+          JudgeTables tables, render::SampleSum sum, double black, double white)
         : context_(context), view_(view), sampling_(sampling), tables_(std::move(tables)), sum_(std::move(sum)),
           black_(black), white_(white) {}
 
     const render::Context& context_;
     const vdtree::View& view_;
     render::Sampling sampling_;
-    perception::JudgeTables tables_;
+    JudgeTables tables_;
     render::SampleSum sum_;
     std::optional<render::VisibilityPasses> passes_ = {};
     double black_, white_; // cd/m2

@@ -1,6 +1,7 @@
-// The perceptual fold test: a fold's worst-case grating against the contrast sensitivity table.
+// The perceptual fold tests: from how far an observer cannot see that nodes are folded.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <span>
@@ -9,9 +10,7 @@
 #include <glm/vec2.hpp>
 
 #include <unseen/perception/csf.h>
-#include <unseen/perception/cut_rings.h>
 #include <unseen/perception/display.h>
-#include <unseen/perception/fold_model.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/lighting.h>
 
@@ -21,14 +20,50 @@ class LightBounds;
 
 namespace unseen::perception {
 
-// What a fold can be seen against: the scene's darkest and brightest relative luminance, background included.
+struct CutRings; // of bound_cut_rings()
+
+// What a fold can be seen against: the darkest and brightest relative luminance of the scene and its background.
 struct SceneLuminance {
     float darkest = 0;
     float brightest = 1;
-    // What the model as a whole is seen against: its background; default: anything of the scene.
+    // What the model as a whole is seen against; default: anything in the scene.
     std::optional<vdtree::LuminanceRange> behind = {};
     bool operator==(const SceneLuminance&) const = default;
 };
+
+// The factors of the fold test by errors that are set by what is seen: with weaker values something shows on the tuning
+// set of `unseen-bench fit`. A criterion applies them to a measurement; files hold none of them.
+struct FoldModel {
+    // Parts of the surface that are nearer to each other than this times the distance by which folds move them may pass
+    // through each other. Both parts move, each with its neighbours. 1.5 shows pixels.
+    double contact_reach = 6;
+    // The sine of the angle at which parts meet: the line where one hides the other moves by 1 / sine. Flatter angles
+    // count as this one. 1 shows pixels.
+    double least_sine = 0.1;
+    // A patch lies among others like it, and contrast is summed over space, whatever its sign. So a patch is seen as
+    // well as a grating in a disc of this many times its width, by the law of area (summation_gain()). 2 shows pixels.
+    double neighbourhood = 6;
+    // The share of the observer's sensitivity that the test needs, by eccentricity: linear in between, and beyond as at
+    // the last. Less than all is enough in the periphery. The table takes frequencies below the peak to be seen as well
+    // as the peak, which lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and
+    // nodes are larger, so fewer folds have their chance of being the worst. With 0.2 at 50 degrees changes reach the
+    // threshold.
+    static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
+    std::array<double, 4> needed = {1, 0.95, 0.6, 0.5}; // must not rise
+    // The same for outlines, at any eccentricity. They count as long straight strips, all of which move by the largest
+    // shift and towards the darkest or brightest background. Along a true outline shifts change their signs from node
+    // to node. If an outline moves by an eighth of the mesh's radius or more, as when a part vanishes, all is needed.
+    // 0.1 shows pixels.
+    double needed_by_outlines = 0.3;
+
+    bool operator==(const FoldModel&) const = default;
+};
+
+// By FoldModel::needed. Precondition: not NaN.
+double needed_sensitivity(const FoldModel& model, Degrees eccentricity);
+
+// Factors must be finite and 0 or more; the neighbourhood and needed shares above 0.
+Result<void> validate(const FoldModel& model);
 
 struct FoldTestOptions {
     Display display = {};
@@ -36,19 +71,19 @@ struct FoldTestOptions {
     // In the window, from the top left; may lie outside. Default: foveal everywhere.
     std::optional<glm::dvec2> gaze_px = {};
     std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: of default_person
-    // Look at colour, too, where the tree has any. The Luebke-Hallen tests then fold where
+    // The Luebke-Hallen tests also look at colour, if the tree has any. They fold where
     //   sqrt((c S)^2 + (c_rg S_rg)^2 + (c_yv S_yv)^2) <= 1,
-    // with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The
-    // ranges are found anew for each criterion (ring_chroma(): one pass over the tree).
+    // with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. Cost:
+    // one more pass over the tree.
     bool chroma = false;
-    FoldModel model = {}; // of the test by errors; the others have no factors
+    FoldModel model = {}; // factors of the test by errors
 };
 
-// All of these tests are in distance form. They depend on the field, the window and the options, and on whether there
-// is a gaze. They do not depend on where the eye or the gaze is. Off centre the viewer's eye is taken to be before the
-// point of the screen where the line of sight meets it. With an orthographic view there can be no gaze. So one criterion does for all cuts of a view that
-// moves. Each fails where the display or the view is not valid, the gaze or a luminance of the scene is not finite, or
-// the tree is from a damaged file.
+// All tests are in distance form. A criterion depends on the field, the window, the options, and on whether there is a
+// gaze, but not on where the eye or the gaze is: one criterion serves all cuts of a view that moves. If the view is
+// shifted, the viewer's eye is assumed to be in front of the point where the line of sight meets the screen. An
+// orthographic view cannot have a gaze. Each test fails if the display or the view is invalid, if the gaze or a
+// luminance of the scene is not finite, or if the tree is from a damaged file.
 
 // Luebke and Hallen 2001, section 3.3, in its safe form: extent and luminance range of the ring, facing of the dilated
 // ring. For a node whose ring's sphere has the angular radius asin(r/d) on the screen:
@@ -56,59 +91,58 @@ struct FoldTestOptions {
 //   c      = Michelson contrast of the ring's luminance range after the display's mapping; for silhouette nodes of that
 //            range united with the scene's
 //   folds where  2 theta' rho* <= 1,  with S(rho*) = 1/c on the falling branch
-// rho* is 0 where even the peak cannot be seen. With the eye inside the sphere nothing folds. A node is a silhouette
-// where the slabs of the dilated ring do not prove that it faces the eye from one side, or the ring has an irregular
+// rho* is 0 if even the peak cannot be seen. With the eye inside the sphere nothing folds. A node is a silhouette
+// unless the slabs of the dilated ring prove that it faces the eye from one side, and if the ring has an irregular
 // edge.
 //
 // Contrast is rounded up to classes of a 48th of an octave, luminance to sixteenths of the display's range.
-// Eccentricity is rounded down to quarters of a degree. The magnification is the window's largest. So a fold counts for
-// no less than above, and a cut keeps about one per cent more triangles at most. With the chroma classes are coarser.
+// Eccentricity is rounded down to quarters of a degree. The magnification is the window's largest. So a fold costs no
+// less than above, and a cut keeps at most about one per cent more triangles. With chroma, classes are coarser.
 //
-// Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze. Fails,
-// too, where the chroma is asked for of a tree with a texture, whose colours are not looked at; so does the next.
+// Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze. Also
+// fails if chroma is asked for and the tree has a texture, whose colours are not known; so does the next test.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
 
-// The same with the remaining holes closed. What is tested is not the mesh's ring but all that the ring can be in any
-// cut, and the mean. Let hat R and hat r be the luminances and the radius of bound_cut_rings(), which contain the
+// The same with the remaining holes closed: it tests all that the ring can be in any cut, not the mesh's ring, and the
+// mean. Let hat R and hat r be the luminances and the radius of bound_cut_rings(), which contain the
 // ring's, r0 the support's radius, r1 the ring's, and m the shift of the mean:
 //   theta' = max(2 asin(max(r1, (r0 + hat r) / 2) / d), one pixel)
 //   c      = Michelson contrast of hat R, for silhouettes united with the scene's range
 //   folds where  c S(1 / (2 theta')) <= 1  and  m / L S_peak <= 1, L the middle of hat R
-// A fold costs at least what it does above, for every node. Cost: as the above.
+// A fold never costs less than above. Cost: as above.
 Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
                                                                const vdtree::View& view,
                                                                const FoldTestOptions& options);
 
-// luebke_hallen_distances() under lights that may move. Ranges are what the lights can make of the normals, albedos and
-// places in a ring, and follow the lighting of the viewpoint. Silhouettes are those of `options.scene`, which must hold
-// for all of it (see lit_scene()). Adaptation is to the brightest luminance of a range. `bounds`: of the tree. Cost:
-// some 20 ms with a gaze, less without; not by node.
+// luebke_hallen_distances() under lights that may move. Luminance ranges are what the lights can make of the normals,
+// albedos and places in a ring, and follow the lighting of the viewpoint. Silhouettes are seen against `options.scene`,
+// which must hold for the whole path (see lit_scene()). The eye adapts to the brightest luminance of a range. `bounds`:
+// of the tree. Cost: some 20 ms with a gaze, less without; not by node.
 Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
                                                 std::shared_ptr<const vdtree::LightBounds> bounds,
                                                 const vdtree::View& view, const FoldTestOptions& options);
 
-// luebke_hallen_safe_distances() under lights that may move: ranges are what the lights can make of all that the ring
-// can be in any cut. `rings`: of the tree; `bounds`: from bound_lit_cut_rings() of these. What it leaves open: shifts of
-// the mean, which depend on the light. Cost: some 60 ms with a gaze, less without, and 10 ns a node.
+// luebke_hallen_safe_distances() under lights that may move: luminance ranges are what the lights can make of all that
+// the ring can be in any cut. `rings`: of the tree. `bounds`: bound_lit_cut_rings() of these. It does not bound shifts
+// of the mean, which depend on the light. Cost: some 60 ms with a gaze, less without, and 10 ns a node.
 Result<vdtree::DistanceCriterion> lit_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
                                                      std::shared_ptr<const vdtree::LightBounds> bounds,
                                                      const vdtree::View& view, const FoldTestOptions& options);
 
-// Between which luminances everything under the lights is, and the background. Rounded outward to steps of 1/32, so
-// that it mostly stays while lights move. `eye`: in the tree's frame.
+// The luminance range of the tree under the lights and of the background, rounded outward to steps of 1/32, so that it
+// rarely changes while lights move. `eye`: in the tree's frame.
 SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,
                          const vdtree::Lighting& lighting, glm::dvec3 eye, float background);
 
-// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the
-// above. Fails, too, where the tree's folds have not been measured (measure_folds()), and where what files say of it is
-// no measurement.
+// The test by errors: by what a fold changes in fact, not what could change within its ring. Also fails if the tree's
+// folds have not been measured (measure_folds()), or if the measurement is damaged.
 //
-// The model makes of the measurement (perception/fold_model.h): a distance h and a luminance e, the largest, and their
-// means hm and em. D is the angular width of what changes: twice the larger of the support's radius and the extent. The
-// ring has luminances lo..hi, with L in their middle, and a sphere of radius r1. Luminances are in cd/m2. S is the
-// table's conservative form, by eccentricity. A band of an octave around rho sees c(rho) S(rho) of a pattern. The
-// pattern is invisible where the sum of these, each to the power of 3.5, is less than 1:
+// From the measurement the model derives the largest shift h and change of luminance e, and their means hm and em. D is
+// the angular width of what changes: twice the larger of the support's radius and the extent. The ring has luminances
+// lo..hi, cd/m2, L in their middle, and a sphere of radius r1. S is the table's conservative form, by eccentricity. A
+// band of an octave around rho sees c(rho) S(rho) of a pattern. The pattern is invisible if the sum of these, each to
+// the power of 3.5, is less than 1:
 //   patch       c = (em + (hi - lo) min(1, 1.6 hm / r1)) / L, and in parts half as wide four times that, up to the
 //               largest, (e + (hi - lo) min(1, h / r1)) / L;
 //               c(rho) = c max over n = 1, 2, 4 of min(1, (n D rho)^2) / n
@@ -117,22 +151,23 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 //   silhouette  a strip of width w, the angle of h plus 0.011 pixel, at most twice that of h. It changes between the
 //               ring's luminance and anything in the scene, with the contrast cs over the pair's mean:
 //               c(rho) = cs min(1, 2 rho w)
-// rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers. So from far
+// rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers. So far
 // enough away everything folds, and drawing must be antialiased.
 //
-// Where the mesh was measured in stages, too, a node also folds from where nobody can tell the whole mesh from the mesh
-// in the node's stage, by pictures of both. That is seldom near, but most of it far away.
+// If the mesh was measured in stages, a node also folds where pictures show that nobody can tell the whole mesh from
+// the mesh in the node's stage. This decides most folds far away, and few near by.
 //
-// Measured, not proven: see docs/evidence.md for where it fails. Open and irregular rings are silhouettes. Cost: as
+// Measured, not proven: docs/evidence.md says where it fails. Open and irregular rings are silhouettes. Cost: as
 // luebke_hallen_distances().
 Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                   const FoldTestOptions& options);
 
-// The same under lights of which some cast shadows: whichever of these are hidden from a node, and with their shadows'
-// edges across it. `as_lit`: the tree under all lights (LitFolds::under()), and then without each set of those that may
-// be hidden, each with the lights that are left. An edge of a shadow moves with the surface that it falls on, by what that moves times the
-// tangent to the light, and takes E times the cosine of the light: the product counts as a change of the ring's light.
-// What the node's own outline does to shadows is not looked at: see ShadowEdges. Cost: as often as there are trees.
+// The same under lights that may cast shadows, for any of them hidden from a node, and for edges of shadows across it.
+// `as_lit`: the tree under all lights (LitFolds::under()), and then without each set of lights that may be hidden, each
+// with the lights that are left. The edge of a shadow moves with the surface that it falls on, by the surface's shift
+// times the tangent of the angle to the light, and changes light by E times the cosine: the product counts as a change
+// of the ring's light. What the node's own outline does to shadows is not included: see ShadowEdges. Cost: once for
+// each tree.
 struct TreeAsLit {
     vdtree::VertexTree tree;
     vdtree::Lighting lighting;
@@ -140,8 +175,8 @@ struct TreeAsLit {
 Result<vdtree::DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, const vdtree::View& view,
                                                   const FoldTestOptions& options);
 
-// Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside
-// folds. The same as vdtree's, but for the gaze. (For a stereo pair: vdtree::viewpoint_of_pair(), without a gaze.)
+// The eye and the gaze in the tree's frame, like vdtree's, which has no gaze. If `window_only`, with the view's
+// frustum, outside of which everything folds.
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 

@@ -8,15 +8,15 @@
 #include <string_view>
 #include <vector>
 
-#include <glm/vec3.hpp>
-
 #include <unseen/perception/units.h>
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
 
-// Where on the retina, along the horizontal meridian. `worst` takes the more sensitive of the two: a viewer with two
+// ---- formulas
+
+// Where on the retina, along the horizontal meridian. `worst` is the more sensitive of the two: for a viewer with two
 // eyes, or an unknown side.
 enum class VisualField { nasal, temporal, worst };
 
@@ -27,11 +27,11 @@ struct Stimulus {
     Hertz temporal{0};     // counterphase flicker
     SquareDegrees area{1}; // pi sigma^2 of a Gaussian envelope; a square field's, for the older models
     VisualField field = VisualField::worst;
-    DegreesPerSecond velocity{0}; // on the retina: see motion.h for how to get it from motion in the world
+    DegreesPerSecond velocity{0}; // on the retina
     Metres distance{0.5};         // from the eye; only Daly's model depends on it
 };
 
-// The formulas, their sources, and what each model does not know: docs/model.md.
+// Sources, and what each model does not know: docs/model.md.
 enum class CsfModel {
     castle,           // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
     stela,            // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)
@@ -42,8 +42,8 @@ enum class CsfModel {
     barten_2004,      // Barten 2003/04, the short form
     mannos_sakrison,  // Mannos and Sakrison 1974; relative
     rushmeier,        // Rushmeier et al. 1995, a simplification of Daly's; relative
-    castle_red_green, // castleCSF's isoluminant branches: contrast is that of opponent_contrast() below
-    castle_yellow_violet,
+    castle_red_green, // castleCSF's isoluminant branches. Contrast is |L - 2.3112 M| and |50.9875 S - (L + M)| of the
+    castle_yellow_violet, // cones' responses, over the luminance L + M
 };
 inline constexpr std::array csf_models = {CsfModel::castle,
                                           CsfModel::stela,
@@ -59,60 +59,52 @@ inline constexpr std::array csf_models = {CsfModel::castle,
 
 std::string_view name(CsfModel model);
 Result<CsfModel> csf_model(std::string_view name);
-// Whether S is that of luminance contrast, which is what fold tests and judges ask for.
+// Whether S is the sensitivity to luminance contrast, which fold tests and judges need.
 bool is_achromatic(CsfModel model);
 
-// The relative models give the shape of S over frequency only. They are scaled to this at their peaks, the peak
-// sensitivity of Daly's model, of which Rushmeier's is a simplification.
+// The relative models give the shape of S over frequency only. Their peak is scaled to this, that of Daly's model.
 constexpr double relative_models_peak = 250;
 
-// The closed form, unclamped. Domain: frequency, luminance, area and distance > 0; eccentricity, temporal frequency
-// and velocity >= 0, and one of the last two is 0; outside of it NaN. Cost: 0.1 to 0.3 us.
-// - Eccentricity: castle and stela by field; daly by its own law; the others lose the factor that Geisler and Perry
-//   1998 found, exp(-0.0461 frequency eccentricity), on either side of the field.
-// - Temporal frequency: castle and stela by their own channels; the others as a drift of velocity temporal / frequency.
-// - Velocity multiplies any model's static sensitivity by velocity_factor() of motion.h.
+// The closed form, unclamped. Frequency, luminance, area and distance must be above 0; eccentricity, temporal frequency
+// and velocity 0 or more, one of the last two 0. Otherwise the result is NaN. Cost: 0.1 to 0.3 us.
+// - Eccentricity: castle and stela depend on the field; daly has its own law; the others are multiplied by
+//   exp(-0.0461 frequency eccentricity) (Geisler and Perry 1998).
+// - Temporal frequency: castle and stela have their own channels; the others take it as a drift of velocity
+//   temporal / frequency.
+// - Velocity multiplies the static sensitivity of any model by one factor (Laird et al. 2006).
 double sensitivity(CsfModel model, const Stimulus& stimulus);
 
-// Contrast in castleCSF's three directions: luminance, red-green, yellow-violet.
-struct OpponentContrast {
-    double luminance = 0, red_green = 0, yellow_violet = 0; // at least 0
-};
-// Of a change `delta` on a `background`, both in the cones' responses L, M, S (CIE 2006, 2 degrees, scaled so that
-// L + M is the luminance). NaN where the background's luminance is not above 0.
-OpponentContrast opponent_contrast(const glm::dvec3& background_lms, const glm::dvec3& delta_lms);
-// How far above threshold a coloured grating is: sqrt(sum over the directions of (contrast S)^2); 1 is just visible.
-double castle_visibility(const OpponentContrast& contrast, const Stimulus& stimulus);
-
-// The set-up of the fold test and of the judge: a patch of 1.5 cycles radius, area pi (1.5 / frequency)^2.
+// The patch that fold test and judge assume: 1.5 cycles radius, area pi (1.5 / frequency)^2.
 SquareDegrees patch_area(CyclesPerDegree frequency);
 
-// The law of area: patches of area A are seen sqrt(A / (A + Ac)) times as well as unlimited ones, with this Ac.
+// The law of area: a patch of area A is seen sqrt(A / (A + Ac)) times as well as an unlimited one, with this Ac.
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
 
-// What Barten leaves to be chosen by observer; by default what he takes for the usual one.
+// What Barten's model leaves open; by default the values that he gives for a usual observer.
 struct BartenConstants {
     double signal_to_noise = 3;    // k
     Degrees line_spread{0.5 / 60}; // sigma0: half a minute of arc
     CyclesPerDegree inhibition{7}; // u0
-    double greatest_cycles = 15;   // Nmax: over more of a grating the eye does not sum
+    double greatest_cycles = 15;   // Nmax: the eye sums over no more of a grating
 };
-// Of CsfModel::barten_fitted: by least squares of decibels to people's thresholds, each study counting alike
+// For CsfModel::barten_fitted: least squares of decibels to people's thresholds, with equal weight for each study
 // (calibration::fit_barten()).
 inline constexpr BartenConstants fitted_barten{4.9936, Degrees(0.4597 / 60), CyclesPerDegree(4.3221), 7.8149};
-// At the fovea; `area` of the pattern, `field` of all that is lit, which decides on the pupil. Preconditions: above 0.
+// At the fovea. `area`: of the pattern. `field`: of all that is lit, which decides on the pupil. All must be above 0.
 double barten_sensitivity(const BartenConstants& constants, CyclesPerDegree frequency, Luminance luminance,
                           SquareDegrees area, SquareDegrees field);
 SquareDegrees barten_summation_area(const BartenConstants& constants, CyclesPerDegree frequency);
-inline constexpr SquareDegrees barten_fitted_field{100}; // of barten_fitted: the screen's business, and no patch's
+inline constexpr SquareDegrees barten_fitted_field{100}; // that barten_fitted assumes
 
 // How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
-//   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15
-// with castle's law for `own` = 1. People sum more or less than that: `own` says how many times as well as by castle's
-// law somebody sees an unlimited grating, of whom it is known how well they see patches of A15 (calibration's
-// ObserverProfile::summation). NaN where frequency, area or own are not above 0; the area may be infinite.
+//   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 if A is less than A15
+// With `own` = 1 this is castle's law. People sum more or less: `own` is how many times as well as by castle's law
+// somebody sees an unlimited grating, relative to a patch of A15 (calibration's ObserverProfile::summation). NaN if the
+// frequency, area or own is not above 0; the area may be infinite.
 double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own = 1);
 double summation_share(CyclesPerDegree frequency, SquareDegrees area); // t
+
+// ---- tables
 
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
@@ -121,80 +113,75 @@ struct CsfConditions {
     VisualField field = VisualField::worst;
     Metres distance{0.5};
 };
+// A patch of patch_area(frequency).
 Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
-                     Luminance luminance); // of patch_area(frequency)
+                     Luminance luminance);
 
-// Sensitivity over frequency x eccentricity x luminance, interpolated linearly in log S over log frequency,
-// eccentricity and log luminance; outside of the axes clamped to their ends: see CsfReach.
+// Sensitivity over frequency, eccentricity and luminance; linear in between in log S over log frequency, eccentricity
+// and log luminance.
 struct CsfSamples {
     std::string source;                   // what filled it: model and conditions, or observer and date
     std::vector<double> frequency_cpd;    // two or more, ascending, > 0 and at most 1e4
     std::vector<double> eccentricity_deg; // ascending from 0 to at most 180
     std::vector<double> luminance_cdm2;   // ascending, > 0 and at most 1e10
     std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
-    double summation = 1;                 // of larger patches: `own` of summation_gain(), 0.01 to 100
+    double summation = 1;                 // for larger patches: `own` of summation_gain(), 0.01 to 100
 };
 
-// Where a table has samples. Beyond them it goes on by these rules; the third is of the conservative form alone:
-// - farther aside sensitivity is as at the last eccentricity, and in dimmer light as at the lowest luminance. Both take
-//   the eye for better than it is, for it sees less there;
-// - in brighter light it is as at the highest luminance. Eyes may see more there: up to some 100 cd/m2 sensitivity
-//   grows with the light, so give a table that reaches as far as the display does;
-// - coarser gratings are seen as well as the best of all that are finer, and finer ones fall on with the shallowest slope
-//   at which any column ends.
+// Where a table has samples. Beyond them:
+// - at larger eccentricities sensitivity is as at the last one, and in dimmer light as at the lowest luminance. Eyes
+//   are less sensitive there, so this is safe;
+// - in brighter light it is as at the highest luminance. Eyes may be more sensitive: up to some 100 cd/m2 sensitivity
+//   grows with the light, so use a table that reaches as far as the display does;
+// - the conservative form sees coarser gratings as well as the best of all finer ones, and finer gratings fall on with
+//   the shallowest slope at which any column ends.
 struct CsfReach {
     CyclesPerDegree coarsest, finest;
     Degrees eccentricity;
     Luminance darkest, brightest;
 };
 
-// Copies are cheap and share their data; any number of threads may look up at once.
+// An observer's table. Copies are cheap and share their data. Threads may look up at the same time.
 class CsfTable {
 public:
     CsfTable(const CsfTable&) = default; // and no move: there is no empty table
     CsfTable& operator=(const CsfTable&) = default;
 
-    // Checks the samples: the ranges above, that each axis rises by `smallest_spacing` at least from sample to sample,
-    // and that sensitivity does not grow with eccentricity by more than `noise_db`. The error names the field and the
-    // index, with the values. Then prepares the conservative form below.
+    // Fails if a sample is out of the ranges above, if an axis rises by less than `smallest_spacing`, or if sensitivity
+    // grows with eccentricity by more than `noise_db`. The error names the field, the index and the values.
     static Result<CsfTable> create(CsfSamples samples);
-    // What measured sensitivities may grow by from any eccentricity to a larger one, in decibels (20 log10): a table that
-    // grows by more has its rows or columns out of order, or a slip. It is the standard deviation of the difference of
-    // two measurements by different studies, each of which strays by 4.4 dB (person.h): root 2 times that. Thresholds by
-    // `unseen calibrate` stray by 2.3 dB at the worst, so two of them differ by so much in one case of twenty.
-    // Sensitivities below 1 count as 1, for nothing that can be shown is seen there.
+    // The standard deviation of the difference of two measurements in different studies, 20 log10: root 2 times 4.4 dB.
+    // A table that grows by more has its rows or columns out of order, or a slip. Two thresholds of `unseen calibrate`
+    // differ by this much in one case of twenty at the worst. Sensitivities below 1 count as 1, because nothing that
+    // can be shown is seen there.
     static constexpr double noise_db = 6.2;
-    // Below this luminance only rods see, of which the fovea has none: there sensitivity may grow. (CIE 191:2010: where
-    // mesopic vision begins.)
+    // Below this luminance only rods see, and the fovea has none, so sensitivity may grow with eccentricity. (CIE
+    // 191:2010: where mesopic vision begins.)
     static constexpr Luminance rods_alone_below{0.005};
-    // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the
-    // slope between them meaningless in float.
+    // Octaves or degrees. Closer neighbours on an axis are a slip, and the slope between them means nothing in float.
     static constexpr double smallest_spacing = 1e-4;
     static constexpr Degrees highest_eccentricity{180};
-    // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 deg,
-    // 1e-3 to 1e4 cd/m2, within 0.5% of the closed form wherever S > 1. An error where the conditions are outside of
-    // the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.
+    // Samples a model for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 degrees, 1e-3 to 1e4 cd/m2, within
+    // 0.5% of the closed form wherever S > 1. Fails on conditions outside of the model's domain. Cost: 20 to 400 ms, 1
+    // to 30 MB; daly's is the largest.
     static Result<CsfTable> from_model(CsfModel model, const CsfConditions& conditions);
     static CsfTable from_model(CsfModel model); // static gratings, the worst field
-    // The default table, built once: castle's.
-    static const CsfTable& standard();
+    static const CsfTable& standard();          // castle's; made once
 
-    // Of someone who sees so many times as well, 0.001 to 1000 (person.h). Fails where sensitivities leave the bounds
-    // above.
+    // Sensitivity times a gain, 0.001 to 1000. Fails if sensitivities leave the bounds above.
     Result<CsfTable> scaled(double gain) const;
 
-    // The same eye's conservative form for patches that hold half a wave of a frequency, one across. Such a patch has
-    // lower frequencies in it, too, of a contrast that goes with the share that it fills of their own patches: the
-    // square of the frequency. So sensitivity at a frequency is no less than that at any lower one times the square of
-    // their ratio: it falls by no more than two octaves an octave. Where sensitivity falls fast, far from the gaze,
-    // this is much more than at the patch's own frequency. sensitivity() stays the samples'. Cost: some milliseconds.
+    // The conservative form for patches that hold half a wave of a frequency. Such a patch also holds lower
+    // frequencies, with a contrast that goes with the square of the frequency, the share of their own patches that it
+    // fills. So sensitivity at a frequency is at least that at any lower one times the square of their ratio. Where
+    // sensitivity falls fast, at large eccentricities, this is much more than at the patch's own frequency.
+    // sensitivity() is not changed. Cost: some milliseconds.
     CsfTable of_half_waves() const;
 
-    // Of what moves over the retina at this velocity: S times velocity_factor() of motion.h, as from_model() has it under
-    // CsfConditions::velocity. Coarse gratings are seen better then, so a table that begins at a higher frequency goes on
-    // down to 1/16 cpd as at its first one, and columns are sampled densely, for the factor bends. Fails where the
-    // velocity is not within 0 to fastest_velocity, or sensitivities leave the bounds above. The same up to
-    // least_velocity.
+    // The table for gratings that move over the retina. Coarse gratings are seen better then, so a table that begins at
+    // a higher frequency is extended down to 1/16 cpd at the value of its first one. Fails on velocities below 0 or
+    // above 80 degrees per second, and if sensitivities leave the bounds above. Up to 0.1 degrees per second nothing
+    // changes.
     Result<CsfTable> moving(DegreesPerSecond velocity) const;
 
     const CsfSamples& samples() const noexcept;
@@ -203,36 +190,62 @@ public:
     // The samples, interpolated.
     double sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
 
-    // The conservative form that fold tests use: non-increasing in frequency (the largest value at this or any higher
-    // frequency, so also clamped below the peak), non-increasing in eccentricity and non-decreasing in luminance
-    // (likewise). Above the last frequency it goes on falling with the shallowest of the slopes with which the table's
-    // columns last fall; eccentricity and luminance are clamped to their axes.
+    // The conservative form, which fold tests use: the largest value at this or any higher frequency, this or any
+    // larger eccentricity, and this or any lower luminance. Above the last frequency it falls on with the shallowest
+    // final slope of the table's columns; eccentricity and luminance are clamped to their axes.
     double monotone_sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
     double peak_sensitivity(Degrees eccentricity, Luminance luminance) const;
 
-    // The highest frequency at which `contrast` can be seen: S(rho) contrast = 1 on the falling branch, the inverse
-    // of monotone_sensitivity; on a plateau its highest frequency. 0 where even the peak cannot be seen. `contrast` is
-    // 0 or more and may exceed 1. Infinite where an argument is NaN, or contrast or luminance is negative: never folds.
+    // The highest frequency at which a contrast can be seen, the inverse of monotone_sensitivity(): S(rho) contrast =
+    // 1. 0 if even the peak cannot be seen. The contrast is 0 or more and may exceed 1. Infinite, so that nothing
+    // folds, if an argument is NaN, or contrast or luminance is negative.
     CyclesPerDegree highest_visible_frequency(double contrast, Degrees eccentricity, Luminance luminance) const;
 
-    // The same in batches of equal length, in float; log2 of the frequency in cpd, -infinity where nothing can be seen.
-    // No allocation; tens of nanoseconds each.
+    // The same for batches of equal length, in float: log2 of the frequency in cpd, -infinity where nothing can be
+    // seen. No allocation; tens of nanoseconds each.
     void highest_visible_log2_frequency(std::span<const float> contrast, std::span<const float> eccentricity_deg,
                                         std::span<const float> luminance_cdm2, std::span<float> log2_frequency) const;
 
 private:
     friend CsfTable widened(const CsfTable& table, Degrees margin);
-    // Of another table's columns, which need not be measured again: all checks of create() but that of growth.
+    // Made from another table's columns: all checks of create() except for growth.
     static Result<CsfTable> derived(CsfSamples samples);
 
     struct State;
     explicit CsfTable(std::shared_ptr<const State> state);
 
-    std::shared_ptr<const State> state_; // the samples and what look-ups need; never changes, so copies share it
+    std::shared_ptr<const State> state_; // never changes, so copies share it
 };
 
-// What of a request lies outside of a table's samples, and how it is taken, for reports; empty where nothing does.
-// "beyond the table's 20 degrees sensitivity is taken as there".
+// Says which part of a request lies outside of a table's samples and how it is treated, for reports: "beyond the
+// table's 20 degrees sensitivity is taken as there". Empty if nothing does.
 std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest);
+
+// ---- people
+
+// How much more sensitive somebody is than castleCSF. With its law of area castleCSF is right for the median person:
+// 65% of 253 sensitivities from eight studies lie above it, the median by 1.2 dB. People differ, and one person differs
+// from study to study, with a standard deviation of 4.4 dB. So a person is castleCSF times a gain. The data are in
+// data/people; <unseen/calibration/people.h> compares them with any model.
+struct Person {
+    std::string_view name;
+    double gain;        // of sensitivity over castleCSF's
+    double share_above; // of measured sensitivities above this person's: of people who might see more
+    double barten_gain; // over barten_fitted's sensitivity, with the same share above: see second_judge_options()
+    bool operator==(const Person&) const = default;
+};
+
+// Each study counts alike. The gratings were still, at up to 30 degrees, of up to 100 square degrees, and of 1 to 500
+// cd/m2. Beyond, castleCSF's own formulas and the same shares are used.
+inline constexpr Person median_person{"median", 1, 0.649, 0.843};
+inline constexpr Person default_person{"default", 2, 0.087, 1.917};
+inline constexpr Person strict_person{"strict", 2.7, 0.0487, 2.129};
+inline constexpr std::array people = {median_person, default_person, strict_person};
+
+// By name; the error lists them.
+Result<Person> person(std::string_view name);
+
+// castleCSF times the gain, for still gratings. The tables of `people` are made once. The gain must be 0.001 to 1000.
+std::shared_ptr<const CsfTable> csf_of(const Person& person);
 
 } // namespace unseen::perception

@@ -64,8 +64,6 @@ PixelsPerDegree finest_pixels_per_degree(const Display& display);
 // half a pixel, so about ppd / cos^2 a; angles are clamped so that a + delta is at most 89.9 degrees. Headsets: by the
 // lens's table.
 PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre);
-// The angle across the whole display: that of the screen's width, or the headset's.
-Degrees display_field(const Display& display);
 // Sets the pixel pitch so that the centre has `ppd` at the display's distance; the display is flat then.
 void set_pixels_per_degree(Display& display, PixelsPerDegree ppd);
 // The field that `pixels` centred pixels fill: 2 atan(pixels pitch / (2 distance)).

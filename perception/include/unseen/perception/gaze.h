@@ -82,8 +82,6 @@ inline constexpr double longest_blink_s = 0.4;
 // Errors name the file, the line and the column. Times that fall are errors, and rows more than
 // `GazeTrace::longest_gap_s` apart.
 Result<GazeRecording> read_gaze_recording(const std::filesystem::path& file);
-// With the columns time_s, x_px, y_px.
-Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace);
 
 // Fixations and saccades by published statistics. Fixations: log-normal durations of median 250 ms (Rayner 1998: 200 to
 // 330 ms). Saccades: amplitudes of a gamma distribution of shape 2 and mean 5.5 degrees, cut at 20; durations 2.2 A +

@@ -1,9 +1,10 @@
 // What a scene masks: by how much its patterns raise the thresholds of what folds change, by place and frequency.
 //
-// The sources' pipeline (Drettakis and others 2007) has one threshold a pixel, of a picture without the objects that ask.
-// That is not safe: one frequency's mask would excuse a change at another, and what stands behind an object would mask it.
-// So elevations are kept by band, and a place has the least of several pictures: of everything but the objects that ask,
-// which masks them whatever they look like, and of the scene as it is seen, which what is covered does not mask.
+// The sources' pipeline (Drettakis and others 2007) has one threshold a pixel, of a picture without the objects that
+// ask. That is not safe: one frequency's mask would excuse a change at another, and what stands behind an object would
+// mask it. So elevations are kept by band, and a place has the least of several pictures: of everything but the objects
+// that ask, which masks them whatever they look like, and of the scene as it is seen, which what is covered does not
+// mask.
 #pragma once
 
 #include <memory>
@@ -29,8 +30,8 @@ struct Elevations {
 // Copies are cheap and share their data; any number of threads may ask at once.
 class MaskingPicture {
 public:
-    // The least of the pictures, which have the same cells and bands. Fails on an invalid view, on no picture or more than
-    // 16 bands, where cells do not cover the window, and on elevations that are NaN, infinite or below 1.
+    // The least of the pictures, which have the same cells and bands. Fails on an invalid view, on no picture or more
+    // than 16 bands, where cells do not cover the window, and on elevations that are NaN, infinite or below 1.
     static Result<MaskingPicture> create(const vdtree::View& view, std::span<const Elevations> pictures);
 
     const vdtree::View& view() const noexcept { return grids_->view; }
@@ -55,10 +56,10 @@ private:
     std::shared_ptr<const Grids> grids_;
 };
 
-// error_distances() where sensitivity to each frequency is divided by the elevation there: of the two bands around it, the
-// least over the node's footprint. For pictures of this view: footprints are of it. A fold is nowhere seen from farther
-// than without masking. Where the window has no masker, this is error_distances(). Fails where that does, and where the
-// picture is of another window. Cost: that of error_distances() some eight times, and 100 ns a node.
+// error_distances() where sensitivity to each frequency is divided by the elevation there: of the two bands around it,
+// the least over the node's footprint. For pictures of this view: footprints are of it. A fold is nowhere seen from
+// farther than without masking. Where the window has no masker, this is error_distances(). Fails where that does, and
+// where the picture is of another window. Cost: that of error_distances() some eight times, and 100 ns a node.
 Result<vdtree::DistanceCriterion> masked_error_distances(const vdtree::VertexTree& tree,
                                                          const vdtree::Similarity& placement,
                                                          const MaskingPicture& masking, const vdtree::View& view,

@@ -1,4 +1,4 @@
-// perception: what people can see of a fold, and of a picture. The header to include first.
+// perception: what people can see of a fold, and of a picture. Include this header first.
 //
 // A Display turns pixels into angles and codes into cd/m2. A CsfTable is an observer: contrast sensitivity by
 // frequency, luminance and eccentricity. The fold tests make a vdtree::DistanceCriterion of both for a tree, by
@@ -13,27 +13,17 @@
 // Numbers with units are types of their own: 4.0_cpd, 100.0_cdm2, 2.0_deg. Models, formulas and sources: docs/model.md.
 #pragma once
 
-// Displays and observers.
+// Displays, observers and where they look.
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/perception/gaze.h>
-#include <unseen/perception/motion.h>
 #include <unseen/perception/units.h>
 
-// Fold tests, and what they are told about a tree.
-#include <unseen/perception/chroma.h>
+// Fold tests, and what is measured for them.
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/cut_rings.h>
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/fold_model.h>
-#include <unseen/perception/lit_folds.h>
 #include <unseen/perception/masking.h>
-#include <unseen/perception/shadow_edges.h>
 
 // Pictures, and judges of them.
-#include <unseen/perception/change.h>
 #include <unseen/perception/image.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/judge_tables.h>
-#include <unseen/perception/person.h>
-#include <unseen/perception/ssim_window.h>

@@ -11,7 +11,6 @@
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/perception/judge.h>
-#include <unseen/perception/person.h>
 #include <unseen/vdtree/view.h>
 
 namespace unseen::session {
@@ -29,7 +28,7 @@ struct Observer {
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<Gaze> gaze = {}; // not set: the viewer may look anywhere, so everything counts as foveal
     // How fast everything moves over the retina, 0 to perception::fastest_velocity. Fine detail blurs, coarse detail is
-    // seen better. The image of what the eye pursues hardly moves: give its retinal slip (perception/motion.h).
+    // seen better. The image of what the eye pursues hardly moves: give its retinal slip.
     perception::DegreesPerSecond velocity{0};
 };
 
@@ -39,7 +38,7 @@ std::string describe(const Observer& observer);
 // The options of the judges of pictures for this observer. The gaze's margin is ignored.
 perception::JudgeOptions judge_options(const Observer& observer);
 
-// A person by name (perception/person.h), or the table of a viewer from a file.
+// A person by name (perception/csf.h), or the table of a viewer from a file.
 struct ObserverChoice {
     perception::Person person = perception::default_person;
     std::shared_ptr<const perception::CsfTable> csf = {}; // from the file; null for a person

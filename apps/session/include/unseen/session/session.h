@@ -19,7 +19,6 @@
 #include <vector>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/cut_rings.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
 #include <unseen/session/level_chain.h>
@@ -30,6 +29,10 @@
 #include <unseen/session/selection.h>
 #include <unseen/session/simplification.h>
 #include <unseen/vdtree/criteria.h>
+
+namespace unseen::perception {
+struct CutRings;
+}
 
 namespace unseen::session {
 

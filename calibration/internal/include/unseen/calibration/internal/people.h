@@ -25,7 +25,7 @@ struct MeasuredSensitivity {
 Result<std::vector<MeasuredSensitivity>> parse_sensitivities(std::string_view text, const std::string& name);
 Result<std::vector<MeasuredSensitivity>> read_sensitivities(const std::filesystem::path& file);
 
-// The measurements that a person (<unseen/perception/person.h>) is compared with: still gratings, up to 30 degrees of
+// The measurements that a person (<unseen/perception/csf.h>) is compared with: still gratings, up to 30 degrees of
 // eccentricity and 100 square degrees, from 1 to 500 cd/m2.
 std::vector<MeasuredSensitivity> within_domain(std::span<const MeasuredSensitivity> all);
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include <unseen/calibration/study.h>
+#include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/perception/image.h>
-#include <unseen/perception/person.h>
 #include <unseen/vdtree/result.h>
 
 namespace unseen::calibration {

@@ -2,7 +2,6 @@
 // passes know neither display nor observer: perception::rpg99_tables() makes their tables.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -11,28 +10,17 @@
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/vdtree/result.h>
 
+namespace unseen {
+struct Rpg99Tables;
+}
+
 namespace unseen::render {
-
-// The fields of Rpg99Tables in perception/judge_tables.h, which explains the computation.
-struct ElevationTables {
-    static constexpr int band_count = 6, level_count = 8;
-
-    std::array<float, 3> kernel = {};
-    std::array<float, band_count> frequency_factor = {};
-    int adaptation_level = 0;
-    float floor = 0, largest_elevation = 0;
-    float masking_scale = 0, masking_gain = 0, masking_power = 0;
-    float first_log2 = 0;
-    int nodes_an_octave = 0, luminances = 0;
-    std::vector<float> log2_tvi;
-    std::vector<float> log2_csf;
-};
 
 // Move-only; keeps a handle to the context. Memory: 108 bytes a pixel, and 4 for each map.
 class ElevationPasses {
 public:
-    // For pictures of one size. Fails on contradictory tables, beyond this GL's limits, and if memory runs out.
-    static Result<ElevationPasses> create(const Context& context, int width, int height, const ElevationTables& tables);
+    // For pictures of one size. Fails beyond this GL's limits, and if memory runs out.
+    static Result<ElevationPasses> create(const Context& context, int width, int height, const Rpg99Tables& tables);
     ElevationPasses(ElevationPasses&&) noexcept;
     ElevationPasses& operator=(ElevationPasses&&) noexcept;
     ~ElevationPasses();

@@ -2,18 +2,18 @@
 // pyramid. They know neither display nor observer: perception::judge_tables() makes their tables.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/render/context.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/result.h>
+
+namespace unseen {
+struct JudgeTables;
+}
 
 namespace unseen::render {
 
@@ -43,38 +43,6 @@ struct LuminanceExtent {
 // in the message.
 Result<LuminanceExtent> luminance_extent(const Context& context, const LuminanceTexture& picture, const char* which);
 
-// Tables for pictures of one size: the fields of perception/judge_tables.h, which explains the computation.
-struct VisibilityTables {
-    struct Node {
-        float log2_s = 0, own = 1, smoothed = 0;
-    };
-    struct Gaussian {
-        float weight = 0;
-        int halvings = 0;          // 0 to 30
-        std::vector<float> kernel; // 1 to 12 values
-    };
-    struct Band {
-        float of_patch = 1;
-        std::array<Gaussian, 3> window;
-        std::vector<Node> nodes; // luminances x eccentricities
-    };
-    struct Gaze {
-        glm::vec3 direction = {0, 0, 1};
-        float tangent_per_pixel = 0;
-    };
-
-    int width = 0, height = 0;
-    float floor_cdm2 = 0; // above 0
-    float beta = 0, most_thresholds = 0;
-    std::array<float, 3> kernel = {};
-    float masking_power = 0, masking_knee = 0, least_masker = 0, most_masker = 0;
-    int luminance_shift = 0, first_luminance = 0;
-    int luminances = 0, eccentricities = 0;
-    float first_eccentricity = 0, eccentricity_step = 0;
-    std::optional<Gaze> gaze = {};
-    std::vector<Band> bands; // 1 to 16
-};
-
 struct VisibilitySummary {
     double largest = 0; // V
     std::uint64_t visible_pixels = 0;
@@ -95,9 +63,9 @@ struct ElevationGrid {
 // 4 for each threshold map and 25 more while it is mapped. From the first set_reference() on, temporary memory is kept.
 class VisibilityPasses {
 public:
-    // Copies the reference. Fails on tables that contradict themselves or the picture, beyond this GL's limits, and if memory
+    // Copies the reference. Fails on tables for another size, beyond this GL's limits, and if memory
     // runs out. The tables' luminances must span the reference's; see luminance_extent().
-    static Result<VisibilityPasses> create(const Context& context, const VisibilityTables& tables,
+    static Result<VisibilityPasses> create(const Context& context, const JudgeTables& tables,
                                            const LuminanceTexture& reference);
     VisibilityPasses(VisibilityPasses&&) noexcept;
     VisibilityPasses& operator=(VisibilityPasses&&) noexcept;

@@ -33,8 +33,8 @@ double disc_flicker_sensitivity(Hertz frequency, Degrees eccentricity, Luminance
 // below 0.
 double ramp_response(double seconds, Degrees eccentricity, Luminance luminance);
 
-// What share of a grating's contrast the flicker of the moment has: 1 up to 0.43 cpd, then castleCSF's transient channel
-// over its largest value, within 0.02.
+// What share of a grating's contrast the flicker of the moment has: 1 up to 0.43 cpd, then castleCSF's transient
+// channel over its largest value, within 0.02.
 double flicker_share(CyclesPerDegree frequency);
 
 // ---- changes ------------------------------------------------------------------------------------------------------
@@ -51,9 +51,9 @@ struct ChangeJudgement {
     double flicker = 0;    // of all the field
 };
 
-// The observer's gain counts over elaTCSF, too; where options.csf_table is given, which is the observer's own, flicker is
-// seen as much better as the table's peak is above castleCSF's. Cost: of 1024 x 1024 pixels about 0.7 s. Errors: those of
-// the Judge, and a time that is below 0 or not finite.
+// The observer's gain counts over elaTCSF, too; where options.csf_table is given, which is the observer's own, flicker
+// is seen as much better as the table's peak is above castleCSF's. Cost: of 1024 x 1024 pixels about 0.7 s. Errors:
+// those of the Judge, and a time that is below 0 or not finite.
 //
 // The change from one picture to another of the same view, in so many seconds: a pop in none, a geomorph in its own
 // time.

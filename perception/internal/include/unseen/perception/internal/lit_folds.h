@@ -1,5 +1,5 @@
-// What folds change under lights, measured once for all of them: what the fold test by errors goes by where a tree's own
-// light is not the scene's.
+// What folds change under lights, measured once for all of them: what the fold test by errors goes by where a tree's
+// own light is not the scene's.
 #pragma once
 
 #include <memory>
@@ -13,10 +13,10 @@
 namespace unseen::perception {
 
 // A light from l makes a max(0, n.l) of a vertex with the albedo a and the normal n. So what a light makes of a fold
-// follows from what the fold changes of the vector a n. Where that is no more than v_k along each axis, the light changes
-// by no more than its luminance times the sum of |l_k| v_k. The three v_k are measured as measure_folds() measures
-// luminance. So is what changes of a, for ambient light. And pictures of the whole mesh, folded in stages, are taken under
-// lights from all around. Copies are cheap and share their data.
+// follows from what the fold changes of the vector a n. Where that is no more than v_k along each axis, the light
+// changes by no more than its luminance times the sum of |l_k| v_k. The three v_k are measured as measure_folds()
+// measures luminance. So is what changes of a, for ambient light. And pictures of the whole mesh, folded in stages, are
+// taken under lights from all around. Copies are cheap and share their data.
 class LitFolds {
 public:
     // Fails where measure_folds() does. Cost: twice to three times that of it.

@@ -1,22 +1,21 @@
-// What the modern judge knows of an observer, for programs that judge by other means than perception::Judge does, such
-// as on a GPU. Both are made of the same numbers: Judge is the reference, these are its tables.
+// What judges know of an observer, as numbers: perception makes the tables, and render's passes judge by them on the GPU.
+// perception's judges on the CPU are made of the same numbers and are the reference.
 #pragma once
 
 #include <array>
 #include <optional>
 #include <vector>
 
-#include <unseen/perception/judge.h>
-#include <unseen/perception/units.h>
+#include <glm/vec3.hpp>
 
-namespace unseen::perception {
+namespace unseen {
 
 // Where the gaze is on the flat screen, for an eye in front of the window's centre.
 struct GazeOnScreen {
-    std::array<float, 3> direction = {0, 0, 1}; // of length 1: right, down, forward
+    glm::vec3 direction = {0, 0, 1}; // of length 1: right, down, forward
     double tangent_per_pixel = 0;
 
-    // Along one axis of a window of so many pixels; the centre of the first is at 0.5. The direction to pixel (x, y) is
+    // Along one axis of a window of `size` pixels; the centre of the first is at 0.5. The direction to pixel (x, y) is
     // (tangent(x + 0.5, width), tangent(y + 0.5, height), 1), and its eccentricity the angle to `direction`.
     double tangent(double px, int size) const { return (px - 0.5 * size) * tangent_per_pixel; }
 };
@@ -31,24 +30,24 @@ struct GazeOnScreen {
 //
 //   T = masking of |own C + smoothed h*C| S of_patch,   threshold = L T / (S of_patch),
 //
-// and of differences D, split likewise but not divided, |own D + smoothed h*D| S / (L T) are contrasts in thresholds, at
-// most `most_thresholds`. Twice their squares, summed by the window, to the power of beta / 2, are added up over the
-// bands, each sample for the pixels it is nearest to; the sum to the power of 1 / beta is V. A picture's threshold is the
-// least of its bands'.
+// and of differences D, split likewise but not divided, |own D + smoothed h*D| S / (L T) are contrasts in thresholds,
+// at most `most_thresholds`. Twice their squares, summed by the window, to the power of beta / 2, are added up over the
+// bands, each sample for the pixels it is nearest to; the sum to the power of 1 / beta is V. A picture's threshold is
+// the least of its bands'.
 struct JudgeTables {
     // At a luminance and an eccentricity; in between all three are linear over these.
     struct Node {
         float log2_s = 0; // of S, to unlimited gratings of the band's nominal frequency
         float own = 1, smoothed = 0;
     };
-    // Sums energies with the weights of a Gaussian, on a plane that was halved so many times, and is then enlarged.
+    // Sums energies with the weights of a Gaussian, on a plane that was halved this many times and is then enlarged.
     struct Gaussian {
         double weight = 0;
         int halvings = 0;
         std::vector<float> kernel; // from the middle on, along one axis; at most 12 values
     };
-    struct Band {                     // level 0 first, the base last
-        CyclesPerDegree nominal = {}; // the frequency that it sees best
+    struct Band {               // level 0 first, the base last
+        double nominal_cpd = 0; // the frequency that it sees best
         float of_patch = 1;
         std::array<Gaussian, 3> window; // the law of area; from the widest on
         std::vector<Node> nodes;        // [e * luminances + l]
@@ -67,15 +66,9 @@ struct JudgeTables {
     int luminance_shift = 0, first_luminance = 0;
     int luminances = 0, eccentricities = 0; // at least 2 and 1; eccentricities are 1 without a gaze
     float first_eccentricity = 0, eccentricity_step = 0;
-    std::optional<GazeOnScreen> gaze = {}; // none: nothing depends on eccentricity
+    std::optional<GazeOnScreen> gaze = {}; // without one nothing depends on eccentricity
     std::vector<Band> bands;
 };
-
-// For references of this size whose luminances lie between these, in cd/m2. Errors: those of Judge::create about its
-// options; a size below 1x1; luminances that are negative, not finite or do not ascend. Cost: 1 to 5 ms, with a
-// gaze up to 40 and some nanoseconds a pixel.
-Result<JudgeTables> judge_tables(int width, int height, float darkest_cdm2, float brightest_cdm2,
-                                 const JudgeOptions& options);
 
 // What rpg99_map() of a reference alone (Rpg99Options::masked_by_both off) knows of an observer. Its steps:
 //
@@ -100,7 +93,4 @@ struct Rpg99Tables {
     std::vector<float> log2_csf; // [band * luminances + node]
 };
 
-// For pictures so wide. Fails where rpg99_map() does, and on widths below 1.
-Result<Rpg99Tables> rpg99_tables(int width, const Rpg99Options& options);
-
-} // namespace unseen::perception
+} // namespace unseen

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include <unseen/perception/chroma.h>
+#include <unseen/perception/internal/chroma.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>

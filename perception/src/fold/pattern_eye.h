@@ -1,0 +1,174 @@
+// From how far patterns are invisible to an eye at one luminance and eccentricity.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include <unseen/perception/criterion.h>
+
+#include "fold/band_elevation.h"
+#include "fold/fold_factors.h"
+#include "fold/fold_screen.h"
+#include "fold/pattern.h"
+#include "fold/pooling.h"
+#include "fold/surround.h"
+
+namespace unseen::perception {
+
+// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's
+// limit.
+inline constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
+
+// Of patterns, from far below any width that can be seen up to the lowest frequency's.
+inline constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+inline constexpr std::size_t width_count = 184;
+inline double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
+
+// What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
+// at all luminances and eccentricities have one copy.
+struct PatternBands {
+    using Shares = std::vector<double>; // [width * bands + band]
+
+    std::vector<double> lowest_cpd; // by band
+    Shares of_patches, of_areas, of_strips;
+
+    // `summation`: of CsfSamples.
+    PatternBands(double highest_cpd, const FoldModel& model, double summation) {
+        for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
+        for (std::size_t i = 0; i < width_count; ++i) {
+            const double width = width_deg(i);
+            const SquareDegrees area = disc(width), neighbourhood = disc(width * model.neighbourhood);
+            for (const double low : lowest_cpd) {
+                const double high = std::min(low * frequency_step, highest_cpd), waves = width * high;
+                const CyclesPerDegree cpd(high);
+                of_patches.push_back(share_of_patches(waves, factors::most_side_by_side) *
+                                     summation_gain(cpd, neighbourhood, summation));
+                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area, summation));
+                of_strips.push_back(std::min(1.0, waves)); // half as wide
+            }
+        }
+    }
+};
+
+// By how many octaves the mean light around a pattern of one luminance is less than its own: [width * bands + band], as
+// PatternBands. A band looks at a neighbourhood as wide as its wave, of which the mesh lights no more than it covers of
+// the pattern's own. Empty where nothing darker is behind.
+struct Dimming {
+    std::vector<float> of_patches, of_areas;
+    std::size_t most = 0; // octaves
+
+    Dimming(const PatternBands& bands, const Surround& surround, double luminance_cdm2, double highest_cpd,
+            const FoldModel& model) {
+        const double dark = std::max(surround.darkest_cdm2, luminance_cdm2 * std::exp2(-most_dimming));
+        if (!(dark < luminance_cdm2)) return;
+        const auto octaves_below = [&](double waves) {
+            const double mean = std::max(dark, surround.mean_cdm2(luminance_cdm2, waves * waves));
+            return static_cast<float>(std::log2(luminance_cdm2 / mean));
+        };
+        for (std::size_t i = 0; i < width_count; ++i)
+            for (const double low : bands.lowest_cpd) {
+                const double waves = width_deg(i) * std::min(low * frequency_step, highest_cpd);
+                of_patches.push_back(octaves_below(waves * model.neighbourhood));
+                of_areas.push_back(octaves_below(waves));
+            }
+        most = static_cast<std::size_t>(std::ceil(std::log2(luminance_cdm2 / dark)));
+    }
+    static constexpr double most_dimming = 12; // octaves; beyond, the eye's own noise is the limit
+};
+
+// What can be seen at one luminance and eccentricity. PatternBands of frequency an octave apart look for a pattern;
+// what they see of it is pooled as the eye pools its channels; wherever the bands' octaves begin.
+class PatternEye {
+public:
+    PatternEye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen,
+               const PatternBands& bands, const Dimming& dimming, const BandElevation& masking, const FoldModel& model)
+        : screen_(screen), model_(model) {
+        // To contrasts over the pattern's own luminance, by octaves that the mean around it is less: [octaves][band].
+        Sensitivities sensitivities(dimming.most + 1);
+        for (std::size_t octaves = 0; octaves <= dimming.most; ++octaves)
+            for (std::size_t band = 0; band < bands.lowest_cpd.size(); ++band) {
+                const double less = std::exp2(static_cast<double>(octaves));
+                const double cpd = bands.lowest_cpd[band];
+                const double here = less / masking.at(cpd) *
+                                    csf.monotone_sensitivity(CyclesPerDegree(cpd), Degrees(eccentricity_deg),
+                                                             Luminance(luminance_cdm2 / less));
+                sensitivities[octaves].push_back(octaves > 0 ? std::max(here, sensitivities[octaves - 1][band]) : here);
+            }
+        const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
+        for (std::size_t i = 0; i < width_count; ++i) {
+            patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, dimming.of_patches, i));
+            areas_[i] = 1 / (factors::needed_by_areas * visibility(sensitivities, bands.of_areas, dimming.of_areas, i));
+            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, {}, i);
+        }
+    }
+
+    // The distances, in radii, from which a round patch among others like it is invisible, and an area on its own.
+    double patch_distance(double contrast) const { return switch_distance(patches_, contrast); }
+    double area_distance(double contrast) const { return switch_distance(areas_, contrast); }
+
+    // The distance, in widths, from which a long strip is invisible.
+    double strip_distance(double contrast, Course course) const {
+        const double needed = course == Course::to_and_fro ? model_.needed_by_outlines
+                              : course == Course::as_made  ? factors::needed_by_borders
+                                                           : 1;
+        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast * needed);
+        if (!std::isfinite(invisible_deg)) return 0;
+        const double counted_deg =
+            std::max(invisible_deg - factors::sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
+        return (1 + distance_rounding) * degrees_per_radian * screen_.largest_magnification / counted_deg;
+    }
+
+private:
+    static constexpr std::size_t bands_per_octave = 8;
+    using Thresholds = std::array<double, width_count>; // contrasts, by width
+    using Sensitivities = std::vector<std::vector<double>>;
+
+    // Of unit contrast, in thresholds. `dimmed`: octaves, as Dimming has them; empty: none.
+    static double visibility(const Sensitivities& sensitivities, const PatternBands::Shares& shares,
+                             std::span<const float> dimmed, std::size_t width) {
+        const std::size_t bands = sensitivities.front().size();
+        const double* const share = shares.data() + width * bands;
+        std::array<double, bands_per_octave> sums{}; // by where the octaves begin
+        for (std::size_t i = 0; i < bands; ++i) {
+            double sensitivity = sensitivities[0][i];
+            if (!dimmed.empty() && dimmed[width * bands + i] > 0) {
+                const double octaves = static_cast<double>(dimmed[width * bands + i]);
+                const auto whole = std::min(static_cast<std::size_t>(octaves), sensitivities.size() - 2);
+                sensitivity = std::lerp(sensitivities[whole][i], sensitivities[whole + 1][i],
+                                        octaves - static_cast<double>(whole));
+            }
+            sums[i % bands_per_octave] += to_power_of_pooling(share[i] * sensitivity);
+        }
+        return std::pow(*std::max_element(sums.begin(), sums.end()), 1 / pooling);
+    }
+
+    double switch_distance(const Thresholds& thresholds, double contrast) const {
+        const double invisible_deg = least_visible_width(thresholds, contrast);
+        if (!std::isfinite(invisible_deg)) return 0; // from inside only
+        const double half = invisible_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        return half < std::numbers::pi / 2 ? (1 + distance_rounding) / std::sin(half) : 1;
+    }
+
+    // The widest that is invisible; infinite where all are.
+    static double least_visible_width(const Thresholds& thresholds, double contrast) {
+        // Thresholds rise as widths fall.
+        const auto first = std::lower_bound(thresholds.begin(), thresholds.end(), contrast);
+        if (first == thresholds.begin()) return std::numeric_limits<double>::infinity();
+        if (first == thresholds.end()) return width_deg(width_count - 1);
+        const auto above = static_cast<std::size_t>(first - thresholds.begin());
+        const double t0 = thresholds[above - 1], t1 = thresholds[above]; // visible, invisible
+        const double share = t1 > t0 ? std::log(contrast / t0) / std::log(t1 / t0) : 1;
+        return widest_deg * std::pow(width_step, static_cast<double>(above - 1) + share);
+    }
+
+    const Screen& screen_;
+    const FoldModel& model_;
+    Thresholds patches_, areas_, strips_;
+};
+
+} // namespace unseen::perception

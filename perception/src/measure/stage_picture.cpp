@@ -1,0 +1,367 @@
+#include "measure/stage_picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string_view>
+#include <type_traits>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+using namespace measurement;
+constexpr std::size_t samples = stage_samples;
+constexpr float nothing = -std::numeric_limits<float>::infinity(); // is at a sample
+// Pictures in which so many surfaces lie behind each other on average are drawn with covers from there on.
+constexpr std::size_t most_layers = 4;
+
+// A footprint and its luminances.
+template <std::size_t lights>
+struct Shown : StageFootprint {
+    std::array<float, lights> of_a, of_b, of_c; // relative luminances
+    std::size_t number;                         // of the triangle
+    const StageCovers* covers;                  // null: all of it is drawn
+};
+
+// The texture of a footprint. Texels are no wider than the samples are apart: the cells' means smooth them.
+struct ShownTexture {
+    const TexturedLight& light;
+    std::size_t level;
+    glm::vec2 of_a, by_b, by_c; // texture coordinates: of a, and how they grow with the shares of b and c
+
+    ShownTexture(const StageFootprint& t, const TexturedLight& texture, const std::array<glm::vec2, 3>& uv)
+        : light(texture), of_a(uv[0]), by_b(uv[1] - uv[0]), by_c(uv[2] - uv[0]) {
+        const glm::vec2 size = texture.texture->size(), along_x = (by_b * t.v_by.x + by_c * t.w_by.x) * size,
+                        along_y = (by_b * t.v_by.y + by_c * t.w_by.y) * size;
+        const std::size_t first_wider = texture.texture->level_of(
+            std::max({std::abs(along_x.x), std::abs(along_x.y), std::abs(along_y.x), std::abs(along_y.y)}));
+        level = first_wider > 0 ? first_wider - 1 : 0;
+    }
+    UNSEEN_INLINE float at(float v, float w) const { return light.texture->nearest(level, of_a + v * by_b + w * by_c); }
+};
+
+template <class Floats>
+using Ints = std::conditional_t<sizeof(Floats) == sizeof(Float4), Int4, Int8>;
+template <class Floats>
+constexpr std::size_t width_of = sizeof(Floats) / sizeof(float);
+
+template <class Floats>
+UNSEEN_INLINE Floats lanes() {
+    Floats lane;
+    for (std::size_t i = 0; i < width_of<Floats>; ++i) lane[i] = static_cast<float>(i);
+    return lane;
+}
+
+// How many samples of a row, or rows, lie before a place: the rounding of floats that every processor has.
+template <class Floats>
+UNSEEN_INLINE Ints<Floats> counts_before(const Floats& place) {
+    const Floats all = Floats{} + samples, from = place > 0 ? place : Floats{}, in = from < all ? from : all;
+    const auto whole = __builtin_convertvector(in, Ints<Floats>);
+    return whole - (__builtin_convertvector(whole, Floats) < in); // true is -1
+}
+std::size_t count_before(float place) {
+    return static_cast<std::size_t>(counts_before(Float4{place, place, place, place})[0]);
+}
+
+// A register of consecutive rows of a triangle.
+template <class Floats>
+struct Rows {
+    Floats offset; // of a row's samples: edges that run up meet them one after the other, not all of a column at once
+    Floats y;      // from corner a
+    Ints<Floats> first, end; // samples in the triangle
+
+    UNSEEN_INLINE Rows(const StageFootprint& t, std::size_t first_row) {
+        constexpr float golden_ratio = 0.618034f;
+        const Floats row = lanes<Floats>() + static_cast<float>(first_row), all = golden_ratio * row;
+        offset = all - __builtin_convertvector(__builtin_convertvector(all, Ints<Floats>), Floats);
+        y = row + 0.5f - t.a[1];
+        // Each corner's weight grows along the row: the triangle is where none is negative.
+        const float left = std::min({t.a[0], t.b[0], t.c[0]}), right = std::max({t.a[0], t.b[0], t.c[0]});
+        Floats low = Floats{} + (left - t.a[0]), high = Floats{} + (right - t.a[0]);
+        const auto cut_by = [&](const Floats& at_start, float by) UNSEEN_INLINE_LAMBDA {
+            const Floats zero = -at_start / by;
+            if (by > 0) low = low < zero ? zero : low;
+            else if (by < 0) high = zero < high ? zero : high;
+            else high = at_start < 0 ? low : high;
+        };
+        cut_by(y * t.v_by.y, t.v_by.x);
+        cut_by(y * t.w_by.y, t.w_by.x);
+        cut_by(1 - y * (t.v_by.y + t.w_by.y), -t.v_by.x - t.w_by.x);
+        first = counts_before(low + t.a[0] - offset), end = counts_before(high + t.a[0] - offset);
+    }
+};
+
+// The samples from x0 to x1 of row y are looked at by registers, `Floats`, whether they lie in the triangle or not; a
+// texture only where it is seen. `offset`, `py`: of Rows.
+template <class Floats, std::size_t lights>
+UNSEEN_INLINE void draw_row(const Shown<lights>& t, const ShownTexture* texture, std::size_t y, float offset, float py,
+                            std::size_t x0, std::size_t x1, StageSurfaces& surfaces) {
+    constexpr std::size_t width = width_of<Floats>;
+    const auto from = static_cast<float>(x0), to = static_cast<float>(x1);
+    for (std::size_t begin = x0 / width * width; begin < x1; begin += width) {
+        const std::size_t first = y * samples + begin;
+        float* const height = surfaces.height.data() + first;
+        const Floats x = lanes<Floats>() + static_cast<float>(begin), px = x + offset - t.a[0];
+        const Floats v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
+        const Floats h = u * t.a[2] + v * t.b[2] + w * t.c[2];
+        Floats old_height;
+        std::memcpy(&old_height, height, sizeof(Floats));
+        const auto is_seen = (x >= from) & (x < to) & (h > old_height);
+        Floats its_texture{};
+        if (texture)
+            for (std::size_t i = 0; i < width; ++i)
+                if (is_seen[i]) its_texture[i] = texture->at(v[i], w[i]);
+        const Floats new_height = is_seen ? h : old_height;
+        std::memcpy(height, &new_height, sizeof(Floats));
+        for (std::size_t k = 0; k < lights; ++k) {
+            float* const light = surfaces.light[k].data() + first;
+            const Floats own = u * t.of_a[k] + v * t.of_b[k] + w * t.of_c[k],
+                         l = texture ? texture->light.with_texture(own, its_texture) : own;
+            Floats old_light;
+            std::memcpy(&old_light, light, sizeof(Floats));
+            const Floats new_light = is_seen ? l : old_light;
+            std::memcpy(light, &new_light, sizeof(Floats));
+        }
+    }
+}
+
+template <class Floats, std::size_t lights>
+UNSEEN_INLINE void draw_rows(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
+    constexpr std::size_t width = width_of<Floats>;
+    static_assert(samples % width == 0 && StageCovers::tile % width == 0);
+    StageCovers::Columns seen{0, samples};
+    for (std::size_t first = t.first, end = 0; first < t.end; first = end) {
+        end = std::min(first + width, t.end);
+        if (t.covers) { // rows of one row of tiles
+            end = std::min(end, first / StageCovers::tile * StageCovers::tile + StageCovers::tile);
+            seen = t.covers->seen(t, t.number, first / StageCovers::tile);
+            if (seen.first >= seen.end) {
+                end = std::min(first / StageCovers::tile * StageCovers::tile + StageCovers::tile, t.end);
+                continue;
+            }
+        }
+        const Rows<Floats> rows(t, first);
+        for (std::size_t i = 0; i < end - first; ++i) {
+            const std::size_t x0 = std::max(static_cast<std::size_t>(rows.first[i]), seen.first),
+                              x1 = std::min(static_cast<std::size_t>(rows.end[i]), seen.end);
+            if (x0 >= x1) continue;
+            surfaces.drawn += x1 - x0;
+            draw_row<Floats>(t, texture, first + i, rows.offset[i], rows.y[i], x0, x1, surfaces);
+        }
+    }
+}
+template <std::size_t lights>
+void draw_plain(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
+    draw_rows<Float4>(t, texture, surfaces);
+}
+#if defined(UNSEEN_EIGHT_WIDE)
+template <std::size_t lights>
+UNSEEN_AVX2 void draw_avx2(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
+    draw_rows<Float8>(t, texture, surfaces);
+}
+#else
+template <std::size_t lights>
+constexpr auto draw_avx2 = draw_plain<lights>;
+#endif
+
+// A triangle's plane at the corners of a tile.
+struct AtCorners {
+    Float4 u, v, w;
+
+    AtCorners(const StageFootprint& t, std::size_t column, std::size_t row) {
+        constexpr auto tile = static_cast<float>(StageCovers::tile);
+        const Float4 x = (static_cast<float>(column) + Float4{0, 1, 0, 1}) * tile - t.a[0],
+                     y = (static_cast<float>(row) + Float4{0, 0, 1, 1}) * tile - t.a[1];
+        v = x * t.v_by.x + y * t.v_by.y, w = x * t.w_by.x + y * t.w_by.y, u = 1 - v - w;
+    }
+    Float4 heights(const StageFootprint& t) const { return u * t.a[2] + v * t.b[2] + w * t.c[2]; }
+};
+
+bool all_of(const Int4& mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
+
+StageCovers::Columns columns_of(const StageFootprint& t) { // of tiles
+    constexpr std::size_t tile = StageCovers::tile;
+    return {count_before(std::min({t.a[0], t.b[0], t.c[0]}) - 1) / tile,
+            (count_before(std::max({t.a[0], t.b[0], t.c[0]})) + tile - 1) / tile};
+}
+
+} // namespace
+
+// ---- where pictures are taken from
+
+Float4 StageCamera::place(const glm::vec3& p) const {
+    const auto along = [&](int axis) { return Float4{right[axis], up[axis], towards[axis], 0}; };
+    const glm::vec3 q = (p - centre) * samples_per_length;
+    return q.x * along(0) + q.y * along(1) + q.z * along(2) + Float4{samples / 2.0f, samples / 2.0f, 0, 0};
+}
+
+StageCamera stage_camera(const Sphere& sphere, std::size_t number) {
+    constexpr float golden_angle = 2.39996323f;
+    const float z = 1 - static_cast<float>(2 * number + 1) / direction_count, s = std::sqrt(1 - z * z);
+    const float angle = golden_angle * static_cast<float>(number);
+    StageCamera c;
+    c.number = number;
+    c.centre = sphere.centre;
+    c.towards = {s * std::cos(angle), s * std::sin(angle), z};
+    c.right =
+        glm::normalize(glm::cross(std::abs(c.towards.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0), c.towards));
+    c.up = glm::cross(c.towards, c.right);
+    c.samples_per_length = samples / (2 * stage_margin * sphere.radius);
+    return c;
+}
+
+// ---- what hides triangles
+
+StageCovers::StageCovers()
+    : covers_(per_side * per_side, {Float4{nothing, nothing, nothing, nothing}, static_cast<std::size_t>(-1)}) {}
+
+void StageCovers::add(const StageFootprint& t, std::size_t number) {
+    constexpr float inside = 1e-3f; // of each corner's weight: beyond what rounding makes of the rows' ends
+    const Columns columns = columns_of(t);
+    for (std::size_t row = (t.first + tile - 1) / tile; row < t.end / tile; ++row) {
+        for (std::size_t column = columns.first; column < columns.end; ++column) {
+            const AtCorners at(t, column, row);
+            if (!all_of((at.u >= inside) & (at.v >= inside) & (at.w >= inside))) continue;
+            Cover& cover = covers_[row * per_side + column];
+            const Float4 height = at.heights(t), nearer = height - cover.height;
+            if (nearer[0] + nearer[1] + nearer[2] + nearer[3] > 0) cover = {height, number};
+        }
+    }
+}
+
+StageCovers::Columns StageCovers::seen(const StageFootprint& t, std::size_t number, std::size_t row) const {
+    const Columns columns = columns_of(t);
+    const auto is_hidden = [&](std::size_t column) {
+        const Cover& cover = covers_[row * per_side + column];
+        return cover.number != number && all_of(AtCorners(t, column, row).heights(t) <= cover.height);
+    };
+    Columns seen = columns;
+    while (seen.first < seen.end && is_hidden(seen.first)) ++seen.first;
+    while (seen.first < seen.end && is_hidden(seen.end - 1)) --seen.end;
+    return {seen.first * tile, seen.end * tile};
+}
+
+bool StageCovers::repeats(const StageFootprint& t) {
+    return t.end - t.first >= tile && !places_.insert({t.a, t.b, t.c}).second;
+}
+
+std::size_t StageCovers::PlaceHash::operator()(const Place& place) const {
+    return std::hash<std::string_view>()({reinterpret_cast<const char*>(place.data()), sizeof place});
+}
+
+bool StageCovers::PlaceEqual::operator()(const Place& a, const Place& b) const {
+    return std::memcmp(a.data(), b.data(), sizeof a) == 0;
+}
+
+// ---- pictures
+
+void StagePicture::subtract(const StagePicture& other) {
+    for (std::size_t i = 0; i < light.values.size(); ++i) {
+        light.values[i] -= other.light.values[i];
+        cover.values[i] -= other.cover.values[i];
+    }
+}
+
+void StageSurfaces::clear(std::size_t lights) {
+    height.assign(samples * samples, nothing);
+    for (std::size_t i = 0; i < lights; ++i) light[i].assign(samples * samples, 0.0f);
+    drawn = 0;
+}
+
+StagePainter::StagePainter(const VertexTree& tree, const TexturedLight& light, const StageCamera& camera,
+                           StageSurfaces& surfaces)
+    : light_(light), camera_(camera), positions_(tree.positions()), uvs_(tree.uvs()), closedness_(tree.closedness()),
+      surfaces_(surfaces) {}
+
+template <std::size_t lights>
+std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> triangles,
+                                                    const FunctionRef<std::array<float, lights>(NodeId)>& luminance) {
+    surfaces_.clear(lights);
+    std::optional<StageCovers> covers;
+    for (std::size_t number = 0; number < triangles.size(); ++number) {
+        const Triangle& corners = triangles[number];
+        const auto place = footprint(corners);
+        if (!place || (covers && covers->repeats(*place))) continue;
+        const Shown<lights> t{*place, luminance(corners[0]),      luminance(corners[1]), luminance(corners[2]),
+                              number, covers ? &*covers : nullptr};
+        std::optional<ShownTexture> texture;
+        if (light_.texture)
+            texture.emplace(t, light_, std::array{uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]});
+        (has_avx2() ? draw_avx2<lights> : draw_plain<lights>)(t, texture ? &*texture : nullptr, surfaces_);
+        if (covers || surfaces_.drawn <= most_layers * samples * samples) continue;
+        covers.emplace();
+        for (std::size_t later = number + 1; later < triangles.size(); ++later)
+            if (const auto its = footprint(triangles[later])) covers->add(*its, later);
+    }
+    return cells<lights>();
+}
+
+// None for what is not seen.
+std::optional<StageFootprint> StagePainter::footprint(const Triangle& corners) const {
+    StageFootprint t;
+    t.a = camera_.place(positions_[corners[0]]);
+    t.b = camera_.place(positions_[corners[1]]);
+    t.c = camera_.place(positions_[corners[2]]);
+    const Float4 ab = t.b - t.a, ac = t.c - t.a;
+    const float area = ab[0] * ac[1] - ab[1] * ac[0];
+    if ((closedness_ == Closedness::closed_outward && area < 0) ||
+        (closedness_ == Closedness::closed_inward && area > 0)) // as renderers do
+        return std::nullopt;
+    t.first = count_before(std::min({t.a[1], t.b[1], t.c[1]}) - 0.5f);
+    t.end = count_before(std::max({t.a[1], t.b[1], t.c[1]}) - 0.5f);
+    if (t.first >= t.end) return std::nullopt; // many, of fine meshes
+    const float inverse = 1 / area;
+    if (!std::isfinite(inverse)) return std::nullopt;
+    t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
+    t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
+    return t;
+}
+
+// The means of the samples, four cells at a time.
+template <std::size_t lights>
+std::array<StagePicture, lights> StagePainter::cells() const {
+    static_assert(cell_samples == 4 && stage_side % 4 == 0);
+    constexpr float share = 1.0f / (cell_samples * cell_samples);
+    std::array<StagePicture, lights> pictures;
+    for (std::size_t cell = 0; cell < stage_side * stage_side; cell += 4) {
+        const std::size_t first = cell / stage_side * cell_samples * samples + cell % stage_side * cell_samples;
+        const auto mean = [&](const std::vector<float>& plane, const auto& of_sample, Raster& to) {
+            Float4 sum{};
+            for (std::size_t y = 0; y < cell_samples; ++y) {
+                Float4 columns[cell_samples];
+                load_columns([&](std::size_t lane) { return plane.data() + first + y * samples + lane * cell_samples; },
+                             columns);
+                for (const Float4& column : columns) sum += of_sample(column);
+            }
+            sum *= share;
+            std::memcpy(to.values.data() + cell, &sum, sizeof sum);
+        };
+        mean(
+            surfaces_.height,
+            [](Float4 height) {
+                return height > nothing ? Float4{1, 1, 1, 1} : Float4{};
+            },
+            pictures[0].cover);
+        for (std::size_t k = 0; k < lights; ++k)
+            mean(
+                surfaces_.light[k], [](Float4 light) { return light; }, pictures[k].light);
+    }
+    for (std::size_t k = 1; k < lights; ++k) pictures[k].cover = pictures[0].cover;
+    return pictures;
+}
+
+template std::array<StagePicture, 1> StagePainter::draw(std::span<const Triangle>,
+                                                        const FunctionRef<std::array<float, 1>(NodeId)>&);
+template std::array<StagePicture, 3> StagePainter::draw(std::span<const Triangle>,
+                                                        const FunctionRef<std::array<float, 3>(NodeId)>&);
+template std::array<StagePicture, 4> StagePainter::draw(std::span<const Triangle>,
+                                                        const FunctionRef<std::array<float, 4>(NodeId)>&);
+
+} // namespace unseen::perception

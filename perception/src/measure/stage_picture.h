@@ -1,0 +1,129 @@
+// Pictures of the whole mesh, folded or not: what a stage of folds changes is measured on these.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <unordered_set>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <unseen/vdtree/function_ref.h>
+#include <unseen/vdtree/internal/simd.h>
+#include <unseen/vdtree/vertex_tree.h>
+
+#include "measure/lit_stages.h"
+#include "measure/measurement.h"
+#include "measure/pyramid.h"
+#include "measure/textured_light.h"
+
+namespace unseen::perception {
+
+// Where a picture is taken from: the mesh's sphere fills it, except for a margin. Lengths are in samples.
+struct StageCamera {
+    std::size_t number;
+    glm::vec3 centre, right, up, towards;
+    float samples_per_length;
+
+    vdtree::Float4 place(const glm::vec3& p) const; // to the right, up, towards the eye
+};
+// Directions of a Fibonacci spiral over the sphere.
+StageCamera stage_camera(const vdtree::Sphere& sphere, std::size_t number);
+
+// The light that comes from each cell before an unlit background, and the share of the cell that the mesh covers.
+struct StagePicture {
+    Raster light{measurement::stage_side}, cover{measurement::stage_side};
+
+    void subtract(const StagePicture& other);
+};
+
+inline constexpr std::size_t stage_samples = measurement::stage_side * measurement::cell_samples; // of a row
+
+// The nearest surface at each sample, and the light that comes from it under each of several lights.
+struct StageSurfaces {
+    std::vector<float> height; // towards the eye; -infinity where nothing is
+    std::array<std::vector<float>, LitStages::lights + 1> light;
+    std::size_t drawn = 0; // samples, hidden ones too
+
+    void clear(std::size_t lights);
+};
+
+// A triangle in a picture.
+struct StageFootprint {
+    vdtree::Float4 a, b, c; // samples: to the right, up, towards the eye
+    glm::vec2 v_by, w_by;   // how the shares of b and c grow, by sample
+    std::size_t first, end; // rows
+};
+
+// The triangles that cover whole tiles of a picture, and how near the eye they are there: triangles behind them need
+// not be drawn, so that no picture of large triangles behind or through each other costs their number times its
+// samples.
+class StageCovers {
+public:
+    static constexpr std::size_t tile = 16; // samples
+    static constexpr std::size_t per_side = stage_samples / tile;
+
+    StageCovers();
+    void add(const StageFootprint& t, std::size_t number);
+
+    struct Columns { // samples
+        std::size_t first, end;
+    };
+    // Where a triangle may be seen in a row of tiles. A triangle that was added is not hidden by itself.
+    Columns seen(const StageFootprint& t, std::size_t number, std::size_t row) const;
+
+    // Whether a triangle, wide enough to matter, lies where an earlier one does that was asked about.
+    bool repeats(const StageFootprint& t);
+
+private:
+    struct Cover {
+        vdtree::Float4 height; // at the tile's corners
+        std::size_t number;    // of the triangle
+    };
+    using Place = std::array<vdtree::Float4, 3>;
+    struct PlaceHash {
+        std::size_t operator()(const Place& place) const;
+    };
+    struct PlaceEqual {
+        bool operator()(const Place& a, const Place& b) const;
+    };
+    std::vector<Cover> covers_; // by row and column
+    std::unordered_set<Place, PlaceHash, PlaceEqual> places_;
+};
+
+// Draws into memory that is used again for other pictures.
+class StagePainter {
+public:
+    StagePainter(const vdtree::VertexTree& tree, const TexturedLight& light, const StageCamera& camera,
+                 StageSurfaces& surfaces);
+
+    // A picture under each light of triangles over nodes. `luminance`: of a node under each light, relative.
+    template <std::size_t lights>
+    std::array<StagePicture, lights> draw(std::span<const vdtree::Triangle> triangles,
+                                          const FunctionRef<std::array<float, lights>(vdtree::NodeId)>& luminance);
+
+    std::size_t drawn() const { return surfaces_.drawn; } // samples of the last picture, hidden ones too
+
+private:
+    std::optional<StageFootprint> footprint(const vdtree::Triangle& corners) const;
+    template <std::size_t lights>
+    std::array<StagePicture, lights> cells() const;
+
+    const TexturedLight& light_;
+    const StageCamera& camera_;
+    std::span<const glm::vec3> positions_;
+    std::span<const glm::vec2> uvs_;
+    vdtree::Closedness closedness_;
+    StageSurfaces& surfaces_;
+};
+extern template std::array<StagePicture, 1>
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 1>(vdtree::NodeId)>&);
+extern template std::array<StagePicture, 3>
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 3>(vdtree::NodeId)>&);
+extern template std::array<StagePicture, 4>
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 4>(vdtree::NodeId)>&);
+
+} // namespace unseen::perception
