@@ -259,7 +259,8 @@ private:
     }
     template <class Passes, class Make>
     Result<GpuMap> timed(Passes& passes, std::string note, Make&& make) const {
-        GpuMap map{.note = std::move(note)};
+        GpuMap map;
+        map.note = std::move(note);
         std::vector<double> times;
         for (int i = 0; i <= repeats_; ++i) {
             const auto start = BenchClock::now();

@@ -8,8 +8,6 @@
 namespace unseen::app {
 namespace {
 
-constexpr int samples_to_judge = 64; // a pixel; with fewer, samples that jump at outlines can be seen
-
 FoldTest test_of(const WhatOptions& what) { return what.request.fold_test.value_or(FoldTest::error); }
 bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 

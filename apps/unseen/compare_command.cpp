@@ -236,7 +236,7 @@ Result<int> run(const CompareArguments& a) {
                        {"visible_pixels", judgement.visible_pixels}, // an older name of visible_at
                        {"pixels", judgement.pixels},
                        {"max_ratio", number_or_null(judgement.max_ratio)},
-                       {"ssim", ssim ? Json(*ssim) : Json()},
+                       {"ssim", number_or_null(ssim)},
                        {"device", a.device}};
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
