@@ -1,6 +1,7 @@
 #include "measure/stage_picture.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -21,6 +22,7 @@ constexpr std::size_t samples = stage_samples;
 constexpr float nothing = -std::numeric_limits<float>::infinity(); // is at a sample
 // Pictures in which so many surfaces lie behind each other on average are drawn with covers from there on.
 constexpr std::size_t most_layers = 4;
+constexpr std::uint64_t every_tile = (std::uint64_t{1} << StageCovers::per_side) - 1;
 
 // A footprint and its luminances.
 template <std::size_t lights>
@@ -135,25 +137,29 @@ UNSEEN_INLINE void draw_row(const Shown<lights>& t, const ShownTexture* texture,
 template <class Floats, std::size_t lights>
 UNSEEN_INLINE void draw_rows(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
     constexpr std::size_t width = width_of<Floats>;
-    static_assert(samples % width == 0 && StageCovers::tile % width == 0);
-    StageCovers::Columns seen{0, samples};
+    static_assert(samples % width == 0 && StageCovers::per_side < 64);
+    constexpr std::size_t tile = StageCovers::tile;
+    std::uint64_t seen = every_tile;
     for (std::size_t first = t.first, end = 0; first < t.end; first = end) {
         end = std::min(first + width, t.end);
         if (t.covers) { // rows of one row of tiles
-            end = std::min(end, first / StageCovers::tile * StageCovers::tile + StageCovers::tile);
-            seen = t.covers->seen(t, t.number, first / StageCovers::tile);
-            if (seen.first >= seen.end) {
-                end = std::min(first / StageCovers::tile * StageCovers::tile + StageCovers::tile, t.end);
-                continue;
-            }
+            const std::size_t end_of_tiles = first / tile * tile + tile;
+            seen = t.covers->seen(t, t.number, first / tile);
+            end = std::min(seen == 0 ? t.end : end, end_of_tiles);
+            if (seen == 0) continue;
         }
         const Rows<Floats> rows(t, first);
         for (std::size_t i = 0; i < end - first; ++i) {
-            const std::size_t x0 = std::max(static_cast<std::size_t>(rows.first[i]), seen.first),
-                              x1 = std::min(static_cast<std::size_t>(rows.end[i]), seen.end);
-            if (x0 >= x1) continue;
-            surfaces.drawn += x1 - x0;
-            draw_row<Floats>(t, texture, first + i, rows.offset[i], rows.y[i], x0, x1, surfaces);
+            for (std::uint64_t left = seen; left != 0;) { // neighbouring tiles together
+                const auto from = static_cast<std::size_t>(std::countr_zero(left)),
+                           to = from + static_cast<std::size_t>(std::countr_one(left >> from));
+                left &= ~std::uint64_t{0} << to;
+                const std::size_t x0 = std::max(static_cast<std::size_t>(rows.first[i]), from * tile),
+                                  x1 = std::min(static_cast<std::size_t>(rows.end[i]), to * tile);
+                if (x0 >= x1) continue;
+                surfaces.drawn += x1 - x0;
+                draw_row<Floats>(t, texture, first + i, rows.offset[i], rows.y[i], x0, x1, surfaces);
+            }
         }
     }
 }
@@ -186,7 +192,10 @@ struct AtCorners {
 
 bool all_of(const Int4& mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
 
-StageCovers::Columns columns_of(const StageFootprint& t) { // of tiles
+struct Columns { // of tiles
+    std::size_t first, end;
+};
+Columns columns_of(const StageFootprint& t) {
     constexpr std::size_t tile = StageCovers::tile;
     return {count_before(std::min({t.a[0], t.b[0], t.c[0]}) - 1) / tile,
             (count_before(std::max({t.a[0], t.b[0], t.c[0]})) + tile - 1) / tile};
@@ -236,16 +245,15 @@ void StageCovers::add(const StageFootprint& t, std::size_t number) {
     }
 }
 
-StageCovers::Columns StageCovers::seen(const StageFootprint& t, std::size_t number, std::size_t row) const {
+std::uint64_t StageCovers::seen(const StageFootprint& t, std::size_t number, std::size_t row) const {
     const Columns columns = columns_of(t);
-    const auto is_hidden = [&](std::size_t column) {
+    std::uint64_t seen = 0;
+    for (std::size_t column = columns.first; column < columns.end; ++column) {
         const Cover& cover = covers_[row * per_side + column];
-        return cover.number != number && all_of(AtCorners(t, column, row).heights(t) <= cover.height);
-    };
-    Columns seen = columns;
-    while (seen.first < seen.end && is_hidden(seen.first)) ++seen.first;
-    while (seen.first < seen.end && is_hidden(seen.end - 1)) --seen.end;
-    return {seen.first * tile, seen.end * tile};
+        const bool is_hidden = cover.number != number && all_of(AtCorners(t, column, row).heights(t) <= cover.height);
+        seen |= static_cast<std::uint64_t>(!is_hidden) << column;
+    }
+    return seen;
 }
 
 bool StageCovers::repeats(const StageFootprint& t) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <unordered_set>
@@ -69,11 +70,8 @@ public:
     StageCovers();
     void add(const StageFootprint& t, std::size_t number);
 
-    struct Columns { // samples
-        std::size_t first, end;
-    };
-    // Where a triangle may be seen in a row of tiles. A triangle that was added is not hidden by itself.
-    Columns seen(const StageFootprint& t, std::size_t number, std::size_t row) const;
+    // The tiles of a row where a triangle may be seen, a bit each. One that was added is not hidden by itself.
+    std::uint64_t seen(const StageFootprint& t, std::size_t number, std::size_t row) const;
 
     // Whether a triangle, wide enough to matter, lies where an earlier one does that was asked about.
     bool repeats(const StageFootprint& t);
