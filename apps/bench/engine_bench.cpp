@@ -13,7 +13,7 @@
 
 #include <sample_mesh.h>
 #include <subdivide.h>
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/criteria.h>

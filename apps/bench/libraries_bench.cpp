@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include <unseen/meshio/examine.h>
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
 

@@ -34,8 +34,8 @@ Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, boo
     auto read = meshio::read_mesh(file, options);
     if (!read) return read;
     const session::Messages messages = terminal_messages();
-    for (const std::string& warning : read->warnings) messages.warning(file.string() + ": " + warning);
-    for (const std::string& note : read->notes) messages.note(file.string() + ": " + note);
+    for (const Message& warning : read->warnings) messages.warning(file.string() + ": " + warning);
+    for (const Message& note : read->notes) messages.note(file.string() + ": " + note);
     return read;
 }
 

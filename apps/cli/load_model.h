@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/session/scene.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>

@@ -33,6 +33,7 @@ constexpr OptionName option_names[] = {
     {"scene.lights", "--lights"},
     {"Scene::relight()", "--light, --ambient or --fill-light"},
     {"read.drop = ", "--drop "},
+    {"read.search_folder = ", "--texture "},
     {"read.skip_bad", "--skip-bad"},
     {"read.weld = false", "--no-weld"},
     {"load.texture", "--texture"},

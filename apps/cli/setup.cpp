@@ -185,8 +185,9 @@ void Setup::add_files() {
     CLI::App& group = add_section("files", "How mesh files are read");
     group
         .add_option("--texture", o.file,
-                    "The image that lies over a mesh with texture coordinates, in place of its materials' images")
-        ->type_name("IMAGE");
+                    "The image that lies over a mesh with texture coordinates, in place of its materials' images; or a "
+                    "folder in which these are looked for, too")
+        ->type_name("IMAGE|FOLDER");
     group.add_flag("--no-texture", o.is_left_out, "Ignore images; simplified meshes keep them");
     group
         .add_option_function<std::vector<std::string>>(

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <system_error>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/image.h>
 #include <unseen/vdtree/tree_io.h>
 

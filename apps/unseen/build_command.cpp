@@ -271,7 +271,7 @@ Result<int> run(const BuildArguments& a) {
 Command build_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<BuildArguments>(BuildArguments{setup.view_options().texture});
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTP")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
     add_choice<std::string, std::string>(*verb, "--clusterer", a->clusterer_name,
                                          {{"quadric", "quadric"}, {"octree", "octree"}, {"openmesh", "openmesh"}},

@@ -8,7 +8,7 @@
 #include <span>
 
 #include <unseen/meshio/examine.h>
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/scene_file.h>
 
 #include "load_model.h"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include <subdivide.h>
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 
 #include "load_model.h"
 #include "options.h"
@@ -64,7 +64,7 @@ Command subdivide_command(CLI::App& make, Setup& setup) {
     auto a = std::make_shared<SubdivideArguments>(SubdivideArguments{setup.view_options()});
     CLI::App* verb =
         make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTP")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The larger mesh")
         ->type_name("OUT.ply|.obj|.glb")
         ->required()

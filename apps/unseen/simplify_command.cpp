@@ -3,7 +3,7 @@
 #include <limits>
 #include <memory>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/scene_file.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
@@ -104,9 +104,9 @@ Command simplify_command(CLI::App& app, Setup& setup) {
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh, or scene, for a view");
     add_model_option(*verb, a->model);
     verb->add_option("-o,--output", a->out, "The mesh")
-        ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.vtk")
+        ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.stl|.off")
         ->required()
-        ->check(ending_in({".ply", ".obj", ".glb", ".gltf", ".vtp", ".vtk"}));
+        ->check(ending_in(meshio::written_endings()));
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     std::vector<Rule> rules;
@@ -120,7 +120,7 @@ Command simplify_command(CLI::App& app, Setup& setup) {
         "to the folder of OUT under their names, where no other file of that name may be.\n\n"
         "In a scene each node gets a mesh of its own, as seen from the view; transforms, materials, lights and the\n"
         "camera stay, and the background is written whole.\n\n"
-        "OUT.ply, .vtp and .vtk have the values of vertices that the model's PLY or VTK file had: vertices that stay\n"
+        "OUT.ply and .vtp have the values of vertices that the model's PLY or VTP file had: vertices that stay\n"
         "keep theirs, others have the mean of those that they stand for, of whole numbers the nearest one's.\n\n"
         "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
         "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"

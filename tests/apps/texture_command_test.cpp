@@ -205,63 +205,61 @@ TEST_F(TextureCommandTest, OfGltfAreFoundInTheFileAndBesideIt) {
             }
         }
     }
-    const auto complaint_about = [&](Json changed) {
+    const auto warning_of = [&](const Json& changed) {
         write_text(path("bad.gltf"), changed.dump());
-        return complaint({"build", "bad.gltf", "-o", "x.vdt"});
+        const Outcome outcome = run({"build", "bad.gltf", "-o", "x.vdt"});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.err;
     };
-    EXPECT_THAT(complaint_about(document({{"uri", "nowhere.png"}}, white)),
-                AllOf(HasSubstr("nowhere.png"), HasSubstr("--no-texture")));
-    EXPECT_THAT(complaint_about(document({{"uri", "../p.png"}}, white)), HasSubstr("only files beside the mesh"));
-    EXPECT_THAT(complaint_about(document({{"bufferView", 9}}, white)), HasSubstr("there are 4 bufferViews"));
-    EXPECT_THAT(complaint_about(document({{"bufferView", 2}}, white)), HasSubstr("image of material"));
-    EXPECT_THAT(complaint_about(document({{"uri", "p.png"}}, {1, 2, 3, 4})), HasSubstr("baseColorFactor"));
+    EXPECT_THAT(warning_of(document({{"uri", "nowhere.png"}}, white)),
+                AllOf(HasSubstr("nowhere.png"), HasSubstr("--texture FOLDER")));
+    EXPECT_THAT(warning_of(document({{"uri", "../p.png"}}, white)), HasSubstr("outside of the mesh's folder"));
+    EXPECT_THAT(warning_of(document({{"bufferView", 9}}, white)), HasSubstr("there are 4 bufferViews"));
+    EXPECT_THAT(warning_of(document({{"bufferView", 2}}, white)), HasSubstr("image of material"));
+    EXPECT_THAT(warning_of(document({{"uri", "p.png"}}, {1, 2, 3, 4})), HasSubstr("baseColorFactor"));
     Json far_set = document({{"uri", "p.png"}}, white);
     far_set["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 8;
-    EXPECT_THAT(complaint_about(far_set), HasSubstr("0 to 7"));
+    EXPECT_THAT(warning_of(far_set), HasSubstr("0 to 7"));
 }
 
+// Without its image a mesh is drawn in its colour; each run warns, those that read the tree from the cache, too.
 TEST_F(TextureCommandTest, BadImagesAreNamed) {
-    const auto complaint_about = [&](const std::string& image) {
-        write_square(image);
-        return complaint({"build", "square.obj", "-o", "x.vdt"});
-    };
-    EXPECT_THAT(complaint_about("missing.png"),
-                AllOf(HasSubstr("missing.png"), HasSubstr("no such file"), HasSubstr("--no-texture")));
-    write_text(path("empty.png"), "");
-    EXPECT_THAT(complaint_about("empty.png"), HasSubstr("is empty"));
-    write_text(path("text.png"), "hello");
-    EXPECT_THAT(complaint_about("text.png"), HasSubstr("neither PNG"));
     write_png("p.png", halves(64));
-    const std::string png = read_text(path("p.png"));
-    write_text(path("cut.png"), png.substr(0, png.size() / 2));
-    EXPECT_THAT(complaint_about("cut.png"), HasSubstr("damaged PNG"));
-    std::string whole = jpeg(halves(64));
-    for (std::size_t size = 3; size < whole.size(); size += 37) {
-        write_text(path("cut.jpg"), whole.substr(0, size));
-        EXPECT_THAT(complaint_about("cut.jpg"), HasSubstr("damaged JPEG")) << size;
-    }
+    const std::string png = read_text(path("p.png")), whole = jpeg(halves(64));
     // The height and width in the frame's header.
     const std::size_t frame = whole.find("\xFF\xC0");
     ASSERT_NE(frame, std::string::npos);
-    std::string huge = whole;
-    for (std::size_t i = 5; i < 9; ++i) huge[frame + i] = '\x3f';
-    write_text(path("huge.jpg"), huge);
-    EXPECT_THAT(complaint_about("huge.jpg"), HasSubstr("cannot hold"));
-    for (std::size_t i = 5; i < 9; ++i) huge[frame + i] = '\x4f'; // 20,303
-    write_text(path("huger.jpg"), huge);
-    EXPECT_THAT(complaint_about("huger.jpg"), HasSubstr("scale it down"));
-    // Floats that are none, and that no display shows.
-    write_text(path("nan.pfm"), std::string("Pf\n1 1\n-1.0\n") + std::string("\x00\x00\xc0\x7f", 4));
-    EXPECT_THAT(complaint_about("nan.pfm"), AllOf(HasSubstr("pixel (0, 0)"), HasSubstr("not a finite number")));
-    write_text(path("two.pfm"), std::string("Pf\n1 1\n-1.0\n") + std::string("\x00\x00\x00\x40", 4));
-    EXPECT_THAT(complaint_about("two.pfm"), HasSubstr("values from 0 to 1"));
-    EXPECT_THAT(complaint_about("../p.png"), HasSubstr("only files beside the mesh"));
-    EXPECT_THAT(complaint_about(""), AllOf(HasSubstr("line 3"), HasSubstr("names no image")));
-    write_text(path("square.mtl"), "newmtl paint\nKd 1 nan 1\n");
-    EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt"}),
-                AllOf(HasSubstr("square.mtl: line 2"), HasSubstr("from 0 to 1")));
-    write_square("missing.png");
-    EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).status, 0);
+    std::string huge = whole, huger = whole;
+    for (std::size_t i = 5; i < 9; ++i) huge[frame + i] = '\x3f', huger[frame + i] = '\x4f'; // 20,303
+    const std::string pfm = "Pf\n1 1\n-1.0\n";
+    struct {
+        std::string name, bytes, warning;
+    } const images[] = {{"missing.png", "", "'missing.png' is neither beside"},
+                        {"empty.png", "", "is empty"},
+                        {"text.png", "hello", "text.png: is neither PNG"},
+                        {"cut.png", png.substr(0, png.size() / 2), "damaged PNG"},
+                        {"cut3.jpg", whole.substr(0, 3), "damaged JPEG"},
+                        {"cut40.jpg", whole.substr(0, 40), "damaged JPEG"},
+                        {"cut.jpg", whole.substr(0, whole.size() - 40), "damaged JPEG"},
+                        {"huge.jpg", huge, "cannot hold"},
+                        {"huger.jpg", huger, "scale it down"},
+                        {"nan.pfm", pfm + std::string("\x00\x00\xc0\x7f", 4), "not a finite number"},
+                        {"two.pfm", pfm + std::string("\x00\x00\x00\x40", 4), "values from 0 to 1"},
+                        {"../p.png", "", "outside of the mesh's folder"}};
+    for (const auto& image : images) {
+        if (image.name != "missing.png" && image.name != "../p.png") write_text(path(image.name), image.bytes);
+        write_square(image.name);
+        for (const int time : {1, 2}) {
+            const Outcome outcome = run({"simplify", "square.obj", "-o", "x.ply"});
+            EXPECT_EQ(outcome.status, 0) << outcome.err;
+            EXPECT_THAT(outcome.err, AllOf(HasSubstr(image.warning), HasSubstr("colour of the material alone"),
+                                           HasSubstr("--texture")))
+                << time;
+        }
+        EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt", "--texture", image.name}), HasSubstr(image.name));
+    }
+    EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).err.find("colour of the material"),
+              std::string::npos);
 }
 
 TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
@@ -271,8 +269,8 @@ TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
                 HasSubstr("no texture coordinates"));
     write_text(path("nan.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 1 1\nf 1/1 2/2 3/3\n");
     const Outcome outcome = run({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"});
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, HasSubstr("texture coordinates of vertex 1 are not finite"));
+    EXPECT_EQ(outcome.status, 0);
+    EXPECT_THAT(outcome.err, HasSubstr("1 texture coordinate was not finite"));
 }
 
 TEST_F(TextureCommandTest, MissingMaterialsAreNoted) {

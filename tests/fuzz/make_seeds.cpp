@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include <unseen/calibration/calibration.h>
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/image.h>
 #include <unseen/session/selection.h>
 #include <unseen/vdtree/builder.h>
@@ -22,7 +22,7 @@
 #include "jpeg_file.h"
 #include "mesh_files.h"
 #include "shapes.h"
-#include "vtk_files.h"
+#include "vtp_files.h"
 
 namespace {
 
@@ -49,13 +49,13 @@ void write_for_reader(const fs::path& file, char reader, const fs::path& mesh) {
 
 // In the order of mesh_fuzz.cpp.
 char reader_of(const fs::path& mesh) {
-    constexpr std::string_view endings[] = {".ply", ".obj", ".off", ".stl", ".gltf", ".glb", ".vtp", ".vtk", ".mtl"};
+    constexpr std::string_view endings[] = {".ply", ".obj", ".off", ".stl", ".gltf", ".glb", ".vtp", ".mtl"};
     return static_cast<char>(std::find(std::begin(endings), std::end(endings), mesh.extension()) - std::begin(endings));
 }
 
 void make_meshes(const fs::path& folder) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(1));
-    for (const std::string ending : {".ply", ".obj", ".glb", ".vtp", ".vtk"}) {
+    for (const std::string ending : {".ply", ".obj", ".glb", ".vtp"}) {
         const fs::path plain = folder / ("plain" + ending);
         expect(meshio::write_mesh(plain, mesh.view()));
         write_for_reader(folder / ("mesh" + ending), reader_of(plain), plain);
@@ -72,7 +72,7 @@ void make_meshes(const fs::path& folder) {
           "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
           "\"nodes\":[0]}]}");
     write(folder / "colours.mtl",
-          "\10newmtl a\nKd 0.5 0.25 1\nd 0.5\nmap_Kd -s 2 2 1 -o 0 0 0 images/a.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n");
+          "\7newmtl a\nKd 0.5 0.25 1\nd 0.5\nmap_Kd -s 2 2 1 -o 0 0 0 images/a.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n");
 }
 
 // Read as a scene: instances, a camera, lights.
@@ -89,19 +89,8 @@ void make_scene(const fs::path& folder) {
     write(folder / "scene.glb", '\4' + mesh_files::glb(json, mesh_files::gltf_triangle_data()));
 }
 
-void make_vtk(const fs::path& folder) {
-    for (const auto& [name, bytes] : vtk_files::samples()) write(folder / name, reader_of(name) + bytes);
-    // The statements of legacy files.
-    write(folder / "statements.vtk",
-          '\7' + vtk_files::vtk_quad(false, false,
-                                     "METADATA\nCOMPONENT_NAMES\nx\n\n\n\nCELL_DATA 1\nSCALARS q float 1\n"
-                                     "LOOKUP_TABLE t\n1\nLOOKUP_TABLE t 1\n0 0 0 1\nPOINT_DATA 4\nNORMALS n float\n"
-                                     "0 0 1 0 0 1 0 0 1 0 0 1\nTEXTURE_COORDINATES t 2 float\n0 0 1 0 1 1 0 1\n"
-                                     "COLOR_SCALARS c 1\n0 0 1 1\nFIELD f 3\nNULL_ARRAY\nw 1 2 string\na\nb\n"
-                                     "b 1 4 bit\n0 1 1 0\n"));
-    write(folder / "strings.vtk", '\7' + vtk_files::vtk_quad(true, true,
-                                                             std::string("POINT_DATA 4\nFIELD f 2\nw 1 2 string\n\xC1"
-                                                                         "a\x80\1b\nb 3 4 bit\nxy\n")));
+void make_vtp(const fs::path& folder) {
+    for (const auto& [name, bytes] : vtp_files::samples()) write(folder / name, reader_of(name) + bytes);
 }
 
 Mesh with_values(Mesh mesh) {
@@ -254,7 +243,7 @@ int main(int count, char** arguments) try {
         fs::create_directories(folder / target);
     make_meshes(folder / "mesh");
     make_scene(folder / "mesh");
-    make_vtk(folder / "mesh");
+    make_vtp(folder / "mesh");
     make_trees(folder / "tree");
     make_drives(folder / "follow");
     make_images(folder / "image");

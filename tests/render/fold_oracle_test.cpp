@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/display.h>
 #include <unseen/perception/internal/cut_rings.h>

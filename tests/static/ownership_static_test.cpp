@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/function_ref.h>

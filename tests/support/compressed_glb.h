@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>

@@ -1,5 +1,5 @@
 // Files that lie, end early or were damaged: one clear sentence, no crash, no allocation out of proportion.
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -12,7 +12,7 @@
 #include "temp_folder.h"
 #include "text_scanner.h"
 #include "tree_file.h"
-#include "vtk_files.h"
+#include "vtp_files.h"
 
 #include <cstdint>
 #include <cstdlib>
@@ -78,7 +78,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 std::vector<std::pair<std::string, std::string>> all_samples() {
     auto samples = mesh_files::samples();
-    for (auto& sample : vtk_files::samples()) samples.push_back(std::move(sample));
+    for (auto& sample : vtp_files::samples()) samples.push_back(std::move(sample));
     return samples;
 }
 
@@ -91,7 +91,7 @@ std::size_t dispensable_bytes(const std::string& name) {
     if (name == "quad.off") return std::string(" 255 0 0\n").size();
     if (name == "ascii.stl") return std::string(" part one\n").size();
     if (name.starts_with("raw") || name.starts_with("base64"))
-        return (vtk_files::VtpFile::tail_of_appended() + "</VTKFile>").size();
+        return (vtp_files::VtpFile::tail_of_appended() + "</VTKFile>").size();
     return 0;
 }
 
@@ -360,27 +360,9 @@ TEST(MalformedMesh, AMeshWithoutTrianglesIsAnError) {
 
 TEST(MalformedMesh, ObjIndicesAreChecked) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
-    for (const std::string corner : {"0",
-                                     "4",
-                                     "-4",
-                                     "4294967297",
-                                     "-4294967295",
-                                     "9223372036854775808",
-                                     "-9223372036854775808",
-                                     "-99999999999999999999",
-                                     "3/2",
-                                     "3/0",
-                                     "3/-2",
-                                     "3//2",
-                                     "3/1/2",
-                                     "3/1/1/1",
-                                     "/1",
-                                     "3.5",
-                                     "x",
-                                     "3x",
-                                     "--1",
-                                     "+-1",
-                                     "3/x"}) {
+    for (const std::string corner :
+         {"0", "4", "-4", "4294967297", "-4294967295", "9223372036854775808", "-9223372036854775808",
+          "-99999999999999999999", "3/1/1/1", "/1", "3.5", "x", "3x", "--1", "+-1", "3/x"}) {
         EXPECT_THAT(error_of(vertices + "f 1 2 " + corner + "\n", "a.obj"), HasSubstr("a.obj: line 6: ")) << corner;
     }
 }
@@ -516,7 +498,7 @@ TEST(MalformedMesh, GltfJsonMayNotBeNestedDeeply) {
 TEST(MalformedMesh, GltfJsonHasNoNulBytes) {
     const std::string data = mesh_files::gltf_triangle_data();
     const std::string json = mesh_files::gltf_triangle_json(
-        R"([{"mesh":0}])", R"({"byteLength":42,"uri":"data:;base64,)" + vtk_files::base64(data) + R"("})");
+        R"([{"mesh":0}])", R"({"byteLength":42,"uri":"data:;base64,)" + vtp_files::base64(data) + R"("})");
     ASSERT_TRUE(is_read_or_refused(json, "a.gltf"));
     for (const std::string& behind : {"\0"s, "\0{}"s, " \n\0"s})
         EXPECT_THAT(error_of(json + behind, "a.gltf"), HasSubstr("a NUL byte, which no JSON contains"));

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 

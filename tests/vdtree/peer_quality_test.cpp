@@ -14,7 +14,7 @@
 #include <meshoptimizer.h>
 #endif
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 
 #include "clustering_tools.h"
 #include "extra_meshes.h"

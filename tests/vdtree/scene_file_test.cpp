@@ -2,8 +2,10 @@
 #include <unseen/meshio/scene_file.h>
 
 #include "mesh_files.h"
+#include "mesh_readers.h"
 #include "temp_folder.h"
 
+#include <array>
 #include <cmath>
 #include <random>
 #include <set>
@@ -62,6 +64,32 @@ TEST(SceneFile, ReadsInstancesOfOneMesh) {
     EXPECT_EQ(read.nodes[2].to_world[3], glm::dvec4(1, 5, 0, 1)) << "below its parent";
     EXPECT_EQ(read.nodes[2].to_world[0], glm::dvec4(2, 0, 0, 0));
     for (const meshio::SceneNode& node : read.nodes) EXPECT_EQ(node.mesh, 0);
+}
+
+TEST(SceneFile, ReadsInstancesOfExtension) {
+    json instanced = document(R"({"nodes": [{"mesh": 0, "name": "ball", "translation": [0, 0, 5], "children": [1],
+        "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0, "SCALE": 0, "_ID": 1}}}},
+        {"mesh": 0, "name": "child"}], "scenes": [{"nodes": [0]}],
+        "extensionsUsed": ["EXT_mesh_gpu_instancing"], "extensionsRequired": ["EXT_mesh_gpu_instancing"]})");
+    const auto file = open(instanced);
+    ASSERT_TRUE(file) << file.error().message;
+    const meshio::SceneContents& read = file->contents();
+    EXPECT_TRUE(read.is_scene);
+    ASSERT_EQ(read.nodes.size(), 4u);
+    EXPECT_EQ(read.nodes[0].name, "child");
+    for (int i = 0; i < 3; ++i) {
+        const glm::dvec3 place = std::array{glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)}[i];
+        EXPECT_EQ(read.nodes[i + 1].name, "ball " + std::to_string(i));
+        EXPECT_EQ(read.nodes[i + 1].to_world[3], glm::dvec4(place + glm::dvec3(0, 0, 5), 1));
+        EXPECT_EQ(read.nodes[i + 1].to_world[0][0], place.x);
+    }
+    EXPECT_THAT(read.warnings, testing::ElementsAre("values of instances (EXT_mesh_gpu_instancing) were left out."));
+    EXPECT_EQ(read.source.json.find("instancing"), std::string::npos) << "each is a node now";
+    instanced["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"].erase("SCALE");
+    const auto moved =
+        meshio::read_mesh_bytes(mesh_files::glb(instanced.dump(), mesh_files::gltf_triangle_data()), "s.glb");
+    ASSERT_TRUE(moved) << moved.error().message;
+    EXPECT_EQ(moved->mesh.triangles.size(), 4u);
 }
 
 TEST(SceneFile, IsAModelWithoutCamerasLightsAndInstances) {
@@ -194,8 +222,8 @@ TEST(SceneFile, NamesWhatIsWrong) {
     EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0, "extras": {"unseen": {"background": "yes"}}}]})"),
                 HasSubstr("extras.unseen.background"));
     EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0}], "extras": {"unseen": {"exposure": 0}}})"), HasSubstr("exposure"));
-    EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0}], "extensionsRequired": ["EXT_mesh_gpu_instancing"]})"),
-                HasSubstr("EXT_mesh_gpu_instancing"));
+    EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0}], "extensionsRequired": ["KHR_draco_mesh_compression"]})"),
+                HasSubstr("needs the extension KHR_draco_mesh_compression, which is not read; export it without"));
     EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0}], "extensionsRequired": ["VENDOR_magic"]})"),
                 HasSubstr("VENDOR_magic"));
     EXPECT_THAT(complaint(R"({"nodes": [{"mesh": 0}], "buffers": [{"byteLength": 42, "uri": "gone.bin"}]})"),

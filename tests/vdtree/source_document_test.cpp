@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>

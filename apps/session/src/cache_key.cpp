@@ -19,13 +19,15 @@
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/names.h>
 
+#include "textures.h"
+
 namespace unseen::session {
 namespace {
 
 namespace fs = std::filesystem;
 
 // One more where the same file gives another tree, or trees are written in another way.
-constexpr std::uint32_t revision = 2;
+constexpr std::uint32_t revision = 3;
 // More is no mesh that anybody has made.
 constexpr std::size_t most_words = 64, most_names = 4096;
 
@@ -110,26 +112,38 @@ void add_uris(std::string_view text, Names& names) {
     }
 }
 
-// Readers look at nothing else than what lies beside the mesh or below.
-std::optional<std::string> read_beside(const fs::path& mesh, const fs::path& name) {
-    if (!name.is_relative() || std::find(name.begin(), name.end(), "..") != name.end()) return std::nullopt;
-    auto bytes = read_regular_file(mesh.parent_path() / name);
-    return bytes ? std::optional(std::move(*bytes)) : std::nullopt;
+// The files that a name may mean. Readers look at nothing else than what lies beside the mesh or below, or in the folder
+// of LoadOptions::texture.
+std::vector<std::string> read_named(const fs::path& mesh, const fs::path& name, const fs::path& search) {
+    const auto is_within = [](const fs::path& path) {
+        return path.is_relative() && std::find(path.begin(), path.end(), "..") == path.end();
+    };
+    std::set<fs::path> places;
+    if (is_within(name)) places.insert(mesh.parent_path() / name);
+    if (!search.empty()) {
+        const fs::path root = fs::absolute(search).lexically_normal();
+        for (const fs::path& place : {mesh.parent_path() / name, search / name, search / name.filename()})
+            if (is_within(fs::absolute(place).lexically_normal().lexically_relative(root))) places.insert(place);
+    }
+    std::vector<std::string> files;
+    for (const fs::path& place : places)
+        if (auto bytes = read_regular_file(place)) files.push_back(std::move(*bytes));
+    return files;
 }
 
 // All that a mesh's text names, relative to its folder: libraries, buffers, images.
-Names names_in(const fs::path& file, std::string_view mesh) {
+Names names_in(const fs::path& file, std::string_view mesh, const fs::path& search = {}) {
     Names names = std::set<std::string>();
     add_after("mtllib", mesh, names);
     add_uris(mesh, names);
     if (!names) return names;
     const std::set<std::string> of_mesh = *names;
     for (const std::string& name : of_mesh) {
-        const auto library = read_beside(file, name);
-        if (!library || library->find("newmtl") == library->npos) continue;
         Names images = std::set<std::string>();
-        for (const char* keyword : {"map_", "bump", "disp", "decal", "norm", "refl"})
-            add_after(keyword, *library, images);
+        for (const std::string& library : read_named(file, name, search))
+            if (library.find("newmtl") != library.npos)
+                for (const char* keyword : {"map_", "bump", "disp", "decal", "norm", "refl"})
+                    add_after(keyword, library, images);
         if (!images) return images;
         for (const std::string& image : *images) { // beside the library, or beside the mesh
             add(names, image);
@@ -202,13 +216,12 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
     const auto mesh = read_regular_file(file);
     if (!mesh) return std::nullopt;
     hash.add(*mesh);
-    const Names names = names_in(file, *mesh);
+    const fs::path search = names_folder(options) ? options.texture : fs::path();
+    const Names names = names_in(file, *mesh, search);
     if (!names) return std::nullopt;
-    for (const std::string& name : *names) {
-        const auto bytes = read_beside(file, name);
-        if (bytes) hash.add(name), hash.add(*bytes);
-    }
-    if (!options.texture.empty()) {
+    for (const std::string& name : *names)
+        for (const std::string& bytes : read_named(file, name, search)) hash.add(name), hash.add(bytes);
+    if (!options.texture.empty() && search.empty()) {
         const auto texture = read_regular_file(options.texture);
         if (!texture) return std::nullopt;
         hash.add("texture"), hash.add(*texture);

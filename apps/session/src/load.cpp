@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string_view>
 
 #include <unseen/perception/fold_measurement.h>
@@ -36,6 +37,35 @@ Result<vdtree::VertexTree> as_asked(Result<vdtree::VertexTree> tree, const fs::p
     return tree;
 }
 
+constexpr char name_begins = '\1', name_ends = '\2';
+
+// A message as text that remembers which of its parts are names.
+std::string with_marks(const Message& message) {
+    std::string text = message;
+    const auto names = message.names();
+    for (std::size_t i = names.size(); i-- > 0;) {
+        text.insert(names[i].begin + names[i].size, 1, name_ends);
+        text.insert(names[i].begin, 1, name_begins);
+    }
+    return text;
+}
+
+Message without_marks(std::string_view text) {
+    Message message;
+    while (!text.empty()) {
+        const std::size_t begin = std::min(text.find(name_begins), text.size());
+        const std::size_t end = std::min(text.find(name_ends, begin), text.size());
+        message = message + std::string(text.substr(0, begin));
+        if (begin < end)
+            message = message + Message::of("{" + std::string(text.substr(begin + 1, end - begin - 1)) + "}");
+        text.remove_prefix(std::min(end + 1, text.size()));
+    }
+    return message;
+}
+
+// What the reader of a tree's mesh warned of, a line each: an attribute of trees in the cache.
+constexpr const char* reading_warnings = "reading_warnings";
+
 Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& options) {
     auto read = read_textured_mesh(file, options);
     if (!read) return read.error();
@@ -47,7 +77,22 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     if (!tree) return Error{tree.error().code, file.string() + ": " + tree.error().message};
     if (const Message hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
         options.messages.note(file.string() + ": " + hint);
-    return measured_as_asked(std::move(*tree), options, options.messages.progress);
+    tree = measured_as_asked(std::move(*tree), options, options.messages.progress);
+    if (!tree || read->warnings.empty()) return tree;
+    std::vector<std::uint8_t> text;
+    for (const Message& warning : read->warnings) {
+        const std::string line = with_marks(warning) + "\n";
+        text.insert(text.end(), line.begin(), line.end());
+    }
+    return tree->with_attribute(reading_warnings, vdtree::AttributeDomain::tree, std::move(text));
+}
+
+// Says again what reading the mesh of a tree from the cache said.
+void warn_again(const vdtree::VertexTree& tree, const fs::path& file, const Messages& messages) {
+    if (!messages.warning) return;
+    const auto bytes = tree.attribute<std::uint8_t>(reading_warnings);
+    std::istringstream lines(std::string(bytes.begin(), bytes.end()));
+    for (std::string line; std::getline(lines, line);) messages.warning(file.string() + ": " + without_marks(line));
 }
 
 // Of files in the cache, behind the source's name.
@@ -90,7 +135,10 @@ Result<LoadedTree> load_mesh(const fs::path& file, const LoadOptions& options) {
     if (key) {
         auto kept = cache.find(*key, options.messages.progress);
         if (!kept) return kept.error();
-        if (*kept) return with_place(std::move(**kept), TreeOrigin::cache);
+        if (*kept) {
+            warn_again(**kept, file, options.messages);
+            return with_place(std::move(**kept), TreeOrigin::cache);
+        }
     }
     auto tree = make_and_keep(
         cache, key, file, options.messages,
@@ -133,18 +181,15 @@ std::string name_of(TreeOrigin origin) {
 
 Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOptions& options,
                                               meshio::ReadOptions reading) {
-    reading.images = options.texture.empty() && !options.without_textures;
-    reading.drop = options.drop;
-    reading.skip_bad = options.skip_bad;
-    reading.weld = options.weld;
+    reading = reading_options(options, std::move(reading));
     reading.progress = options.messages.progress;
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
     if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     if (options.messages.warning)
-        for (const std::string& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
+        for (const Message& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
     if (options.messages.note)
-        for (const std::string& note : read->notes) options.messages.note(file.string() + ": " + note);
+        for (const Message& note : read->notes) options.messages.note(file.string() + ": " + note);
     return read;
 }
 
@@ -199,7 +244,14 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
     if (!kept) return kept.error();
     if (*kept) return std::move(**kept);
     return make_and_keep(
-        place->cache, place->key, place->file, messages, [&] { return measured(tree, 0, messages.progress); },
+        place->cache, place->key, place->file, messages,
+        [&]() -> Result<vdtree::VertexTree> {
+            auto with_folds = measured(tree, 0, messages.progress);
+            const auto warnings = tree.attribute<std::uint8_t>(reading_warnings);
+            if (!with_folds || warnings.empty()) return with_folds;
+            return with_folds->with_attribute(reading_warnings, vdtree::AttributeDomain::tree,
+                                              std::vector(warnings.begin(), warnings.end()));
+        },
         [&](const vdtree::VertexTree&) { return "measured the tree of " + place->file.string(); });
 }
 

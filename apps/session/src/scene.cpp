@@ -7,6 +7,7 @@
 
 #include "loaded_tree.h"
 #include "scene_from_file.h"
+#include "textures.h"
 
 #include <glm/geometric.hpp>
 

@@ -260,18 +260,9 @@ bool is_turned(const vdtree::Similarity& placement) {
 
 } // namespace
 
-meshio::ReadOptions reading_options(const LoadOptions& options) {
-    meshio::ReadOptions reading;
-    reading.images = options.texture.empty() && !options.without_textures;
-    reading.drop = options.drop;
-    reading.skip_bad = options.skip_bad;
-    reading.weld = options.weld;
-    return reading;
-}
-
 Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const LoadOptions& options) {
     const meshio::SceneContents& contents = file.contents();
-    if (!options.texture.empty())
+    if (!options.texture.empty() && !names_folder(options))
         return invalid_field(
             "{} is a scene, and {load.texture} lies over one model: leave it out, or read the file with "
             "{load.as = }model.",
@@ -311,9 +302,9 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
         placed.push_back({&node, factored->placement, part});
     }
     if (options.messages.warning)
-        for (const std::string& warning : contents.warnings) options.messages.warning(name.string() + ": " + warning);
+        for (const Message& warning : contents.warnings) options.messages.warning(name.string() + ": " + warning);
     if (options.messages.note)
-        for (const std::string& note : contents.notes) options.messages.note(name.string() + ": " + note);
+        for (const Message& note : contents.notes) options.messages.note(name.string() + ": " + note);
 
     // The test by errors knows the trees' own light alone.
     const bool is_lit = !options.prelit && (!contents.lights.empty() || turns);

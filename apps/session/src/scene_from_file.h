@@ -8,7 +8,4 @@ namespace unseen::session {
 // Of a file that SceneFile has read, as Scene::load() says.
 Result<Scene> scene_from(meshio::SceneFile file, const std::filesystem::path& name, const LoadOptions& options);
 
-// What the options leave of images, skins and so on.
-meshio::ReadOptions reading_options(const LoadOptions& options);
-
 } // namespace unseen::session

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -23,25 +24,18 @@ using vdtree::Mesh;
 using vdtree::MeshRange;
 using vdtree::Texture;
 
-// What one can do about a bad image, in the same sentence.
-Message with_advice(Message complaint) {
-    if (complaint.ends_with('.')) complaint.pop_back();
-    return complaint + Message::of(" ({load.texture} names another image, {load.without_textures} leaves images out).");
-}
-
 constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unused = no_material - 1;
 
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
-    using Look = std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>,
-                            std::array<double, 6>>;
+    using Look =
+        std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>, std::array<double, 6>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
         const meshio::Material& m = read.materials[i];
         const glm::dmat2& uv = m.uv_map.linear;
-        const Look look{m.image,
-                        m.image_bytes.get(),
+        const Look look{m.image_bytes.get(),
                         m.wrap_u,
                         m.wrap_v,
                         {m.colour.r, m.colour.g, m.colour.b, m.colour.a},
@@ -89,39 +83,46 @@ std::vector<std::size_t> part_vertices(meshio::ReadResult& read, const std::vect
     return of_vertex;
 }
 
-// The images that are asked for, each decoded once.
+// The images that are asked for, each decoded once. Null: it could not be decoded.
 class Images {
 public:
-    Images(std::filesystem::path mesh_file, bool from_top) : mesh_file_(std::move(mesh_file)), from_top_(from_top) {}
+    explicit Images(bool from_top) : from_top_(from_top) {}
 
-    Result<const Texture*> of(const meshio::Material& material) {
-        const bool is_embedded = material.image.empty();
-        const std::filesystem::path file =
-            is_embedded
-                ? std::filesystem::path(mesh_file_.string() + ": the image of material " + in_quotes(material.name))
-                : mesh_file_.parent_path() / material.image;
-        auto [entry, is_new] =
-            images_.try_emplace({material.image, material.image_bytes.get(), material.wrap_u, material.wrap_v});
+    const Texture* of(const meshio::Material& material) {
+        auto [entry, is_new] = images_.try_emplace({material.image_bytes.get(), material.wrap_u, material.wrap_v});
         if (is_new) {
-            auto texture =
-                is_embedded ? decode_texture(*material.image_bytes, file, from_top_) : read_texture(file, from_top_);
-            if (!texture) return Error{texture.error().code, with_advice(texture.error().message)};
-            if (!texels_.spend(texture->texels.size()))
-                return Error{ErrorCode::unsupported,
-                             with_advice(mesh_file_.string() + ": its images have more than 2^29 pixels in all; scale "
-                                                               "them down")};
-            entry->second = std::move(*texture);
-            entry->second.wrap_u = material.wrap_u;
-            entry->second.wrap_v = material.wrap_v;
+            const std::string name = material.image.empty() ? "the image of material '" + material.name + "'"
+                                                            : material.image.generic_string();
+            auto texture = decode_texture(*material.image_bytes, name, from_top_);
+            if (!texture) complaints_.push_back(texture.error().message);
+            else if (!texels_.spend(texture->texels.size()))
+                complaints_.push_back(name + ": with it the images have more than 2^29 pixels in all; scale it down.");
+            else {
+                entry->second = std::move(*texture);
+                entry->second->wrap_u = material.wrap_u;
+                entry->second->wrap_v = material.wrap_v;
+            }
         }
-        return &entry->second;
+        return entry->second ? &*entry->second : nullptr;
+    }
+
+    // A sentence on the images that could not be decoded, and the triangles that are drawn without; or nothing.
+    void warn(std::uint64_t triangles, std::vector<Message>& warnings) const {
+        if (complaints_.empty()) return;
+        const std::string first = complaints_.front().substr(0, complaints_.front().size() - 1);
+        const std::string count = complaints_.size() == 1 ? "" : "the first of " + std::to_string(complaints_.size());
+        warnings.push_back(
+            Message::of("{} the colour of the material alone, as an image could not be decoded ({}{}); "
+                        "{load.texture} names another image.",
+                        {std::to_string(triangles) + (triangles == 1 ? " triangle shows" : " triangles show"),
+                         count.empty() ? "" : count + ": ", first}));
     }
 
 private:
-    std::filesystem::path mesh_file_;
     bool from_top_;
     Budget texels_{0, 0, std::uint64_t{1} << 29};
-    std::map<std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
+    std::map<std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap>, std::optional<Texture>> images_;
+    std::vector<std::string> complaints_;
 };
 
 // The reflectance of a vertex: its own colour times its material's, and the texture's where it has one. Each is white
@@ -132,21 +133,13 @@ void colour_vertices(Mesh& mesh, const std::vector<Material>& materials, const s
         if (of_vertex[v] < materials.size()) mesh.colours[v] *= materials[of_vertex[v]].colour;
 }
 
-Result<void> check_uvs(const std::filesystem::path& mesh_file, const meshio::ReadResult& read) {
-    if (read.mesh.uvs.empty())
-        return Error{
-            ErrorCode::malformed_data,
-            with_advice(mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies")};
-    if (read.bad_uv)
-        return Error{ErrorCode::malformed_data,
-                     with_advice(mesh_file.string() + ": the texture coordinates of vertex " +
-                                 std::to_string(*read.bad_uv) + " are not finite; correct them")};
-    return {};
-}
-
 Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read,
                      const std::filesystem::path& image) {
-    if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
+    if (read.mesh.uvs.empty())
+        return Error{ErrorCode::malformed_data,
+                     Message::of("{}: it has no texture coordinates, which say where the image of {load.texture} lies; "
+                                 "leave it out.",
+                                 {mesh_file.string()})};
     auto texture = read_texture(image, read.uvs_from_top);
     if (!texture) return texture.error();
     read.mesh.texture = std::move(*texture);
@@ -171,15 +164,18 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
                                               const std::vector<std::size_t>& of_vertex) {
     Mesh& mesh = read.mesh;
     const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
-    Images images(mesh_file, read.uvs_from_top);
+    Images images(read.uvs_from_top);
     static const Texture white{1, 1, vdtree::Wrap::clamp, vdtree::Wrap::clamp, {{255, 255, 255, 255}}};
     std::vector<const Texture*> of_material(read.materials.size() + 1, &white); // the last: no material
+    std::uint64_t lost = 0;
     for (const std::size_t m : of_triangle) {
         if (!has_image(m) || of_material[m] != &white) continue;
-        auto image = images.of(read.materials[m]);
-        if (!image) return image.error();
-        of_material[m] = *image;
+        if (const Texture* image = images.of(read.materials[m])) of_material[m] = image;
+        else ++lost;
     }
+    images.warn(lost, read.warnings);
+    if (std::all_of(of_material.begin(), of_material.end(), [](const Texture* image) { return image == &white; }))
+        return std::vector<meshio::UvMap>(of_material.size());
     constexpr meshio::UvMap middle{glm::dmat2(0), glm::dvec2(0.5)};
     std::vector<meshio::UvMap> maps(of_material.size(), middle);
     for (std::size_t m = 0; m < read.materials.size(); ++m)
@@ -206,7 +202,7 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
         return maps;
     }
     auto atlas = make_atlas(parts);
-    if (!atlas) return Error{atlas.error().code, with_advice(mesh_file.string() + ": " + atlas.error().message)};
+    if (!atlas) return Error{atlas.error().code, mesh_file.string() + ": " + atlas.error().message};
     for (std::size_t v = 0; v < of_vertex.size(); ++v) { // those that are not used get some place, too
         const AtlasPlace& place = atlas->places[part_of_material[std::min(of_vertex[v], read.materials.size())]];
         mesh.uvs[v] = glm::vec2(place.scale * glm::dvec2(mesh.uvs[v]) + place.offset);
@@ -226,11 +222,10 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
         return std::any_of(of_triangle.begin(), of_triangle.end(),
                            [&](std::size_t m) { return m != no_material && holds(read.materials[m]); });
     };
-    const bool has_images = with_images && any([](const Material& m) { return m.has_image(); });
+    const bool has_images =
+        with_images && !read.mesh.uvs.empty() && any([](const Material& m) { return m.has_image(); });
     const bool has_colours = any([](const Material& m) { return m.colour != glm::vec4(1); });
     if (!has_images && !has_colours) return {};
-    if (has_images)
-        if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
     const std::vector<std::size_t> of_vertex = part_vertices(read, of_triangle);
     if (has_colours) colour_vertices(read.mesh, read.materials, of_vertex);
     Result<std::vector<meshio::UvMap>> maps = std::vector<meshio::UvMap>(read.materials.size() + 1);
@@ -258,8 +253,23 @@ void keep_document(meshio::ReadResult& read) {
 
 } // namespace
 
+bool names_folder(const LoadOptions& options) {
+    std::error_code unknown;
+    return std::filesystem::is_directory(options.texture, unknown);
+}
+
+meshio::ReadOptions reading_options(const LoadOptions& options, meshio::ReadOptions reading) {
+    const bool is_folder = names_folder(options);
+    reading.images = (options.texture.empty() || is_folder) && !options.without_textures;
+    if (is_folder) reading.search_folder = options.texture;
+    reading.drop = options.drop;
+    reading.skip_bad = options.skip_bad;
+    reading.weld = options.weld;
+    return reading;
+}
+
 Result<void> lay_texture(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const LoadOptions& options) {
-    const bool has_own_image = !options.texture.empty();
+    const bool has_own_image = !options.texture.empty() && !names_folder(options);
     if (const auto laid = lay_materials(mesh_file, read, !has_own_image && !options.without_textures); !laid)
         return laid;
     if (has_own_image)

@@ -80,7 +80,11 @@ Buffers::Buffers(const MeshSource& source, const json& document, std::optional<s
         else if (is_fallback(array[i])) {
             buffers_.emplace_back();
             continue;
-        } else fail(where + " names no file and has no data of its own; correct the JSON.");
+        } else if (const json* extensions = member(array[i], "extensions");
+                   extensions && !extensions->empty() && extensions->is_object())
+            fail(where + " has no data but by the extension " + in_quotes(extensions->begin().key()) +
+                 ", which is not read; export it without.");
+        else fail(where + " names no file and has no data of its own; correct the JSON.");
         if (size > bytes.size()) {
             fail(where + " claims " + std::to_string(size) + " bytes, but there are " + std::to_string(bytes.size()) +
                  "; the data are cut short.");

@@ -18,7 +18,6 @@ namespace {
 constexpr int max_json_depth = 256;
 // Three bytes of JSON become a few hundred in memory, so their number is bounded, at more than scenes are made of.
 constexpr std::size_t max_json_values = std::size_t{1} << 23;
-constexpr std::size_t max_array_elements = std::size_t{1} << 20; // nodes, meshes, accessors, ...
 
 constexpr std::uint32_t glb_version = 2;
 constexpr std::uint32_t chunk_json = 0x4E4F534A;
@@ -107,6 +106,22 @@ json parse_json(std::string_view text) {
     } catch (const json::exception&) {
         fail("its JSON has a number that no double can hold; correct it.");
     }
+}
+
+std::string to_text(const json& document) { return document.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+TextureSource source_of(const json& texture) {
+    const auto index_in = [](const json& object) -> std::optional<std::size_t> {
+        const json* source = object.is_object() ? member(object, "source") : nullptr;
+        if (source == nullptr || !source->is_number_unsigned()) return std::nullopt;
+        return source->get<std::size_t>();
+    };
+    if (const auto own = index_in(texture)) return {own, {}};
+    const json* extensions = texture.is_object() ? member(texture, "extensions") : nullptr;
+    if (extensions != nullptr && extensions->is_object())
+        for (const auto& [name, extension] : extensions->items())
+            if (const auto other = index_in(extension)) return {other, name};
+    return {};
 }
 
 const json* member(const json& object, const char* key) {
@@ -281,6 +296,7 @@ private:
             integer(primitive, copied, "mode", max_int, false);
             json& attributes = copied["attributes"] = json::object();
             const json& attributes_in = object(primitive, "attributes");
+            refuse_draco(primitive, attributes_in);
             for (const auto& [key, value] : attributes_in.items()) {
                 const bool is_of_skin = key.starts_with("JOINTS_") || key.starts_with("WEIGHTS_");
                 if (is_read(key)) integer(attributes_in, attributes, key.c_str(), max_int, false);
@@ -288,6 +304,20 @@ private:
             }
             primitives.push_back(std::move(copied));
         }
+    }
+
+    // Files may offer plain data beside compressed ones; many do not, and yet call the extension optional.
+    void refuse_draco(const json& primitive, const json& attributes) const {
+        const json* extensions = member(primitive, "extensions");
+        const json* position = member(attributes, "POSITION");
+        if (extensions == nullptr || !extensions->is_object() || member(*extensions, draco_extension) == nullptr ||
+            position == nullptr || !position->is_number_unsigned())
+            return;
+        const json& accessors = array_of(document_, "accessors");
+        const auto index = position->get<std::size_t>();
+        if (index < accessors.size() && accessors[index].is_object() && !accessors[index].contains("bufferView") &&
+            !accessors[index].contains("sparse"))
+            fail(where_ + " is compressed by " + draco_extension + ", which is not read; export it without.");
     }
 
     void node(const json& in, json& out) {

@@ -12,7 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
+#include <unseen/meshio/source_document.h>
 
 namespace unseen::meshio::gltf {
 
@@ -38,6 +39,12 @@ Container split_glb(std::string_view bytes);
 
 // Not deeper and not of more values than scenes are.
 json parse_json(std::string_view text);
+std::string to_text(const json& document);
+
+// Compressed vertices and triangles, which are not read.
+inline constexpr const char* draco_extension = "KHR_draco_mesh_compression";
+
+inline constexpr std::size_t max_array_elements = std::size_t{1} << 20; // nodes, meshes, accessors, ...
 
 // Names of nodes with coarser meshes, which stand in no scene.
 inline constexpr const char* lod_extension = "MSFT_lod";
@@ -66,6 +73,13 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
 
 // The document as far as it is kept beside the triangles: without geometry, what is dropped, extensions that nobody
 // here knows, and images that lie in the file.
-json without_geometry(json document, std::vector<Message>& warnings);
+json without_geometry(json document, const std::vector<SourceDocument::File>& images, std::vector<Message>& warnings);
+
+// The image of a texture: its own, or the one that an extension names, in a format that not everybody decodes.
+struct TextureSource {
+    std::optional<std::size_t> image;
+    std::string extension;
+};
+TextureSource source_of(const json& texture);
 
 } // namespace unseen::meshio::gltf

@@ -4,10 +4,11 @@
 #include <string>
 #include <string_view>
 
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "gltf_instances.h"
 #include "kept_arrays.h"
 #include "mesh_readers.h"
 
@@ -16,8 +17,7 @@ namespace unseen::meshio::gltf {
 namespace {
 
 // Extensions without which the positions or triangles cannot be read.
-constexpr std::string_view unsupported_extensions[] = {"KHR_draco_mesh_compression", "KHR_meshopt_compression",
-                                                       "EXT_mesh_gpu_instancing"};
+constexpr std::string_view unsupported_extensions[] = {draco_extension, "KHR_meshopt_compression"};
 // Only of how vertices are stored, which is done otherwise when they are written.
 constexpr std::string_view quantization = "KHR_mesh_quantization";
 
@@ -55,7 +55,7 @@ std::set<std::string> unknown_required(const json& document) {
                  ", and this build is without the library meshoptimizer; install "
                  "libmeshoptimizer-dev and build again, or export it without.");
         if (!is_kept(required) && required != quantization && required != meshopt_extension &&
-            required != lod_extension)
+            required != lod_extension && required != instancing_extension)
             unknown.insert(required);
     }
     return unknown;
@@ -152,12 +152,13 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
     }
 }
 
-json without_geometry(json document, std::vector<Message>& warnings) {
+json without_geometry(json document, const std::vector<SourceDocument::File>& images, std::vector<Message>& warnings) {
     for (const char* key : {"accessors", "bufferViews", "buffers", "animations", "skins"}) document.erase(key);
     std::set<std::string> stripped;
     strip_extensions(document, stripped);
     stripped.erase(std::string(quantization));
     stripped.erase(meshopt_extension);
+    stripped.erase(draco_extension); // there were plain data, too
     if (stripped.erase(lod_extension) > 0)
         warnings.push_back("of its levels of detail (MSFT_lod) the finest were read.");
     if (!stripped.empty())
@@ -170,6 +171,8 @@ json without_geometry(json document, std::vector<Message>& warnings) {
     };
     change_each("meshes", kept_mesh);
     change_each("images", kept_image);
+    for (std::size_t i = 0; i < images.size(); ++i)
+        if (!images[i].uri.empty()) document["images"][i]["uri"] = images[i].uri; // as it is written again
     change_each("nodes", [](json node) {
         node.erase("skin");
         node.erase("weights");

@@ -8,7 +8,7 @@
 #include <meshoptimizer.h>
 #endif
 
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 
 #include "gltf_data.h"
 

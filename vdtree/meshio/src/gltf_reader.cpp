@@ -20,9 +20,12 @@
 
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "gltf_instances.h"
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"
+#include "gltf_writer.h"
 #include "mesh_readers.h"
+#include "named_files.h"
 
 namespace unseen::meshio {
 namespace gltf {
@@ -45,47 +48,53 @@ constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an in
 class ImageReader {
 public:
     // `spend` is told of all bytes of images in the file, and fails where they are too many.
-    ImageReader(const json& document, const Buffers& buffers, Callback<void(std::uint64_t)> spend)
+    ImageReader(const MeshSource& source, const json& document, const Buffers& buffers,
+                Callback<void(std::uint64_t)> spend)
         : images_(array_of(document, "images")), views_(array_of(document, "bufferViews")), buffers_(buffers),
-          spend_(std::move(spend)), files_(images_.size()) {}
+          files_(source), spend_(std::move(spend)), read_(images_.size()) {}
 
-    // One that lies beside the mesh file has no bytes.
-    const SourceDocument::File& read(std::size_t index) {
-        std::optional<SourceDocument::File>& file = files_[index];
-        if (!file) file = read_anew(images_[index], numbered("image", index));
-        return *file;
+    // Null bytes: it could not be read, for the reason told.
+    const NamedFile& read(std::size_t index) {
+        std::optional<NamedFile>& image = read_[index];
+        if (image) return *image;
+        try {
+            image = read_anew(images_[index], numbered("image", index));
+        } catch (const Broken& broken) {
+            image = NamedFile{.why = broken.what.substr(0, broken.what.size() - 1)};
+        }
+        if (!image->bytes) return *image;
+        const auto [known, is_new] = known_.try_emplace(*image->bytes, image->bytes);
+        if (is_new && image->uri.empty()) spend_(image->bytes->size());
+        image->bytes = known->second;
+        return *image;
     }
 
-    // All images, for who writes them again, those beside the mesh file once. What cannot be read is told in the
-    // warnings.
-    std::vector<SourceDocument::File> read_all(std::vector<Message>& warnings) {
+    // All images, for who writes them again. Names of images that lie elsewhere are changed in the document.
+    std::vector<SourceDocument::File> read_all(LostImages& lost) {
         std::vector<SourceDocument::File> all;
-        std::set<std::string> read_already;
         for (std::size_t i = 0; i < images_.size(); ++i) {
-            SourceDocument::File& file = all.emplace_back();
-            try {
-                file = read(i);
-                if (!file.uri.empty() && read_already.insert(file.uri).second)
-                    file.bytes =
-                        std::make_shared<const std::string>(buffers_.read_beside(file.uri, numbered("image", i)));
-            } catch (const Broken& broken) {
-                if (const json* uri = member(images_[i], "uri"); uri != nullptr && uri->is_string())
-                    file.uri = uri->get<std::string>();
-                warnings.push_back(broken.what + " It is named, but not kept.");
-            }
+            const NamedFile& image = read(i);
+            if (!image.bytes) lost.add(image.why);
+            all.push_back({.uri = image.uri, .bytes = image.bytes});
         }
         return all;
     }
 
 private:
-    SourceDocument::File read_anew(const json& image, const std::string& where) {
+    NamedFile read_anew(const json& image, const std::string& where) {
         if (!image.is_object()) fail(where + " is no object; correct the JSON.");
-        SourceDocument::File file;
+        NamedFile file;
         if (const json* uri = member(image, "uri")) {
             if (!uri->is_string()) fail(where + ": its uri is no text; correct the JSON.");
             const auto& text = uri->get_ref<const std::string&>();
-            if (text.starts_with("data:")) file.bytes = kept(Buffers::decode_data(text, where));
-            else file.uri = text;
+            if (text.starts_with("data:")) {
+                file.bytes = std::make_shared<const std::string>(Buffers::decode_data(text, where));
+                return file;
+            }
+            file = files_.find(decode_percent(text));
+            const auto path = plain_path(decode_percent(text));
+            file.uri = file.bytes && path && *path != file.uri ? to_uri(file.uri) : text;
+            if (!file.bytes) file.why = where + ": " + file.why;
             return file;
         }
         const json* view_index = member(image, "bufferView");
@@ -109,25 +118,17 @@ private:
             fail(where + " ends behind its buffer; the data are cut short or the JSON is wrong.");
         }
         if (length == 0) fail(where + " is empty; correct the JSON.");
-        file.bytes = kept(std::string(buffers_[buffer].substr(offset, length)));
+        file.bytes = std::make_shared<const std::string>(buffers_[buffer].substr(offset, length));
         return file;
-    }
-
-    // Images with the same bytes are one.
-    std::shared_ptr<const std::string> kept(std::string bytes) {
-        if (const auto same = known_.find(bytes); same != known_.end()) return same->second;
-        spend_(bytes.size());
-        auto image = std::make_shared<const std::string>(std::move(bytes));
-        known_.emplace(*image, image);
-        return image;
     }
 
     const json& images_;
     const json& views_;
     const Buffers& buffers_;
+    NamedFiles files_;
     Callback<void(std::uint64_t)> spend_;
-    std::vector<std::optional<SourceDocument::File>> files_;
-    std::map<std::string_view, std::shared_ptr<const std::string>> known_;
+    std::vector<std::optional<NamedFile>> read_;
+    std::map<std::string_view, std::shared_ptr<const std::string>> known_; // images with the same bytes are one
 };
 
 // ---- materials ----
@@ -138,22 +139,25 @@ public:
     // `images`: null: colours only.
     MaterialReader(const json& document, ImageReader* images) : document_(document), images_(images) {}
 
-    // Alpha counts where it is not said to be ignored.
-    Material read(std::size_t index, std::string name) {
+    // Alpha counts where it is not said to be ignored. What is wrong loses the material its texture, or its colour.
+    Material read(std::size_t index, std::string name, std::vector<Message>& warnings, LostImages& lost) {
         Material material{.name = std::move(name)};
         const json& of_file = array_of(document_, "materials")[index];
         where_ = numbered("material", index);
-        const json* surface = optional_object(of_file, "pbrMetallicRoughness");
-        if (surface == nullptr) return material;
-        if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
-        const json* mode = member(of_file, "alphaMode");
-        if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
-        const json* texture = optional_object(*surface, "baseColorTexture");
-        if (images_ != nullptr && texture != nullptr) {
+        try {
+            const json* surface = optional_object(of_file, "pbrMetallicRoughness");
+            if (surface == nullptr) return material;
+            if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
+            const json* mode = member(of_file, "alphaMode");
+            if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
+            const json* texture = optional_object(*surface, "baseColorTexture");
+            if (images_ == nullptr || texture == nullptr) return material;
             if (!colour_uv_set(of_file))
                 fail(where_ + ": its texture lies by texture coordinates that are not read, which are 0 to " +
-                     std::to_string(last_uv_set) + "; correct it, or leave the textures out.");
-            add_texture(*texture, material);
+                     std::to_string(last_uv_set) + ".");
+            add_texture(*texture, material, lost);
+        } catch (const Broken& broken) {
+            warnings.push_back(broken.what + " Material " + in_quotes(material.name) + " is drawn without that.");
         }
         return material;
     }
@@ -185,11 +189,11 @@ private:
             fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " +
                  std::to_string(array.size()) + " " + key + "; correct the JSON.");
         if (!array[index].is_object()) fail(where_ + ": its " + of + " is no object; correct the JSON.");
-        where_ = numbered(key, index);
+        where_ = numbered(std::string(key, std::string_view(key).size() - 1).c_str(), index); // "texture 3"
         return array[index];
     }
 
-    void add_texture(const json& info, Material& material) {
+    void add_texture(const json& info, Material& material, LostImages& lost) {
         const json* extensions = optional_object(info, "extensions");
         const json* transform = extensions ? optional_object(*extensions, "KHR_texture_transform") : nullptr;
         if (transform != nullptr) material.uv_map = uv_map(*transform);
@@ -201,11 +205,22 @@ private:
             material.wrap_v = wrap(sampler, "wrapT");
             where_ = of_texture;
         }
+        if (member(texture, "source") == nullptr) {
+            const TextureSource other = source_of(texture);
+            if (!other.extension.empty()) {
+                lost.add(where_ + " is an image of the extension " + other.extension + ", which is not decoded");
+                lost.materials.insert(material.name);
+                return;
+            }
+        }
         element("images", texture, "source"); // it is there
-        const SourceDocument::File& image =
+        const NamedFile& image =
             images_->read(static_cast<std::size_t>(to_integer_in_range(texture["source"], max_int, where_)));
-        if (image.uri.empty()) material.image_bytes = image.bytes;
-        else material.image = Buffers::below_folder(image.uri, where_);
+        material.image = decode_percent(image.uri);
+        material.image_bytes = image.bytes;
+        if (image.bytes) return;
+        lost.add(image.why);
+        lost.materials.insert(material.name);
     }
 
     // KHR_texture_transform: scaled, turned and moved.
@@ -306,7 +321,7 @@ public:
         result_ = {};
         document_ = {};
         used_materials_.clear();
-        skipped_primitives_ = primitives_without_uvs_ = 0;
+        skipped_primitives_ = triangles_without_uvs_ = 0;
         add_mesh(mesh, -1, placement_of(glm::dmat4(stretch)));
         for (SourceDocument::Part& part : document_.parts) part.mesh = 0;
         tell_of_parts();
@@ -315,9 +330,10 @@ public:
     }
 
     // After read(): of the file, those that triangles have.
-    void read_materials(MaterialReader& reader, ReadResult& result) const {
+    void read_materials(MaterialReader& reader, ReadResult& result, LostImages& lost) const {
         for (const std::size_t index : used_materials_)
-            result.materials.push_back(reader.read(index, material_name(static_cast<int>(index))));
+            result.materials.push_back(
+                reader.read(index, material_name(static_cast<int>(index)), result.warnings, lost));
     }
 
     void spend(std::uint64_t count, std::uint64_t bytes_each) {
@@ -331,11 +347,7 @@ private:
             result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
                                        " left out for having no triangles or no positions.");
         }
-        if (primitives_without_uvs_ > 0) {
-            result_.warnings.push_back(counted_were(primitives_without_uvs_, "primitive") +
-                                       " without the texture coordinates that their texture lies by and drawn in its "
-                                       "colour at 0, 0.");
-        }
+        if (source_.options.images) warn_of_missing_uvs(triangles_without_uvs_, result_);
     }
 
     // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones, of which the same
@@ -363,9 +375,6 @@ private:
                 continue;
             }
             const std::string uvs = uvs_of(primitive);
-            const auto material = static_cast<std::size_t>(primitive.material);
-            primitives_without_uvs_ +=
-                material < is_textured_.size() && is_textured_[material] && !vertices.contains(uvs);
             const auto [first, is_new] =
                 first_vertices.try_emplace({vertices, uvs}, static_cast<Index>(result_.mesh.positions.size()));
             if (is_new) add_vertices(vertices, uvs, placement);
@@ -373,6 +382,9 @@ private:
             add_triangles(mesh, primitive, first->second, accessors_.count_of(vertices.at("POSITION")),
                           placement.is_mirrored);
             if (result_.mesh.triangles.size() == first_triangle) continue;
+            const auto material = static_cast<std::size_t>(primitive.material);
+            if (material < is_textured_.size() && is_textured_[material] && !vertices.contains(uvs))
+                triangles_without_uvs_ += result_.mesh.triangles.size() - first_triangle;
             spend(1, sizeof(SourceDocument::Part) + sizeof(SourceDocument::Run));
             document_.runs.push_back({first_triangle, static_cast<std::uint32_t>(document_.parts.size())});
             document_.parts.push_back({.node = node,
@@ -459,13 +471,7 @@ private:
                                                            : "texture coordinates");
         if (is_normal) {
             mesh.normals.resize(first, missing_normal);
-            for (const glm::dvec4& n : values) {
-                if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
-                    fail("normal " + std::to_string(mesh.normals.size() - first) + " of " +
-                         numbered("accessor", static_cast<std::size_t>(accessor)) + " is NaN or infinite; correct it.");
-                }
-                mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
-            }
+            for (const glm::dvec4& n : values) mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
         } else if (attribute == uvs) {
             mesh.uvs.resize(first, glm::vec2(0.0f));
             for (const glm::dvec4& uv : values) mesh.uvs.emplace_back(uv.x, uv.y);
@@ -553,7 +559,7 @@ private:
     std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
     SourceDocument document_;
     Budget budget_;
-    std::uint64_t skipped_primitives_ = 0, primitives_without_uvs_ = 0;
+    std::uint64_t skipped_primitives_ = 0, triangles_without_uvs_ = 0;
 };
 
 Result<ReadResult> read_document(const MeshSource& source) {
@@ -566,6 +572,7 @@ Result<ReadResult> read_document(const MeshSource& source) {
     check_kept(document, source.options.drop, warnings);
     Buffers buffers(source, document, container.bin);
     unpack_views(document, buffers);
+    expand_instances(document, buffers, warnings);
     const Reduced reduced = reduce(document);
     if (reduced.has_tangents) warnings.push_back("tangents were left out; they follow from normals and coordinates.");
     if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
@@ -573,11 +580,13 @@ Result<ReadResult> read_document(const MeshSource& source) {
     std::optional<ReadResult> result = scene.read();
     if (!result) return cancelled(source);
     result->uvs_from_top = true;
-    ImageReader images(document, buffers, [&](std::uint64_t bytes) { scene.spend(1, bytes); });
+    ImageReader images(source, document, buffers, [&](std::uint64_t bytes) { scene.spend(1, bytes); });
     MaterialReader materials(document, source.options.images ? &images : nullptr);
-    scene.read_materials(materials, *result);
-    result->document->files = images.read_all(warnings);
-    result->document->json = without_geometry(document, warnings).dump(-1, ' ', false, json::error_handler_t::replace);
+    LostImages lost;
+    result->document->files = images.read_all(lost);
+    scene.read_materials(materials, *result, lost);
+    if (source.options.images) warn_of_lost_images(lost, *result);
+    result->document->json = to_text(without_geometry(document, result->document->files, warnings));
     result->warnings.insert(result->warnings.end(), warnings.begin(), warnings.end());
     return std::move(*result);
 }
@@ -589,7 +598,7 @@ Result<ReadResult> read_document(const MeshSource& source) {
 struct Meshes::Impl {
     Impl(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
         : scene(source, document, model, buffers),
-          images(document, buffers, [this](std::uint64_t bytes) { scene.spend(1, bytes); }),
+          images(source, document, buffers, [this](std::uint64_t bytes) { scene.spend(1, bytes); }),
           materials(document, source.options.images ? &images : nullptr) {}
 
     SceneReader scene;
@@ -604,12 +613,19 @@ Meshes::~Meshes() = default;
 ReadResult Meshes::read(std::size_t mesh, const glm::dmat3& stretch) {
     ReadResult result = impl_->scene.read_mesh(mesh, stretch);
     result.uvs_from_top = true;
-    impl_->scene.read_materials(impl_->materials, result);
+    LostImages lost;
+    impl_->scene.read_materials(impl_->materials, result, lost);
+    warn_of_lost_images(lost, result);
     return result;
 }
 
 std::vector<SourceDocument::File> Meshes::files(std::vector<Message>& warnings) {
-    return impl_->images.read_all(warnings);
+    LostImages lost;
+    auto files = impl_->images.read_all(lost);
+    ReadResult result;
+    warn_of_lost_images(lost, result);
+    warnings.insert(warnings.end(), result.warnings.begin(), result.warnings.end());
+    return files;
 }
 
 } // namespace gltf

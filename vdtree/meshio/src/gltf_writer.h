@@ -14,7 +14,7 @@
 #include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 #include <unseen/vdtree/mesh.h>
 
 namespace unseen::meshio {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include <unseen/meshio/mesh_io.h>
-#include <unseen/meshio/vertex_array.h>
+#include <unseen/meshio/mesh_file.h>
+#include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>
 
 namespace unseen::meshio {

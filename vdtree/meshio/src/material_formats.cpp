@@ -17,6 +17,7 @@
 #include "gltf_document.h"
 #include "gltf_writer.h"
 #include "mesh_readers.h"
+#include "mtl_reader.h"
 
 namespace unseen::meshio {
 
@@ -54,17 +55,14 @@ void for_each_normal(SourceDocument& document, auto&& change) {
 // ---- OBJ to glTF
 
 json gltf_material(const Material& material, json& document, std::vector<File>& images,
-                   std::map<fs::path, std::size_t>& image_numbers, const std::vector<File>& files) {
+                   std::map<fs::path, std::size_t>& image_numbers) {
     json surface = {{"metallicFactor", 0}, {"roughnessFactor", 1}};
     const glm::vec4& c = material.colour;
     if (c != glm::vec4(1)) surface["baseColorFactor"] = {c.r, c.g, c.b, c.a};
-    if (!material.image.empty()) {
+    if (material.has_image()) {
         const auto [found, is_new] = image_numbers.try_emplace(material.image, images.size());
         if (is_new) {
-            File image{.uri = to_uri(material.image)};
-            for (const File& file : files)
-                if (file.use == File::Use::image && file.uri == material.image.generic_string())
-                    image.bytes = file.bytes;
+            File image{.uri = to_uri(material.image), .bytes = material.image_bytes};
             document["images"].push_back({{"uri", image.uri}});
             images.push_back(std::move(image));
         }
@@ -86,7 +84,15 @@ Result<SourceDocument> as_gltf(SourceDocument document, std::vector<Message>& no
     MtlContents contents;
     for (const File& file : document.files) {
         if (file.use != File::Use::library || !file.bytes) continue;
-        if (const auto read = read_mtl(*file.bytes, file.uri, true, contents); !read) return read.error();
+        const fs::path folder = fs::path(file.uri).parent_path();
+        const auto find = [&](std::string_view name) {
+            const auto path = plain_path(name);
+            for (const fs::path& uri : {(folder / path.value_or("")).lexically_normal(), path.value_or("")})
+                for (const File& image : document.files)
+                    if (image.use == File::Use::image && image.uri == uri) return NamedFile{image.uri, image.bytes, {}};
+            return NamedFile{};
+        };
+        read_mtl(*file.bytes, file.uri, find, folder, contents);
         notes.push_back("of the materials in " + in_quotes(file.uri) +
                         ", glTF gets colours, opacity and colour images; all else is left out.");
     }
@@ -115,7 +121,7 @@ Result<SourceDocument> as_gltf(SourceDocument document, std::vector<Message>& no
                                                 [&](const Material& m) { return m.name == part.material; });
                 out["materials"].push_back(known == contents.materials.end()
                                                ? json{{"name", part.material}}
-                                               : gltf_material(*known, out, images, image_numbers, document.files));
+                                               : gltf_material(*known, out, images, image_numbers));
             }
             primitive["material"] = material->second;
         }
@@ -125,7 +131,7 @@ Result<SourceDocument> as_gltf(SourceDocument document, std::vector<Message>& no
         primitives.push_back(std::move(primitive));
     }
     document.format = SourceDocument::Format::gltf;
-    document.json = out.dump(-1, ' ', false, json::error_handler_t::replace);
+    document.json = gltf::to_text(out);
     document.files = std::move(images);
     turn_uvs_upside_down(document);
     for_each_normal(document, [](const glm::dvec3& n, const Part&) { return n; });
@@ -160,6 +166,8 @@ double number_or(const json& value, double missing) { return value.is_number() ?
 
 std::string ending_of(std::string_view bytes) {
     if (bytes.starts_with("\x89PNG")) return ".png";
+    if (bytes.starts_with("RIFF") && bytes.substr(8).starts_with("WEBP")) return ".webp";
+    if (bytes.starts_with("\xABKTX 20")) return ".ktx2";
     return bytes.starts_with("\xFF\xD8\xFF") ? ".jpg" : ".image";
 }
 
@@ -201,11 +209,11 @@ private:
     }
     void write_image(const char* keyword, const json& use) {
         const json& texture = at(document_, "textures", within(use, {"index"}));
-        const json& source = within(texture, {"source"});
-        if (!source.is_number_unsigned() || source.get<std::size_t>() >= images_.size()) return;
-        File& image = images_[source.get<std::size_t>()];
+        const auto source = gltf::source_of(texture).image;
+        if (!source || *source >= images_.size()) return;
+        File& image = images_[*source];
         if (image.uri.empty())
-            image.uri = stem_ + "_image" + source.dump() + (image.bytes ? ending_of(*image.bytes) : "");
+            image.uri = stem_ + "_image" + std::to_string(*source) + (image.bytes ? ending_of(*image.bytes) : "");
         constexpr int clamps = 33071, mirrors = 33648;
         const json& sampler = at(document_, "samplers", within(texture, {"sampler"}));
         lost_mirrors_ |= within(sampler, {"wrapS"}) == mirrors || within(sampler, {"wrapT"}) == mirrors;

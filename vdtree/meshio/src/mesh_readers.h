@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/finite.h>
@@ -41,7 +40,6 @@ Result<ReadResult> read_off(const MeshSource& source);
 Result<ReadResult> read_stl(const MeshSource& source);
 Result<ReadResult> read_gltf(const MeshSource& source);
 Result<ReadResult> read_vtp(const MeshSource& source);
-Result<ReadResult> read_legacy_vtk(const MeshSource& source);
 
 // What all formats share, after their readers: checks coordinates and normals, drops triangles that use a vertex twice.
 Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result);
@@ -55,22 +53,13 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const std::filesystem
 bool is_binary_stl(std::string_view bytes);
 // Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
 bool starts_with_off_keyword(std::string_view bytes);
-// Whether the bytes start as a file of VTK does: XML with an element VTKFile, or the first line of legacy files.
+// Whether the bytes start as VTK's XML does, with an element VTKFile.
 bool is_vtk_xml(std::string_view bytes);
-bool is_legacy_vtk(std::string_view bytes);
 
-// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the
+// A name in a mesh file as a path below the mesh's folder, or nothing: a mesh must not be able to name any file of the
 // machine.
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
-struct MtlContents {
-    std::vector<Material> materials;
-    std::set<std::filesystem::path> images; // all that are named, below the mesh file's folder
-    std::vector<Message> warnings;
-};
-// Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad
-// ones are no errors.
-Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents);
 
 // Counts a vertex with a NaN or infinite coordinate. `where` names it if it is the first.
 template <class Where>

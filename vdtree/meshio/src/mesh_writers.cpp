@@ -1,6 +1,7 @@
-// Writes meshes as PLY, OBJ and glTF, and has others written.
+// Writes meshes as PLY, OBJ, glTF, STL and OFF.
 #include "mesh_writers.h"
 
+#include "formats.h"
 #include "gltf_writer.h"
 #include "kept_arrays.h"
 #include "mesh_readers.h"
@@ -147,7 +148,8 @@ void write_ply_header(FileOutput& out, const MeshView& mesh, const PlyColumns& c
              (needs_unsigned ? "uint" : "int") + " vertex_indices\nend_header\n");
 }
 
-Result<void> write_ply(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, const Progress& progress) {
+Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, const Progress& progress) {
+    constexpr std::size_t items_a_report = std::size_t{1} << 18; // some milliseconds
     const bool has_floats = are_floats(mesh);
     write_ply_header(out, mesh, columns, has_floats);
     const auto vertex_count = static_cast<double>(mesh.positions.size());
@@ -217,7 +219,7 @@ void write_obj_corner(FileOutput& out, const MeshView& mesh, Index vertex) {
 }
 
 template <class Vector>
-void write_obj_vector(FileOutput& out, const Vector& vector, int size) {
+void write_vector(FileOutput& out, const Vector& vector, int size) {
     for (int i = 0; i < size; ++i) {
         out.text(" ");
         out.number(vector[i]);
@@ -227,26 +229,26 @@ void write_obj_vector(FileOutput& out, const Vector& vector, int size) {
 void write_obj_vertices(FileOutput& out, const MeshView& mesh) {
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         out.text("v");
-        write_obj_vector(out, mesh.positions[i], 3);
+        write_vector(out, mesh.positions[i], 3);
         if (!mesh.colours.empty()) {
             const glm::vec4& c = mesh.colours[i];
-            write_obj_vector(out, glm::vec3(linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b)), 3);
+            write_vector(out, glm::vec3(linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b)), 3);
         }
         out.text("\n");
     }
     for (const glm::vec2& uv : mesh.uvs) {
         out.text("vt");
-        write_obj_vector(out, uv, 2);
+        write_vector(out, uv, 2);
         out.text("\n");
     }
     for (const glm::vec3& normal : mesh.normals) {
         out.text("vn");
-        write_obj_vector(out, normal, 3);
+        write_vector(out, normal, 3);
         out.text("\n");
     }
 }
 
-void write_obj(FileOutput& out, const MeshView& mesh) {
+void write_obj_to(FileOutput& out, const MeshView& mesh) {
     write_obj_vertices(out, mesh);
     const std::vector<RangeChange> changes = range_changes(mesh);
     std::size_t next_change = 0;
@@ -344,7 +346,43 @@ glm::vec3 unit(const glm::vec3& normal) {
     return {static_cast<float>(x / length), static_cast<float>(y / length), static_cast<float>(z / length)};
 }
 
-Result<void> write_gltf(const fs::path& file, const MeshView& mesh) {
+Error cannot_write(const fs::path& file, const std::string& why) {
+    return {ErrorCode::invalid_argument, "Cannot write '" + file.string() + "': " + why};
+}
+
+} // namespace
+
+std::string lower_ending(const fs::path& file) {
+    std::string ending = file.extension().string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return ending;
+}
+
+bool are_floats(const MeshView& mesh) {
+    return std::all_of(mesh.positions.begin(), mesh.positions.end(),
+                       [](const glm::dvec3& p) { return is_float(p.x) && is_float(p.y) && is_float(p.z); });
+}
+
+std::uint8_t to_byte(float channel) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
+}
+
+Result<void> write_ply(const MeshToWrite& to) {
+    const PlyColumns columns(to.mesh, to.arrays, to.notes);
+    return write_file(to.file, [&](FileOutput& out) { return write_ply_to(out, to.mesh, columns, to.progress); });
+}
+
+Result<void> write_obj(const MeshToWrite& to) {
+    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+        write_obj_to(out, to.mesh);
+        return {};
+    });
+}
+
+Result<void> write_gltf(const MeshToWrite& to) {
+    const MeshView& mesh = to.mesh;
+    if (mesh.triangles.empty())
+        return cannot_write(to.file, "the mesh has no triangles, and glTF cannot hold such a mesh; write PLY.");
     const GltfFrame frame = gltf_frame(mesh);
     std::vector<glm::vec3> positions, normals;
     positions.reserve(mesh.positions.size());
@@ -373,64 +411,73 @@ Result<void> write_gltf(const fs::path& file, const MeshView& mesh) {
                      {"nodes", json::array({node})},
                      {"meshes", json::array({{{"primitives", primitives}}})}};
     for (const std::string& name : materials.names) document["materials"].push_back({{"name", name}});
-    return out.write(file, std::move(document));
+    return out.write(to.file, std::move(document));
 }
 
-Error cannot_write(const fs::path& file, const std::string& why) {
-    return {ErrorCode::invalid_argument, "Cannot write '" + file.string() + "': " + why};
+// Facets with their own normals.
+Result<void> write_stl(const MeshToWrite& to) {
+    const MeshView& mesh = to.mesh;
+    if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max())
+        return cannot_write(to.file, "STL counts triangles in 32 bits; write PLY.");
+    for (const glm::dvec3& p : mesh.positions)
+        if (!is_finite(glm::vec3(p)))
+            return cannot_write(to.file, "STL has floats, which do not reach to its vertices; write PLY.");
+    if (!are_floats(mesh)) to.notes.push_back("STL has floats: the vertices were rounded to them.");
+    if (!mesh.colours.empty() || !mesh.uvs.empty() || !mesh.normals.empty())
+        to.notes.push_back(
+            "STL has triangles alone: normals, colours and texture coordinates of vertices were left out.");
+    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+        out.text(std::string("written by unseen") + std::string(63, ' '));
+        out.binary(static_cast<std::uint32_t>(mesh.triangles.size()));
+        for (const Triangle& t : mesh.triangles) {
+            const glm::dvec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
+            const glm::vec3 normal = unit(glm::vec3(glm::normalize(glm::cross(b - a, c - a))));
+            for (int k = 0; k < 3; ++k) out.binary(normal[k]);
+            for (const glm::dvec3& corner : {a, b, c})
+                for (int k = 0; k < 3; ++k) out.binary(static_cast<float>(corner[k]));
+            out.binary(std::uint16_t{0});
+        }
+        return {};
+    });
 }
 
-} // namespace
-
-std::string lower_ending(const fs::path& file) {
-    std::string ending = file.extension().string();
-    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return ending;
+Result<void> write_off(const MeshToWrite& to) {
+    const MeshView& mesh = to.mesh;
+    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+        const std::string keyword = std::string(mesh.uvs.empty() ? "" : "ST") + (mesh.colours.empty() ? "" : "C") +
+                                    (mesh.normals.empty() ? "" : "N") + "OFF\n";
+        out.text(keyword + std::to_string(mesh.positions.size()) + " " + std::to_string(mesh.triangles.size()) + " 0");
+        for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+            out.text("\n");
+            write_vector(out, mesh.positions[v], 3);
+            if (!mesh.normals.empty()) write_vector(out, mesh.normals[v], 3);
+            if (!mesh.colours.empty()) {
+                const glm::vec4& c = mesh.colours[v];
+                write_vector(out, glm::vec4(linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b), c.a), 4);
+            }
+            if (!mesh.uvs.empty()) write_vector(out, mesh.uvs[v], 2);
+        }
+        for (const Triangle& triangle : mesh.triangles) {
+            out.text("\n3");
+            write_vector(out, triangle, 3);
+        }
+        out.text("\n");
+        return {};
+    });
 }
-
-bool are_floats(const MeshView& mesh) {
-    return std::all_of(mesh.positions.begin(), mesh.positions.end(),
-                       [](const glm::dvec3& p) { return is_float(p.x) && is_float(p.y) && is_float(p.z); });
-}
-
-std::uint8_t to_byte(float channel) {
-    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
-}
-
-bool holds_arrays(const std::string& ending) { return ending == ".ply" || ending == ".vtp" || ending == ".vtk"; }
 
 Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::span<const VertexArray> arrays,
                              std::vector<Message>& notes, const Progress& progress) {
-    const std::string ending = lower_ending(file);
-    const bool is_gltf = ending == ".glb" || ending == ".gltf";
-    if (!holds_arrays(ending) && ending != ".obj" && !is_gltf) {
-        return cannot_write(file,
-                            "its name does not end in .ply, .obj, .glb, .gltf, .vtp or .vtk; choose one of these.");
+    const Format* format = format_named(file);
+    if (format == nullptr) {
+        std::string endings;
+        for (const std::string& ending : written_endings()) endings += (endings.empty() ? "" : ", ") + ending;
+        return cannot_write(file, "its name ends in none of " + endings + "; choose one of these.");
     }
     if (const Result<void> valid = validate(mesh); !valid) return cannot_write(file, valid.error().message);
-    if (is_gltf && mesh.triangles.empty()) {
-        return cannot_write(file, "the mesh has no triangles, and glTF cannot hold such a mesh; write PLY.");
-    }
-    if (ending == ".vtk" && !fits_legacy_vtk(mesh)) {
-        return cannot_write(file, "the mesh is too large for the 32-bit sizes of legacy VTK; write .vtp.");
-    }
-    if (const auto names = names_of(arrays); !names.empty() && !holds_arrays(ending))
-        notes.push_back("values of vertices were left out: " + listed(names) + "; .ply, .vtp and .vtk hold them.");
-    if (is_gltf) return write_gltf(file, mesh);
-    Result<AtomicFile> target = AtomicFile::create(file);
-    if (!target) return target.error();
-    FileOutput out(std::move(*target));
-    if (ending == ".ply") {
-        const PlyColumns columns(mesh, arrays, notes);
-        if (const Result<void> written = write_ply(out, mesh, columns, progress); !written) return written;
-    } else if (ending == ".vtp") {
-        write_vtp(out, mesh, arrays);
-    } else if (ending == ".vtk") {
-        write_legacy_vtk(out, mesh, arrays);
-    } else {
-        write_obj(out, mesh);
-    }
-    return out.finish();
+    if (const auto names = names_of(arrays); !names.empty() && !format->holds_values)
+        notes.push_back("values of vertices were left out: " + listed(names) + "; .ply and .vtp hold them.");
+    return format->write({file, mesh, arrays, notes, progress});
 }
 
 Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {

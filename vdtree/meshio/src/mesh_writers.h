@@ -1,4 +1,4 @@
-// The writers behind write_mesh and write_cut: with values of vertices.
+// The writers behind write_mesh and write_cut, one function a format.
 #pragma once
 
 #include <filesystem>
@@ -6,35 +6,48 @@
 #include <string>
 #include <vector>
 
-#include <unseen/meshio/mesh_io.h>
-#include <unseen/meshio/vertex_array.h>
+#include <unseen/meshio/mesh_file.h>
+#include <unseen/meshio/source_document.h>
 
 #include "file_output.h"
 
 namespace unseen::meshio {
 
-// What can hold arrays: PLY, and VTK's two formats. By ending, in small letters.
-bool holds_arrays(const std::string& ending);
+// A valid mesh with triangles. Arrays are as long as the mesh; those of other roles than `value` say how the mesh's own
+// are called. What the format holds otherwise, or not at all, is told in the notes.
+struct MeshToWrite {
+    const std::filesystem::path& file;
+    const vdtree::MeshView& mesh;
+    std::span<const VertexArray> arrays;
+    std::vector<Message>& notes;
+    const Progress& progress;
+};
+Result<void> write_ply(const MeshToWrite& mesh);
+Result<void> write_obj(const MeshToWrite& mesh);
+Result<void> write_gltf(const MeshToWrite& mesh);
+Result<void> write_vtp(const MeshToWrite& mesh); // little-endian, raw behind the XML
+Result<void> write_stl(const MeshToWrite& mesh); // binary
+Result<void> write_off(const MeshToWrite& mesh);
 
-// write_mesh() with arrays by vertex; those of other roles than `value` say how the mesh's own are called. What the
-// format holds otherwise, or not at all, is told in the notes. Precondition: the arrays are as long as the mesh.
+// write_mesh() with arrays.
 Result<void> write_mesh_with(const std::filesystem::path& file, const vdtree::MeshView& mesh,
                              std::span<const VertexArray> arrays, std::vector<Message>& notes,
                              const Progress& progress = {});
 
-// XML PolyData (.vtp): little-endian, raw behind the XML; legacy polydata (.vtk): binary, version 3.0. Points are
-// floats where that is exact and doubles otherwise. Precondition of the second: the mesh fits.
-void write_vtp(FileOutput& out, const vdtree::MeshView& mesh, std::span<const VertexArray> arrays);
-void write_legacy_vtk(FileOutput& out, const vdtree::MeshView& mesh, std::span<const VertexArray> arrays);
-bool fits_legacy_vtk(const vdtree::MeshView& mesh); // whose sizes have 32 bits
+// Runs write(FileOutput&), then renames the file.
+template <class Write>
+Result<void> write_file(const std::filesystem::path& file, Write&& write) {
+    Result<vdtree::AtomicFile> target = vdtree::AtomicFile::create(file);
+    if (!target) return target.error();
+    FileOutput out(std::move(*target));
+    if (const Result<void> written = write(out); !written) return written;
+    return out.finish();
+}
 
 // Whether all positions are floats.
 bool are_floats(const vdtree::MeshView& mesh);
 
 // 0..1 as 0..255.
 std::uint8_t to_byte(float channel);
-
-// Some milliseconds of writing.
-inline constexpr std::size_t items_a_report = std::size_t{1} << 18;
 
 } // namespace unseen::meshio

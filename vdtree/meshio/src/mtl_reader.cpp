@@ -1,8 +1,11 @@
 // Wavefront MTL: of each material its diffuse colour, its opacity and its diffuse image, and the names of all images.
-#include "mesh_readers.h"
+#include "mtl_reader.h"
 #include "text_scanner.h"
 
-#include <string>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
 #include <unordered_set>
 
 namespace unseen::meshio {
@@ -11,79 +14,85 @@ namespace {
 
 class MtlReader {
 public:
-    MtlReader(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents)
-        : bytes_(bytes), name_(name), with_images_(with_images), contents_(contents), materials_(contents.materials) {
-        for (const Material& m : materials_) names_.insert(m.name);
+    MtlReader(std::string_view bytes, const std::string& name, const FunctionRef<NamedFile(std::string_view)>& find,
+              const std::filesystem::path& folder, MtlContents& contents)
+        : bytes_(bytes), name_(name), find_(find), folder_(folder), contents_(contents) {
+        for (const Material& m : contents_.materials) names_.insert(m.name);
+        for (const NamedFile& image : contents_.images) uris_.insert(image.uri);
     }
 
-    Result<void> read() {
-        if (const std::size_t nul = bytes_.find('\0'); nul != std::string_view::npos)
-            return bad(line_number(bytes_, nul),
-                       "a NUL byte, which no MTL text contains; the file is damaged or no MTL file.");
+    std::string read() {
         LineScanner lines(bytes_);
         std::string_view rest;
         while (lines.next(rest)) {
             const std::string_view keyword = take_word(rest);
             if (keyword.empty() || keyword.front() == '#') continue;
-            if (keyword == "newmtl") {
-                begin(trimmed(rest));
-                continue;
-            }
-            if (names_image(keyword)) note_image(rest);
-            if (!is_open_) continue; // before the first material, or in one that was there before
-            Result<void> done;
-            if (keyword == "Kd") done = read_colour(rest, lines.line());
-            else if (keyword == "d") done = read_alpha(rest, lines.line(), false);
-            else if (keyword == "Tr") done = read_alpha(rest, lines.line(), true);
-            else if (keyword == "map_Kd" && with_images_) done = read_image(rest, lines.line());
-            if (!done) return done;
+            line_ = lines.line();
+            if (keyword == "newmtl") begin(trimmed(rest));
+            else if (names_image(keyword)) read_image(rest, keyword == "map_Kd");
+            else if (!is_open_) continue; // before the first material, or in one that was there before
+            else if (keyword == "Kd") read_colour(rest);
+            else if (keyword == "d") read_alpha(rest, false);
+            else if (keyword == "Tr") read_alpha(rest, true);
         }
-        return {};
+        if (odd_lines_ > 0)
+            contents_.warnings.push_back(name_ + ": " + first_odd_ +
+                                         (odd_lines_ == 1 ? "."
+                                                          : "; " + std::to_string(odd_lines_ - 1) + " more such " +
+                                                                (odd_lines_ == 2 ? "line." : "lines.")));
+        return text_.append(bytes_.substr(copied_));
     }
 
 private:
-    Error bad(std::uint64_t line, const std::string& what) const {
-        return {ErrorCode::malformed_data, name_ + ": line " + std::to_string(line) + ": " + what};
+    Material& material() { return contents_.materials.back(); }
+
+    void note_odd(const std::string& what) {
+        if (odd_lines_++ == 0) first_odd_ = "line " + std::to_string(line_) + ": " + what;
     }
-    Material& material() { return materials_.back(); }
 
     void begin(std::string_view name) {
         is_open_ = names_.emplace(name).second;
-        if (is_open_) materials_.push_back({.name = std::string(name)});
+        if (is_open_) contents_.materials.push_back({.name = std::string(name)});
     }
 
-    // A number from 0 to 1, with which a line begins.
-    bool take_share(std::string_view& rest, double& value) const {
-        return to_number(take_word(rest), value) && value >= 0 && value <= 1;
+    // Numbers from 0 to 1, with which a line begins; those beyond are clamped. False if there is another word.
+    bool take_shares(std::string_view& rest, std::span<double> values) {
+        for (double& value : values) {
+            double given = 0;
+            if (!to_number(take_word(rest), given) || std::isnan(given)) return false;
+            value = std::clamp(given, 0.0, 1.0);
+            if (value != given)
+                note_odd("values of material " + in_quotes(material().name) + " beyond 0..1 were clamped");
+        }
+        return true;
     }
 
     // Kd R G B; one number means grey. Spectra and CIE XYZ are left alone.
-    Result<void> read_colour(std::string_view rest, std::uint64_t line) {
+    void read_colour(std::string_view rest) {
         const std::string_view all = trimmed(rest);
-        if (all.starts_with("spectral") || all.starts_with("xyz")) return {};
-        double r = 0, g = 0, b = 0;
-        bool is_valid = take_share(rest, r);
+        if (all.starts_with("spectral") || all.starts_with("xyz")) return;
+        std::array<double, 3> rgb{};
+        const std::span values(rgb);
+        bool is_valid = take_shares(rest, values.first(1));
         const bool is_grey = trimmed(rest).empty();
-        is_valid = is_valid && (is_grey || (take_share(rest, g) && take_share(rest, b)));
+        is_valid = is_valid && (is_grey || take_shares(rest, values.last(2)));
         if (!is_valid)
-            return bad(line, "the colour of material " + in_quotes(material().name) +
-                                 " should be 3 numbers from 0 to 1, not " + in_quotes(all) + "; correct it.");
-        if (is_grey) g = b = r;
+            return note_odd("the colour of material " + in_quotes(material().name) + " should be 3 numbers, not " +
+                            in_quotes(all) + ", and was left out");
+        if (is_grey) rgb[1] = rgb[2] = rgb[0];
         const glm::vec4 decoded =
-            decode_colour(glm::vec4(r, g, b, 1), ColourEncoding::srgb); // as painting programs mean it
+            decode_colour(glm::vec4(rgb[0], rgb[1], rgb[2], 1), ColourEncoding::srgb); // as painting programs mean it
         material().colour = {decoded.r, decoded.g, decoded.b, material().colour.a};
-        return {};
     }
 
-    Result<void> read_alpha(std::string_view rest, std::uint64_t line, bool is_transparency) {
+    void read_alpha(std::string_view rest, bool is_transparency) {
         const std::string_view all = trimmed(rest);
         double value = 0;
         if (all.starts_with("-halo")) take_word(rest);
-        if (!take_share(rest, value))
-            return bad(line, "the opacity of material " + in_quotes(material().name) +
-                                 " should be a number from 0 to 1, not " + in_quotes(all) + "; correct it.");
+        if (!take_shares(rest, {&value, 1}))
+            return note_odd("the opacity of material " + in_quotes(material().name) + " should be a number, not " +
+                            in_quotes(all) + ", and was left out");
         material().colour.a = static_cast<float>(is_transparency ? 1 - value : value);
-        return {};
     }
 
     static bool names_image(std::string_view keyword) {
@@ -108,44 +117,63 @@ private:
         }
     }
 
-    // Any image, for who copies it.
-    void note_image(std::string_view rest) {
-        skip_options(rest, [](std::string_view, std::string_view) {});
-        if (const auto path = path_beside(rest)) contents_.images.insert(*path);
+    // All images are kept; that of the colour is the material's.
+    void read_image(std::string_view rest, bool is_colour) {
+        is_colour = is_colour && is_open_;
+        Wrap wrap = Wrap::repeat;
+        skip_options(rest, [&](std::string_view option, std::string_view value) {
+            if (option == "-clamp") wrap = value == "on" ? Wrap::clamp : Wrap::repeat;
+            if (is_colour && (option == "-s" || option == "-o" || option == "-t"))
+                note_odd(in_quotes(option) + " of an image was ignored");
+        });
+        if (rest.empty()) {
+            if (is_colour) note_odd("material " + in_quotes(material().name) + " names no image");
+            return;
+        }
+        NamedFile image = find_(rest);
+        if (is_colour) {
+            material().wrap_u = material().wrap_v = wrap;
+            material().image = image.uri.empty() ? std::string(rest) : image.uri;
+            material().image_bytes = image.bytes;
+        }
+        if (!image.bytes) {
+            contents_.lost.add(image.why);
+            if (is_colour) contents_.lost.materials.insert(material().name);
+            return;
+        }
+        rename(rest, image.uri);
+        if (uris_.insert(image.uri).second) contents_.images.push_back(std::move(image));
     }
 
-    Result<void> read_image(std::string_view rest, std::uint64_t line) {
-        Material& m = material();
-        m.wrap_u = m.wrap_v = Wrap::repeat;
-        skip_options(rest, [&](std::string_view option, std::string_view value) {
-            if (option == "-clamp") m.wrap_u = m.wrap_v = value == "on" ? Wrap::clamp : Wrap::repeat;
-            if (option == "-s" || option == "-o" || option == "-t")
-                contents_.warnings.push_back(name_ + ": line " + std::to_string(line) + ": " + in_quotes(option) +
-                                             " of an image was ignored.");
-        });
-        if (rest.empty())
-            return bad(line, "material " + in_quotes(m.name) + " names no image; add it or remove the line.");
-        const auto path = path_beside(rest);
-        if (!path)
-            return bad(line, "the image of material " + in_quotes(m.name) + " is " + in_quotes(rest) +
-                                 ", and only files beside the mesh are read; move it there.");
-        m.image = *path;
-        return {};
+    // An image that lies elsewhere is written beside the library, and so is named otherwise there.
+    void rename(std::string_view name, const std::filesystem::path& uri) {
+        const auto path = plain_path(name);
+        if (*path == uri || (folder_ / *path).lexically_normal() == uri) return;
+        const auto at = static_cast<std::size_t>(name.data() - bytes_.data());
+        text_.append(bytes_.substr(copied_, at - copied_))
+            .append(uri.lexically_relative(folder_.empty() ? "." : folder_).generic_string());
+        copied_ = at + name.size();
     }
 
     std::string_view bytes_;
     const std::string& name_;
-    const bool with_images_;
+    const FunctionRef<NamedFile(std::string_view)>& find_;
+    const std::filesystem::path& folder_;
     MtlContents& contents_;
-    std::vector<Material>& materials_;
-    std::unordered_set<std::string> names_; // of all materials so far
+    std::unordered_set<std::string> names_, uris_; // of all materials and images so far
     bool is_open_ = false;
+    std::uint64_t line_ = 0, odd_lines_ = 0;
+    std::string first_odd_;
+    std::string text_; // what is written again, of the bytes up to ...
+    std::size_t copied_ = 0;
 };
 
 } // namespace
 
-Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents) {
-    return MtlReader(bytes, name, with_images, contents).read();
+std::string read_mtl(std::string_view bytes, const std::string& name,
+                     const FunctionRef<NamedFile(std::string_view)>& find, const std::filesystem::path& folder,
+                     MtlContents& contents) {
+    return MtlReader(bytes, name, find, folder, contents).read();
 }
 
 } // namespace unseen::meshio

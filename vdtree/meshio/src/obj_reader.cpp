@@ -1,6 +1,7 @@
 // Wavefront OBJ: polygons with positions, UVs, normals, groups and material names. Two passes over the text: vertices
 // first, so that polygons can be cut by their positions, then faces.
 #include "mesh_readers.h"
+#include "mtl_reader.h"
 #include "polygon_triangulator.h"
 #include "text_scanner.h"
 #include <unseen/vdtree/internal/finite.h>
@@ -184,6 +185,7 @@ public:
         add_attributes();
         if (has_index_overflow_) return too_many_vertices();
         add_warnings();
+        keep_materials();
         keep_document();
         return std::move(result_);
     }
@@ -265,7 +267,7 @@ private:
                 start_range(group_, rest, MeshRange::Kind::group);
                 change_part(keyword == "g" ? &SourceDocument::Part::group : &SourceDocument::Part::object, rest);
             } else if (keyword == "mtllib") {
-                if (Result<void> done = read_materials(rest, statements.line()); !done) return done;
+                read_materials(rest, statements.line());
             } else if (keyword == "usemtl") {
                 start_range(material_, rest, MeshRange::Kind::material);
                 change_part(&SourceDocument::Part::material, rest);
@@ -333,78 +335,72 @@ private:
         std::int64_t number = 0;
         at = parse_integer(at, word_end, number);
         if (at == nullptr) return bad_corner();
-        resolve(number, positions_seen_, positions().size(), "vertex", line, corner.position);
-        for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
-            ++at;
-            if (at == word_end || *at == '/') continue;
-            at = parse_integer(at, word_end, number);
-            if (at == nullptr) return bad_corner();
-            if (slash == 0) resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv);
-            else resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
-        }
-        if (at != word_end) return bad_corner();
-        if (corner.normal != none && !is_finite(normals_[corner.normal])) {
-            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses normal " +
-                                 std::to_string(corner.normal + 1) + ", which is NaN or infinite; correct it.");
-        }
-        has_uvs_ = has_uvs_ || corner.uv != none;
-        has_normals_ = has_normals_ || corner.normal != none;
-        return {};
-    }
-
-    // Positive numbers count from 1 in the file, negative ones back from the last that came before the face. What is
-    // not there leaves the face out.
-    void resolve(std::int64_t number, std::size_t seen, std::size_t total, const char* what, std::uint64_t line,
-                 Index& index) {
-        const bool is_valid = number > 0 ? static_cast<std::uint64_t>(number) <= total
-                                         : number < 0 && number >= -static_cast<std::int64_t>(seen);
-        if (is_valid) {
-            index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
-        } else if (is_whole_) {
+        if (!resolve(number, positions_seen_, positions().size(), corner.position) && is_whole_) {
             is_whole_ = false;
             leave_out_face(result_.bad, [&] {
                 return "line " + std::to_string(line) + ": face " + std::to_string(result_.source_faces + 1) +
-                       " uses " + what + " " + std::to_string(number) + ", but there are " +
-                       std::to_string(number < 0 ? seen : total) +
+                       " uses vertex " + std::to_string(number) + ", but there are " +
+                       std::to_string(number < 0 ? positions_seen_ : positions().size()) +
                        (number == 0  ? ", numbered from 1"
                         : number < 0 ? " before it"
                                      : "");
             });
         }
+        for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
+            ++at;
+            if (at == word_end || *at == '/') continue;
+            at = parse_integer(at, word_end, number);
+            if (at == nullptr) return bad_corner();
+            const bool is_there = slash == 0 ? resolve(number, uvs_seen_, uvs_.size(), corner.uv)
+                                             : resolve(number, normals_seen_, normals_.size(), corner.normal);
+            if (!is_there && lost_attributes_++ == 0)
+                first_lost_attribute_ = std::string(slash == 0 ? "texture coordinate " : "normal ") +
+                                        std::to_string(number) + " in line " + std::to_string(line);
+        }
+        if (at != word_end) return bad_corner();
+        has_uvs_ = has_uvs_ || corner.uv != none;
+        has_normals_ = has_normals_ || corner.normal != none;
+        return {};
+    }
+
+    // Positive numbers count from 1 in the file, negative ones back from the last that came before the face. False if
+    // there is no such one.
+    static bool resolve(std::int64_t number, std::size_t seen, std::size_t total, Index& index) {
+        const bool is_valid = number > 0 ? static_cast<std::uint64_t>(number) <= total
+                                         : number < 0 && number >= -static_cast<std::int64_t>(seen);
+        if (is_valid) index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
+        return is_valid;
     }
 
     // ---- groups and materials ----
 
     // One name with blanks in it, or several.
-    Result<void> read_materials(std::string_view rest, std::uint64_t line) {
+    void read_materials(std::string_view rest, std::uint64_t line) {
         rest = trimmed(rest);
-        std::error_code error;
-        const auto whole = path_beside(rest);
-        if (whole && fs::exists(source_.folder / *whole, error)) return read_library(rest, line);
-        while (!(rest = trimmed(rest)).empty())
-            if (Result<void> done = read_library(take_word(rest), line); !done) return done;
-        return {};
+        if (rest.empty()) return;
+        if (read_library(rest, line, rest.find_first_of(" \t") == rest.npos)) return;
+        while (!(rest = trimmed(rest)).empty()) read_library(take_word(rest), line, true);
     }
 
-    Result<void> read_library(std::string_view library, std::uint64_t line) {
-        const std::string where = "line " + std::to_string(line) + ": the materials in " + in_quotes(library);
-        const auto path = path_beside(library);
-        if (!path || source_.folder.empty()) {
-            warn(where + " were left out: only files beside the mesh are read" +
-                 (path ? ", and a mesh in memory has none." : "."));
-            return {};
-        }
-        if (!libraries_.insert(*path).second) return {}; // it is often named again and again
-        document_.files.push_back({.use = SourceDocument::File::Use::library, .uri = path->generic_string()});
-        Result<std::string> bytes = read_regular_file(source_.folder / *path);
-        if (!bytes) {
-            warn(where + " were left out: " + bytes.error().message);
-            return {};
-        }
-        has_library_ = true;
-        document_.files.back().bytes = std::make_shared<const std::string>(std::move(*bytes));
-        return read_mtl(*document_.files.back().bytes, (source_.folder / *path).string(), source_.options.images,
-                        library_);
+    // False if it is not there; warns of that only if it must be.
+    bool read_library(std::string_view name, std::uint64_t line, bool must_be_there) {
+        if (libraries_.contains(std::string(name))) return true; // it is often named again and again
+        const NamedFile library = files_.find(name);
+        if (!library.bytes && !must_be_there) return false;
+        libraries_.emplace(name);
+        if (!library.bytes)
+            warn("line " + std::to_string(line) + ": the materials of a library were left out: " + library.why + ".");
+        else has_library_ = true;
+        if (library.uri.empty()) return true;
+        const fs::path folder = fs::path(library.uri).parent_path();
+        std::shared_ptr<const std::string> text;
+        if (library.bytes)
+            text = std::make_shared<const std::string>(read_mtl(
+                *library.bytes, (source_.folder / library.uri).string(),
+                [&](std::string_view image) { return files_.find(image, folder); }, folder, library_));
+        document_.files.push_back(
+            {.use = SourceDocument::File::Use::library, .uri = library.uri, .bytes = std::move(text)});
+        return true;
     }
 
     // ---- what is kept beside the triangles ----
@@ -412,7 +408,7 @@ private:
     // From the next triangle on.
     void change_part(std::string SourceDocument::Part::*name, std::string_view rest) {
         part_.*name = trimmed(rest);
-        has_parts_ = has_parts_ || name != &SourceDocument::Part::group;
+        has_parts_ = has_parts_ || (name != &SourceDocument::Part::group && !(part_.*name).empty());
         part_changes_ = true;
     }
 
@@ -426,18 +422,33 @@ private:
         document_.runs.push_back({triangle_corners_.size() / 3, found->second});
     }
 
-    void keep_document() {
+    void keep_materials() {
+        for (Message& warning : library_.warnings) warn(std::move(warning));
         result_.materials = std::move(library_.materials);
-        for (std::string& warning : library_.warnings) warn(std::move(warning));
-        if (!has_parts_ || result_.mesh.triangles.empty()) return;
-        document_.format = SourceDocument::Format::obj;
-        for (const fs::path& image : library_.images) {
-            Result<std::string> bytes = read_regular_file(source_.folder / image);
-            if (!bytes) warn(bytes.error().message + " The image is named, but not kept.");
-            document_.files.push_back(
-                {.uri = image.generic_string(),
-                 .bytes = bytes ? std::make_shared<const std::string>(std::move(*bytes)) : nullptr});
+        if (!source_.options.images) {
+            for (Material& material : result_.materials) material.image.clear(), material.image_bytes.reset();
+            return;
         }
+        warn_of_lost_images(library_.lost, result_);
+        std::set<std::string> textured;
+        for (const Material& material : result_.materials)
+            if (material.has_image()) textured.insert(material.name);
+        std::uint64_t bare = 0;
+        for (const MeshRange& range : ranges()) {
+            if (range.kind != MeshRange::Kind::material || !textured.contains(range.name)) continue;
+            for (std::uint64_t t = range.first_triangle; t < range.first_triangle + range.triangle_count; ++t)
+                bare += std::any_of(&triangle_corners_[3 * t], &triangle_corners_[3 * t] + 3,
+                                    [](const Corner& corner) { return corner.uv == none; });
+        }
+        warn_of_missing_uvs(bare, result_);
+    }
+
+    void keep_document() {
+        if (!has_parts_ || result_.mesh.triangles.empty()) return;
+        if (ranges().empty()) ranges().push_back({"", MeshRange::Kind::group, 0, result_.mesh.triangles.size()});
+        document_.format = SourceDocument::Format::obj;
+        for (const NamedFile& image : library_.images)
+            document_.files.push_back({.uri = image.uri, .bytes = image.bytes});
         const Mesh& mesh = result_.mesh;
         const auto keep = [&](const char* name, int components, const auto& values, auto&& has_part) {
             if (values.empty()) return;
@@ -534,6 +545,9 @@ private:
         if (unknown_ > 0) {
             warn(counted_were(unknown_, "line") + " skipped for an unknown keyword, the first " + first_unknown_ + ".");
         }
+        if (lost_attributes_ > 0)
+            warn(std::to_string(lost_attributes_) + (lost_attributes_ == 1 ? " corner goes" : " corners go") +
+                 " without a normal or texture coordinate that is not there, the first " + first_lost_attribute_ + ".");
         if (has_library_) warn_of_unknown_materials();
         if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
             warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
@@ -555,7 +569,7 @@ private:
         return {ErrorCode::unsupported,
                 source_.name + ": it has more vertices than 32-bit indices can number; split the mesh."};
     }
-    void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
+    void warn(Message sentence) { result_.warnings.push_back(std::move(sentence)); }
     Error bad(std::uint64_t line, const std::string& what) const { return malformed_line(source_, line, what); }
     std::vector<glm::dvec3>& positions() { return result_.mesh.positions; }
     std::vector<MeshRange>& ranges() { return result_.mesh.ranges; }
@@ -576,8 +590,9 @@ private:
     bool has_normals_ = false;
     bool has_index_overflow_ = false;
     OpenRange group_, material_;
-    std::set<fs::path> libraries_; // that were asked for
-    bool has_library_ = false;     // that could be read
+    NamedFiles files_{source_};
+    std::set<std::string> libraries_; // that were asked for
+    bool has_library_ = false;        // that could be read
     MtlContents library_;
     SourceDocument document_;
     SourceDocument::Part part_; // of the next triangle
@@ -591,8 +606,8 @@ private:
     PolygonTriangulator polygons_;
     std::uint64_t statements_ = 0;
     std::uint64_t small_faces_ = 0;
-    std::uint64_t unknown_ = 0;
-    std::string first_unknown_;
+    std::uint64_t unknown_ = 0, lost_attributes_ = 0;
+    std::string first_unknown_, first_lost_attribute_;
 };
 
 } // namespace

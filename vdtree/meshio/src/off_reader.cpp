@@ -1,6 +1,5 @@
 // OFF: Geomview's object file format, ASCII, with its prefixes ST, C and N.
-#include "mesh_readers.h"
-#include "polygon_triangulator.h"
+#include "face_collector.h"
 #include "text_scanner.h"
 
 #include <algorithm>
@@ -51,13 +50,6 @@ public:
         if (Result<void> header = read_header(); !header) return header.error();
         if (Result<void> vertices = read_vertices(); !vertices) return vertices.error();
         if (Result<void> faces = read_faces(); !faces) return faces.error();
-        if (small_faces_ > 0) {
-            result_.warnings.push_back(counted_were(small_faces_, "face") +
-                                       " left out for having fewer than 3 corners.");
-        }
-        if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
-            result_.warnings.push_back(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
-        }
         return std::move(result_);
     }
 
@@ -164,45 +156,13 @@ private:
                                           " corners, more than the file can hold; correct it.");
             }
             corners_.resize(static_cast<std::size_t>(size));
-            is_whole_ = true;
-            for (Index& corner : corners_) {
-                if (Result<void> done = read_corner(i, corner); !done) return done;
-            }
+            for (std::int64_t& corner : corners_)
+                if (Result<void> done = to_index(words_.next(), i, corner); !done) return done;
+            faces_.add_polygon(corners_, {0, vertex_count_}, [&] { return line() + "face " + std::to_string(i); });
             words_.skip_line(); // a colour may follow
-            add_face();
         }
+        faces_.warn();
         return {};
-    }
-
-    Result<void> read_corner(std::uint64_t face, Index& corner) {
-        std::int64_t index = 0;
-        if (Result<void> done = to_index(words_.next(), face, index); !done) return done;
-        corner = static_cast<Index>(index);
-        if ((index >= 0 && static_cast<std::uint64_t>(index) < vertex_count_) || !is_whole_) return {};
-        is_whole_ = false;
-        leave_out_face(result_.bad, [&] {
-            return line() + "face " + std::to_string(face) + " uses vertex " + std::to_string(index) +
-                   ", but there are " + std::to_string(vertex_count_) + ", numbered from 0";
-        });
-        return {};
-    }
-
-    void add_face() {
-        ++result_.source_faces;
-        if (!is_whole_) return;
-        if (corners_.size() < 3) {
-            ++small_faces_;
-            return;
-        }
-        points_.clear();
-        for (const Index corner : corners_) points_.push_back(result_.mesh.positions[corner]);
-        if (result_.bad.vertices > 0 && !std::all_of(points_.begin(), points_.end(), is_finite<double>)) {
-            ++result_.bad.left_out;
-            return;
-        }
-        polygons_.triangulate(points_, [&](const Triangle& t) {
-            result_.mesh.triangles.push_back({corners_[t[0]], corners_[t[1]], corners_[t[2]]});
-        });
     }
 
     Result<void> to_count(std::string_view word, const char* what, std::uint64_t& count) {
@@ -245,12 +205,9 @@ private:
     Keyword keyword_;
     std::uint64_t vertex_count_ = 0;
     std::uint64_t face_count_ = 0;
-    std::uint64_t small_faces_ = 0;
-    bool is_whole_ = true; // all corners_ are there
     ReadResult result_;
-    PolygonTriangulator polygons_;
-    std::vector<Index> corners_;
-    std::vector<glm::dvec3> points_;
+    FaceCollector faces_{result_};
+    std::vector<std::int64_t> corners_;
 };
 
 } // namespace

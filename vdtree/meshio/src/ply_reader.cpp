@@ -169,6 +169,16 @@ Result<Header> parse_header(const MeshSource& source) {
 
 // ---- bodies: the same few operations on text and on bytes ----
 
+bool to_index(double number, std::int64_t& value, std::string& why) {
+    constexpr double largest = 9.0e15; // beyond this no index is valid, and the conversion would be undefined
+    if (!(std::abs(number) <= largest) || number != std::floor(number)) {
+        why = "an index is not a whole number";
+        return false;
+    }
+    value = static_cast<std::int64_t>(number);
+    return true;
+}
+
 // Every operation returns false where the data end or are no number; why() then says so.
 class AsciiBody {
 public:
@@ -185,7 +195,7 @@ public:
         if (!is_integer(type)) {
             double number = 0.0;
             if (!real(type, number)) return false;
-            return to_index(number, value);
+            return to_index(number, value, why_);
         }
         const std::string_view word = words_.next();
         return accept(word, to_integer(word, value));
@@ -208,17 +218,6 @@ private:
         if (!is_number) why_ = word.empty() ? "the file ends there" : in_quotes(word) + " is no number of its type";
         return is_number;
     }
-    bool to_index(double number, std::int64_t& value) {
-        // Beyond this no index is valid, and the conversion would be undefined.
-        constexpr double largest = 9.0e15;
-        if (!(std::abs(number) <= largest) || number != std::floor(number)) {
-            why_ = "an index is not a whole number";
-            return false;
-        }
-        value = static_cast<std::int64_t>(number);
-        return true;
-    }
-
     std::string_view bytes_;
     WordScanner words_;
     std::string why_;
@@ -236,13 +235,7 @@ public:
         if (is_integer(type)) return any(type, value);
         double number = 0.0;
         if (!any(type, number)) return false;
-        constexpr double largest = 9.0e15;
-        if (!(std::abs(number) <= largest) || number != std::floor(number)) {
-            why_ = "an index is not a whole number";
-            return false;
-        }
-        value = static_cast<std::int64_t>(number);
-        return true;
+        return to_index(number, value, why_);
     }
     bool skip(ValueType type, std::uint64_t count) {
         if (count > remaining() / byte_size(type)) return ended();

@@ -14,6 +14,7 @@
 #include "file_output.h"
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "gltf_instances.h"
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"
 #include "gltf_subset.h"
@@ -299,6 +300,7 @@ struct SceneFile::Impl {
         gltf::check_kept(document, options.drop, warnings);
         buffers.emplace(source, document, container.bin);
         gltf::unpack_views(document, *buffers);
+        gltf::expand_instances(document, *buffers, warnings);
         reduced = gltf::reduce(document);
         if (reduced.has_tangents)
             warnings.push_back("tangents were left out; they follow from normals and coordinates.");
@@ -309,8 +311,8 @@ struct SceneFile::Impl {
         contents.file_bytes = source.bytes.size() + buffers->external_bytes();
         meshes.emplace(source, document, reduced.model, *buffers);
         contents.source.files = meshes->files(warnings);
-        kept = gltf::without_geometry(document, warnings);
-        contents.source.json = kept.dump(-1, ' ', false, json::error_handler_t::replace);
+        kept = gltf::without_geometry(document, contents.source.files, warnings);
+        contents.source.json = gltf::to_text(kept);
         contents.warnings.insert(contents.warnings.end(), warnings.begin(), warnings.end());
         return {};
     }
@@ -348,7 +350,7 @@ Result<std::optional<ReadResult>> SceneFile::mesh(std::size_t mesh, const glm::d
         ReadResult read = impl_->meshes->read(mesh, stretch);
         if (read.mesh.triangles.empty() && !read.bad.any()) return Read();
         gltf::Subset subset = gltf::subset_of(impl_->kept, impl_->contents.source.files, mesh);
-        read.document->json = subset.document.dump(-1, ' ', false, json::error_handler_t::replace);
+        read.document->json = gltf::to_text(subset.document);
         read.document->files = std::move(subset.files);
         auto finished = finish_reading(source, std::move(read));
         if (!finished) return finished.error();

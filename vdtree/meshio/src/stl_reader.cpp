@@ -43,7 +43,8 @@ bool is_ascii_stl(std::string_view bytes) {
     if (!equals_ignoring_case(words.next(), "solid")) return false;
     words.skip_line();
     const std::string_view word = words.next();
-    return equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid");
+    return equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid") ||
+           equals_ignoring_case(word, "end");
 }
 
 bool is_direction(const glm::vec3& n) { return is_finite(n) && n != glm::vec3(0.0f); }
@@ -172,7 +173,7 @@ private:
         MeshRange range{rest_of_line(), MeshRange::Kind::group, result_.mesh.triangles.size(), 0};
         for (;;) {
             const std::string_view word = words_.next();
-            if (equals_ignoring_case(word, "endsolid")) break;
+            if (ends(word, "solid")) break;
             if (!equals_ignoring_case(word, "facet")) return unexpected("facet or endsolid", word);
             if (Result<void> facet = read_facet(); !facet) return facet;
         }
@@ -198,8 +199,9 @@ private:
             if (Result<void> done = expect("vertex"); !done) return done;
             if (Result<void> done = read_vector(corner); !done) return done;
         }
-        if (Result<void> done = expect("endloop"); !done) return done;
-        if (Result<void> done = expect("endfacet"); !done) return done;
+        for (const char* what : {"loop", "facet"})
+            if (const std::string_view word = words_.next(); !ends(word, what))
+                return unexpected(std::string("end") + what, word);
         add_facet(result_, glm::vec3(normal), corners);
         return {};
     }
@@ -216,6 +218,14 @@ private:
         const std::string_view word = words_.next();
         if (equals_ignoring_case(word, keyword)) return {};
         return unexpected(std::string(keyword), word);
+    }
+
+    // "endsolid", or "end solid" as some programs write it.
+    bool ends(std::string_view word, std::string_view what) {
+        constexpr std::size_t end = 3;
+        if (!equals_ignoring_case(word.substr(0, end), "end")) return false;
+        if (word.size() > end) return equals_ignoring_case(word.substr(end), what);
+        return equals_ignoring_case(words_.next(), what);
     }
 
     std::string rest_of_line() {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string_view>
@@ -40,8 +41,19 @@ inline double out_of_range_number(std::string_view digits) {
     return is_negative ? -value : value;
 }
 
+// "1.#IND", "1.#QNAN", "1.#INF00": what C libraries of Windows printed for NaN and infinity. `end` is the end of "1.".
+inline const char* parse_windows_nan(const char* end, const char* last, double& value) {
+    if (end == last || *end != '#' || end[-1] != '.') return end;
+    const std::string_view rest(end + 1, static_cast<std::size_t>(last - end - 1));
+    if (rest.empty() || rest[0] < 'A' || rest[0] > 'Z') return end;
+    value = rest.starts_with("INF") ? std::copysign(std::numeric_limits<double>::infinity(), value)
+                                    : std::numeric_limits<double>::quiet_NaN();
+    const std::size_t size = rest.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789");
+    return end + 1 + std::min(size, rest.size());
+}
+
 // Parses a number at `first`, with an optional leading '+', which std::from_chars does not know. Returns the end of
-// the number, or nullptr where there is none. Too large becomes infinite, too small 0.
+// the number, or nullptr if there is none. Too large becomes infinite, too small 0.
 inline const char* parse_number(const char* first, const char* last, double& value) {
     if (first != last && *first == '+') {
         ++first;
@@ -49,7 +61,7 @@ inline const char* parse_number(const char* first, const char* last, double& val
     }
     const auto [end, error] = std::from_chars(first, last, value);
     if (error == std::errc::result_out_of_range) value = out_of_range_number({first, end});
-    return error == std::errc::invalid_argument ? nullptr : end;
+    return error == std::errc::invalid_argument ? nullptr : parse_windows_nan(end, last, value);
 }
 
 // The same for integers. Those beyond 64 bits become the largest or smallest of them, which no index accepts.

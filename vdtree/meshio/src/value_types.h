@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include <unseen/meshio/vertex_array.h>
+#include <unseen/meshio/source_document.h>
 
 #include "text_scanner.h"
 
@@ -82,6 +82,10 @@ bool parse_value(std::string_view word, T& value) {
     if (word.starts_with('+')) word.remove_prefix(1);
     const char* const last = word.data() + word.size();
     const auto [end, error] = std::from_chars(word.data(), last, value);
+    if constexpr (std::is_floating_point_v<T>) {
+        double special = 1;
+        if (end != last && *end == '#' && to_number(word, special)) return value = static_cast<T>(special), true;
+    }
     if (end != last || word.empty() || word.starts_with('+')) return false;
     if constexpr (std::is_floating_point_v<T>) {
         if (error == std::errc::result_out_of_range) value = static_cast<T>(out_of_range_number(word));

@@ -1,4 +1,4 @@
-#include <unseen/meshio/vertex_array.h>
+#include <unseen/meshio/source_document.h>
 
 #include <cmath>
 #include <limits>

@@ -11,7 +11,7 @@
 #include "base64.h"
 #include "text_scanner.h"
 #include "value_types.h"
-#include "vtk_polygons.h"
+#include "vtp_polygons.h"
 
 namespace unseen::meshio {
 

@@ -14,9 +14,9 @@
 #include "mesh_readers.h"
 #include "text_scanner.h"
 #include "value_types.h"
-#include "vtk_polygons.h"
-#include "vtk_types.h"
 #include "vtp_data.h"
+#include "vtp_polygons.h"
+#include "vtp_types.h"
 
 namespace unseen::meshio {
 

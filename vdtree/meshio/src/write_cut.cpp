@@ -10,11 +10,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/scene_file.h>
 #include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
+#include "formats.h"
 #include "gltf_data.h"
 #include "gltf_document.h"
 #include "gltf_parts.h"
@@ -303,8 +304,9 @@ private:
 
 Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument document,
                             std::vector<Message>& notes) {
-    const std::string ending = lower_ending(file);
-    const bool is_gltf = ending == ".glb" || ending == ".gltf";
+    const Format* const format = format_named(file);
+    if (format == nullptr) return write_mesh(file, {}); // which says what endings there are
+    const bool is_gltf = format->read == read_gltf;
     const std::vector<std::string> uvs = drawn_uvs(document);
     auto converted =
         is_gltf ? as_gltf(std::move(document), notes) : as_obj(std::move(document), file.stem().string(), notes);
@@ -314,30 +316,30 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
         return failed_to_write(file, "the cut has no triangles, and no format holds materials of nothing.");
     auto parts = restore(cut, extracted, *converted, uvs);
     if (!parts) return parts.error();
-    if (holds_arrays(ending)) {
-        notes.assign(1, (ending == ".ply" ? "PLY" : "VTK") +
-                            std::string(" holds no materials, images and nodes; write glTF or OBJ to keep them."));
+    if (!format->holds_materials) {
+        notes.assign(1, std::string(format->name) +
+                            " holds no materials, images and nodes; write glTF or OBJ to keep them.");
         for (std::size_t c = 0; c < converted->channels.size(); ++c)
             for (const RestoredPart& part : *parts)
                 if (converted->channels[c].name == part.uvs)
                     for (std::size_t i = 0; 2 * i < part.channels[c].size(); ++i)
                         extracted.mesh.uvs.at(part.vertices[i]) = {part.channels[c][2 * i],
                                                                    part.channels[c][2 * i + 1]};
-        return write_mesh(file, extracted.mesh.view());
+        return write_mesh_with(file, extracted.mesh.view(), {}, notes);
     }
     if (const auto written = write_beside(file, *converted, notes); !written) return written;
     if (is_gltf) return write_gltf(file, *converted, *parts, notes);
-    Result<AtomicFile> target = AtomicFile::create(file);
-    if (!target) return target.error();
-    FileOutput out(std::move(*target));
-    ObjWriter(out, extracted, *converted, *parts).write();
-    return out.finish();
+    return write_file(file, [&](FileOutput& out) -> Result<void> {
+        ObjWriter(out, extracted, *converted, *parts).write();
+        return {};
+    });
 }
 
 Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocument& document,
                          std::vector<Message>& notes) {
     const ExtractedMesh extracted = extract_with_sources(cut);
-    const bool is_held = holds_arrays(lower_ending(file));
+    const Format* const format = format_named(file);
+    const bool is_held = format != nullptr && format->holds_values;
     const auto arrays =
         is_held ? arrays_of_cut(cut, extracted, document.arrays) : Result<std::vector<VertexArray>>(document.arrays);
     if (!arrays) return arrays.error();
@@ -462,7 +464,7 @@ Result<std::vector<Message>> write_cut(const fs::path& file, const Cut& cut) {
     const auto bytes = cut.tree().document();
     Result<void> written;
     if (bytes.empty()) {
-        written = write_mesh(file, extract_mesh(cut).view());
+        written = write_mesh_with(file, extract_mesh(cut).view(), {}, notes);
     } else {
         written = guarded_writing([&]() -> Result<void> {
             auto document = unpack(bytes);

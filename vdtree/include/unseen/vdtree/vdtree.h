@@ -11,7 +11,7 @@
 //     draw(tree->positions(), cut.indices());
 //
 // Functions that can fail return a Result: the value, or an Error with a sentence. Nothing prints. Results do not depend on
-// the number of threads. <unseen/meshio/mesh_io.h> reads mesh files.
+// the number of threads. <unseen/meshio/mesh_file.h> reads mesh files.
 #pragma once
 
 // Meshes, and trees of them.

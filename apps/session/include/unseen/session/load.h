@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
@@ -85,7 +85,9 @@ enum class LoadAs { model, scene, automatic };
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
     LoadAs as = LoadAs::automatic;      // for Scene::load(); trees and files of other formats are models
-    std::filesystem::path texture = {}; // an image that replaces those of the mesh's materials; empty: not set
+    // An image that replaces those of the mesh's materials, or a folder in which these are looked for, too
+    // (meshio::ReadOptions::search_folder).
+    std::filesystem::path texture = {};
     bool without_textures = false;      // ignore images; colours of materials still count
     meshio::LeftOut drop = {};          // what glTF files may have and trees cannot
     bool skip_bad = false, weld = true; // see meshio::ReadOptions
@@ -115,8 +117,8 @@ enum class TreeOrigin { given, file, built, cache };
 std::string name_of(TreeOrigin origin);
 
 // A tree file, read and checked to the last byte; or the tree of a mesh file. That is built and measured, which takes
-// some ten seconds for a million triangles plus some 25 us a fold, or read from the cache. The reader's warnings are
-// repeated only when the tree is built. If the cache cannot be written to, a note says so, and nothing else happens.
+// some ten seconds for a million triangles plus some 25 us a fold, or read from the cache. The reader's warnings come
+// each time. If the cache cannot be written to, a note says so, and nothing else happens.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const LoadOptions& options = {});
 
 // A sentence for the user if a tree was not built as pre-lit and its colours look as if light were in them (see

@@ -36,8 +36,8 @@ struct Examination {
     glm::dvec3 low = glm::dvec3(0), high = glm::dvec3(0); // the bounding box, in mesh units; 0 without triangles
 };
 
-// Time and memory are linear but for sorts of the edges at one place: some 100 bytes and 1 us a triangle. Fails on what
-// vdtree::validate() refuses.
+// Time and memory are linear but for sorts of the edges at one place: some 100 bytes and 1 us a triangle. Fails on
+// what vdtree::validate() refuses.
 Result<Examination> examine(const vdtree::MeshView& mesh);
 
 // Whether there are several triangles, no two share a vertex, and some vertices coincide. The mesh must be valid.

@@ -1,9 +1,10 @@
-// glTF files as scenes: meshes that nodes place in the world, with cameras and lights. read_mesh() makes one mesh of
-// all nodes; here every mesh is read once, in its own frame, however many nodes show it.
+// glTF files as scenes: meshes that nodes place in the world, cameras and lights. read_mesh() joins all nodes to one
+// mesh; a SceneFile reads each mesh once, in its own frame, however many nodes show it. Also written: scenes, and
+// levels of detail.
 //
-// A node is background where its name is "background", or begins so and goes on with anything but a letter, or where
-// its extras say {"unseen": {"background": true}}; so is all below it. The document's own extras may say how lights
-// come out: {"unseen": {"exposure": E, "ambient": A}}, see SceneContents.
+// A node is background if its name is "background", or "background" followed by anything but a letter, or if its
+// extras say {"unseen": {"background": true}}; so are all nodes below it. The document's extras may set the
+// brightness of lights: {"unseen": {"exposure": E, "ambient": A}}, see SceneContents.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +19,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>
 
@@ -27,14 +28,14 @@ namespace unseen::meshio {
 // A mesh under a node.
 struct SceneNode {
     std::string name;       // for people: the node's or the mesh's, or "node 3"
-    std::int32_t node = -1; // of the document; -1: it has no nodes, and shows its meshes
+    std::int32_t node = -1; // its number in the document; -1: the document has no nodes and shows all meshes
     std::int32_t mesh = 0;
     glm::dmat4 to_world = glm::dmat4(1); // affine and finite; may be singular
     bool is_background = false;
 };
 
-// KHR_lights_punctual; colours count by their luminance, and ranges do not count. The extras of a light, or of its node,
-// may say {"casts_shadow": true}.
+// KHR_lights_punctual. Colours count by their luminance; ranges are ignored. The extras of a light or of its node may
+// say {"casts_shadow": true}.
 struct SceneLight {
     enum class Kind : std::uint8_t { directional, point, spot };
     Kind kind = Kind::directional;
@@ -42,7 +43,7 @@ struct SceneLight {
     double intensity = 1;                        // lux of directional lights, else candela; 0 or more, finite
     glm::dvec3 position = glm::dvec3(0);         // in the world
     glm::dvec3 direction = glm::dvec3(0, 0, 1);  // unit; where it shines
-    double inner_radians = 0, outer_radians = 0; // of a spot: half angles, inner < outer <= pi / 2
+    double inner_radians = 0, outer_radians = 0; // half angles of a spot, inner < outer <= pi / 2
     bool casts_shadow = false;
 };
 
@@ -53,20 +54,20 @@ struct SceneCamera {
     double fov_y_degrees = 30;                                                                // in (0, 180)
 };
 
-// What a scene is written again with: the document without geometry, and its images.
+// The document without geometry, and its images: what write_scene() starts from.
 struct SceneSource {
     std::string json;
     std::vector<SourceDocument::File> files;
 };
 
 struct SceneContents {
-    std::vector<SceneNode> nodes; // with a mesh, of the scene that is shown
+    std::vector<SceneNode> nodes; // nodes with a mesh, in the scene that is shown
     std::vector<SceneLight> lights;
     std::optional<SceneCamera> camera; // the first
-    // From lux to relative luminance of white; above 0. None: whoever lights the scene chooses.
+    // From lux to relative luminance of white; above 0. Not set: whoever lights the scene chooses.
     std::optional<double> exposure;
     std::optional<double> ambient; // relative luminance of white without lights, 0..1
-    // Cameras, lights, a mark of what is background, or a mesh under several nodes: more than one model.
+    // Whether this is more than one model: it has cameras, lights, a background, or a mesh under several nodes.
     bool is_scene = false;
     std::uint64_t file_bytes = 0; // with its buffers
     SceneSource source;
@@ -75,9 +76,10 @@ struct SceneContents {
 
 class SceneFile {
 public:
-    // Fails on other formats than glTF, and on what read_mesh() refuses of documents. Nothing of meshes is read yet.
+    // Reads the document, but no mesh yet. Fails if the file is not glTF, or if read_mesh() would refuse its
+    // document.
     static Result<SceneFile> read(const std::filesystem::path& file, const ReadOptions& options = {});
-    // Of bytes in memory; `folder`: where its buffers lie.
+    // The same from bytes in memory. `folder`: where buffers and images lie.
     static Result<SceneFile> from_bytes(std::string bytes, const std::filesystem::path& name,
                                         const ReadOptions& options = {}, const std::filesystem::path& folder = {});
     SceneFile(SceneFile&&) noexcept;
@@ -86,9 +88,8 @@ public:
 
     const SceneContents& contents() const noexcept;
 
-    // A mesh in its own frame, or stretched, with a document of its own; nothing where it has no triangles, such as
-    // one of lines. Of all meshes together no more is read than of one file. Precondition: there is such a mesh.
-    // Not thread-safe. Cost: the mesh.
+    // A mesh in its own frame, or stretched, with a document of its own; nothing if it has no triangles, only lines.
+    // Precondition: there is such a mesh. Not thread-safe. Cost: the mesh.
     Result<std::optional<ReadResult>> mesh(std::size_t mesh, const glm::dmat3& stretch = glm::dmat3(1));
 
 private:
@@ -97,19 +98,58 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-// Whether a file looks like glTF, by its first bytes or its ending.
+// Whether a file's name ends like glTF.
 bool is_gltf_file(const std::filesystem::path& file);
 
-// A cut of what a node shows. The tree is of SceneFile::mesh(), whatever its stretch.
+// The cut that a node shows. Its tree was built from SceneFile::mesh(), with any stretch.
 struct SceneCut {
     std::int32_t node = -1, mesh = 0;
     const vdtree::Cut* cut = nullptr;
 };
 
-// Writes a scene as glTF with the cuts in place of the meshes: each node has a mesh of its own, but for whole ones,
-// which are shared as before; nodes, transforms, names, materials, cameras and lights stay. Nodes whose cut has no
-// triangles lose their mesh. Images as by write_cut(). Returns what could not be kept, one sentence each.
+// Writes a scene as glTF with the cuts in place of the meshes. Nodes, transforms, names, materials, cameras and
+// lights stay; images as in write_cut(). Nodes share a mesh if their cuts are the same. A node whose cut has no
+// triangles loses its mesh. Returns what could not be kept, one sentence each.
 Result<std::vector<Message>> write_scene(const std::filesystem::path& file, const SceneSource& source,
                                          std::span<const SceneCut> cuts);
+
+// ---- levels of detail
+
+// Smaller files, by extensions that readers must know; this library's does.
+struct GltfOptions {
+    // KHR_mesh_quantization: positions on a grid of 65,535 steps along the mesh's longest side; normals, colours and
+    // texture coordinates within 0..1 in 16 bits. Half to two thirds of the bytes.
+    bool quantize = false;
+    // EXT_meshopt_compression of vertices and indices, in an order that suits graphics cards. Fails if the build
+    // lacks the library meshoptimizer.
+    bool meshopt = false;
+};
+
+bool has_meshoptimizer() noexcept; // whether this build has the library
+
+// The levels of detail of one node.
+struct LevelCuts {
+    std::int32_t node = -1, mesh = 0;     // as in SceneCut
+    std::vector<const vdtree::Cut*> cuts; // finest first; not empty. A cut that occurs twice is written once
+    std::vector<double> coverages;        // by cut: shares of the screen's area, 0..1, descending
+};
+
+struct LevelsWritten {
+    std::vector<Message> notes;       // what could not be kept, one sentence each
+    std::vector<std::uint64_t> bytes; // geometry by level; shared geometry counts for the first level that has it
+};
+
+// Levels in one file, by the extension MSFT_lod: the node with the finest mesh names the nodes with the others, and
+// its extras (MSFT_screencoverage) say down to which share of the screen each is shown. Readers that do not know the
+// extension show the finest.
+// Writes a scene like write_scene(). Each further level has a node with the transform of the first, in no scene. A
+// node that is more than a mesh gets a child for its levels. Fails if a level but the first has no triangles.
+Result<LevelsWritten> write_scene_levels(const std::filesystem::path& file, const SceneSource& source,
+                                         std::span<const LevelCuts> levels, const GltfOptions& options = {});
+
+// Writes the levels of a whole model, like write_cut() to glTF: the first has a root above its nodes, each other one
+// a root above nodes in the world's frame. `levels.node` and `levels.mesh` are ignored.
+Result<LevelsWritten> write_model_levels(const std::filesystem::path& file, const LevelCuts& levels,
+                                         const GltfOptions& options = {});
 
 } // namespace unseen::meshio

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 #include <unseen/render/context.h>
 #include <unseen/session/level_chain.h>
 #include <unseen/session/session.h>

@@ -1,4 +1,4 @@
-// What VTK's two formats have in common: pieces of polygons with data by point, and how they become a mesh.
+// Pieces of polygons with data by point, as VTK's XML has them, and how they become a mesh.
 #pragma once
 
 #include <cstdint>

@@ -79,12 +79,3 @@ write_xml("raw_zlib.vtp", "Appended", "ZLib")
 write_xml("base64_zlib.vtp", "Appended", "ZLib", base64=True)
 write_xml("base64_big64.vtp", "Appended", base64=True, other=True)
 write_xml("raw_lz4.vtp", "Appended", "LZ4")
-
-for version in (42, 51):
-    for kind in ("ASCII", "Binary"):
-        writer = vtk.vtkPolyDataWriter()
-        writer.SetInputData(mesh)
-        writer.SetFileName("%s_%d.vtk" % (kind.lower(), version))
-        writer.SetFileVersion(version)
-        getattr(writer, "SetFileTypeTo" + kind)()
-        writer.Write()

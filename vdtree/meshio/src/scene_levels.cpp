@@ -1,5 +1,5 @@
 // Levels of detail in one glTF file.
-#include <unseen/meshio/level_file.h>
+#include <unseen/meshio/scene_file.h>
 
 #include <algorithm>
 #include <deque>

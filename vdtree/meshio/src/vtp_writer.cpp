@@ -1,7 +1,5 @@
-// VTK's polygons, in its XML format (VTK File Formats, kitware) and the legacy one.
+// VTK's polygons in its XML format: VTK File Formats, https://docs.vtk.org, "XML File Formats".
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -15,7 +13,7 @@
 #include "mesh_readers.h"
 #include "mesh_writers.h"
 #include "value_types.h"
-#include "vtk_types.h"
+#include "vtp_types.h"
 
 namespace unseen::meshio {
 
@@ -52,48 +50,6 @@ VtkPointData point_data_of(const MeshView& mesh, std::span<const VertexArray> ar
     return data;
 }
 
-// Numbers in the byte order of the format.
-class VtkNumbers {
-public:
-    VtkNumbers(FileOutput& out, std::endian order) : out_(out), order_(order) {}
-
-    template <class T>
-    void put(T value) {
-        auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
-        if (order_ != std::endian::native) std::reverse(raw.begin(), raw.end());
-        out_.text({raw.data(), raw.size()});
-    }
-    void put(const VertexArray& array) {
-        with_type(array.type, [&](auto tag) {
-            using T = typename decltype(tag)::type;
-            for (std::size_t at = 0; at < array.values.size(); at += sizeof(T))
-                put(load_value<T>(array.values.data() + at));
-        });
-    }
-    template <class Vector>
-    void put_all(std::span<const Vector> vectors) {
-        for (const Vector& vector : vectors)
-            for (int k = 0; k < Vector::length(); ++k) put(vector[k]);
-    }
-    void put_positions(const MeshView& mesh, bool has_floats) {
-        if (!has_floats) return put_all(mesh.positions);
-        for (const glm::dvec3& p : mesh.positions)
-            for (int k = 0; k < 3; ++k) put(static_cast<float>(p[k]));
-    }
-    void put_colours(const MeshView& mesh, std::uint32_t components) {
-        for (const glm::vec4& colour : mesh.colours) {
-            for (int k = 0; k < 3; ++k) put(to_byte(linear_to_srgb(colour[k])));
-            if (components == 4) put(to_byte(colour.a));
-        }
-    }
-
-private:
-    FileOutput& out_;
-    std::endian order_;
-};
-
-// ---- XML
-
 std::string xml_text(std::string_view text) {
     std::string escaped;
     for (const char c : text) {
@@ -109,7 +65,7 @@ std::string xml_text(std::string_view text) {
 // Collects what stands behind the XML, for it begins with where everything lies.
 class VtpWriter {
 public:
-    VtpWriter(FileOutput& out, const MeshView& mesh) : out_(out), numbers_(out, std::endian::little), mesh_(mesh) {}
+    VtpWriter(FileOutput& out, const MeshView& mesh) : out_(out), mesh_(mesh) {}
 
     void write(const VtkPointData& data) {
         const std::string point_data = describe(data);
@@ -120,7 +76,7 @@ public:
                 ? ValueType::int64
                 : ValueType::int32;
         const std::string points = array(has_floats ? ValueType::float32 : ValueType::float64, "Points", 3, vertices,
-                                         [=, this] { numbers_.put_positions(mesh_, has_floats); });
+                                         [=, this] { put_positions(has_floats); });
         const std::string corners = array(index, "connectivity", 1, 3 * triangles, [=, this] {
             for (const Triangle& triangle : mesh_.triangles)
                 for (const Index corner : triangle) put_index(corner, index);
@@ -137,7 +93,7 @@ public:
                   "      </Points>\n      <Polys>\n" + corners + ends +
                   "      </Polys>\n    </Piece>\n  </PolyData>\n  <AppendedData encoding=\"raw\">\n   _");
         for (const Block& block : blocks_) {
-            numbers_.put(block.bytes);
+            out_.binary(block.bytes);
             block.write();
         }
         out_.text("\n  </AppendedData>\n</VTKFile>\n");
@@ -159,16 +115,14 @@ private:
             if (!name.empty()) xml += std::string(" ") + what + "=\"" + xml_text(name) + "\"";
         xml += ">\n";
         for (const VertexArray* values : data.values)
-            xml += array(values->type, values->name, values->components, values->size(),
-                         [=, this] { numbers_.put(*values); });
+            xml += array(values->type, values->name, values->components, values->size(), [=, this] { put(*values); });
         const std::size_t vertices = mesh_.positions.size();
         if (!data.normals.empty())
-            xml += array(ValueType::float32, data.normals, 3, vertices, [this] { numbers_.put_all(mesh_.normals); });
+            xml += array(ValueType::float32, data.normals, 3, vertices, [this] { put_all(mesh_.normals); });
         if (!data.colours.empty())
             xml += array(ValueType::uint8, data.colours, data.colour_components, vertices,
-                         [this, k = data.colour_components] { numbers_.put_colours(mesh_, k); });
-        if (!data.uvs.empty())
-            xml += array(ValueType::float32, data.uvs, 2, vertices, [this] { numbers_.put_all(mesh_.uvs); });
+                         [this, k = data.colour_components] { put_colours(k); });
+        if (!data.uvs.empty()) xml += array(ValueType::float32, data.uvs, 2, vertices, [this] { put_all(mesh_.uvs); });
         return xml + "      </PointData>\n";
     }
 
@@ -183,86 +137,46 @@ private:
     }
 
     void put_index(std::uint64_t value, ValueType type) {
-        if (type == ValueType::int64) numbers_.put(static_cast<std::int64_t>(value));
-        else numbers_.put(static_cast<std::int32_t>(value));
+        if (type == ValueType::int64) out_.binary(static_cast<std::int64_t>(value));
+        else out_.binary(static_cast<std::int32_t>(value));
+    }
+    void put(const VertexArray& array) {
+        with_type(array.type, [&](auto tag) {
+            using T = typename decltype(tag)::type;
+            for (std::size_t at = 0; at < array.values.size(); at += sizeof(T))
+                out_.binary(load_value<T>(array.values.data() + at));
+        });
+    }
+    template <class Vector>
+    void put_all(std::span<const Vector> vectors) {
+        for (const Vector& vector : vectors)
+            for (int k = 0; k < Vector::length(); ++k) out_.binary(vector[k]);
+    }
+    void put_positions(bool has_floats) {
+        if (!has_floats) return put_all(mesh_.positions);
+        for (const glm::dvec3& p : mesh_.positions)
+            for (int k = 0; k < 3; ++k) out_.binary(static_cast<float>(p[k]));
+    }
+    void put_colours(std::uint32_t components) {
+        for (const glm::vec4& colour : mesh_.colours) {
+            for (int k = 0; k < 3; ++k) out_.binary(to_byte(linear_to_srgb(colour[k])));
+            if (components == 4) out_.binary(to_byte(colour.a));
+        }
     }
 
     FileOutput& out_;
-    VtkNumbers numbers_;
     const MeshView& mesh_;
     std::vector<Block> blocks_;
     std::uint64_t offset_ = 0; // of the next block
 };
 
-// ---- legacy
-
-constexpr std::size_t numbers_a_triangle = 4; // how many corners, and these
-
-// As VTK does: a name is one word.
-std::string percent_encoded(std::string_view name) {
-    constexpr const char* digits = "0123456789ABCDEF";
-    std::string encoded;
-    for (const char c : name) {
-        const auto byte = static_cast<unsigned char>(c);
-        if (byte > 32 && byte < 127 && c != '"' && c != '%') encoded += c;
-        else (encoded += '%') += {digits[byte >> 4], digits[byte & 15]};
-    }
-    return encoded.empty() ? "_" : encoded;
-}
-
-void write_legacy_data(FileOutput& out, VtkNumbers& numbers, const MeshView& mesh, const VtkPointData& data) {
-    if (data.values.empty() && data.normals.empty() && data.colours.empty() && data.uvs.empty()) return;
-    out.text("POINT_DATA " + std::to_string(mesh.positions.size()) + "\n");
-    if (!data.colours.empty()) {
-        out.text("COLOR_SCALARS " + percent_encoded(data.colours) + " " + std::to_string(data.colour_components) +
-                 "\n");
-        numbers.put_colours(mesh, data.colour_components);
-        out.text("\n");
-    }
-    if (!data.normals.empty()) {
-        out.text("NORMALS " + percent_encoded(data.normals) + " float\n");
-        numbers.put_all(mesh.normals);
-        out.text("\n");
-    }
-    if (!data.uvs.empty()) {
-        out.text("TEXTURE_COORDINATES " + percent_encoded(data.uvs) + " 2 float\n");
-        numbers.put_all(mesh.uvs);
-        out.text("\n");
-    }
-    if (data.values.empty()) return;
-    out.text("FIELD FieldData " + std::to_string(data.values.size()) + "\n");
-    for (const VertexArray* values : data.values) {
-        out.text(percent_encoded(values->name) + " " + std::to_string(values->components) + " " +
-                 std::to_string(values->size()) + " " + legacy_name(values->type) + "\n");
-        numbers.put(*values);
-        out.text("\n");
-    }
-}
-
 } // namespace
 
-void write_vtp(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
-    VtpWriter(out, mesh).write(point_data_of(mesh, arrays));
-}
-
-bool fits_legacy_vtk(const MeshView& mesh) {
-    return mesh.triangles.size() <= INT32_MAX / numbers_a_triangle && mesh.positions.size() <= INT32_MAX;
-}
-
-void write_legacy_vtk(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
-    VtkNumbers numbers(out, std::endian::big);
-    const bool has_floats = are_floats(mesh);
-    out.text("# vtk DataFile Version 3.0\nwritten by unseen\nBINARY\nDATASET POLYDATA\nPOINTS " +
-             std::to_string(mesh.positions.size()) + (has_floats ? " float\n" : " double\n"));
-    numbers.put_positions(mesh, has_floats);
-    out.text("\nPOLYGONS " + std::to_string(mesh.triangles.size()) + " " +
-             std::to_string(numbers_a_triangle * mesh.triangles.size()) + "\n");
-    for (const Triangle& triangle : mesh.triangles) {
-        numbers.put(std::int32_t{3});
-        for (const Index corner : triangle) numbers.put(static_cast<std::int32_t>(corner));
-    }
-    out.text("\n");
-    write_legacy_data(out, numbers, mesh, point_data_of(mesh, arrays));
+Result<void> write_vtp(const MeshToWrite& to) {
+    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+        VtpWriter(out, to.mesh).write(point_data_of(to.mesh, to.arrays));
+        return {};
+    });
 }
 
 } // namespace unseen::meshio

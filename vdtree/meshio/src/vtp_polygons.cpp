@@ -1,4 +1,4 @@
-#include "vtk_polygons.h"
+#include "vtp_polygons.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,4 +1,4 @@
-// Files of VTK as strings: the quad of mesh_files.h with two arrays of point data, in every encoding.
+// VTP files as strings: the quad of mesh_files.h with two arrays of point data, in every encoding.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 #include "mesh_files.h"
 
-namespace vtk_files {
+namespace vtp_files {
 
 using mesh_files::bytes;
 
@@ -134,27 +134,6 @@ inline std::string vtp_quad(Style style) {
     return file.whole(piece);
 }
 
-// Behind the cells only what `more` says.
-inline std::string vtk_quad(bool is_binary, bool has_offsets, const std::string& more = "") {
-    std::string file = std::string("# vtk DataFile Version ") + (has_offsets ? "5.1" : "3.0") + "\na quad\n" +
-                       (is_binary ? "BINARY" : "ASCII") + "\nDATASET POLYDATA\nPOINTS 4 float\n";
-    const auto add = [&](auto value) {
-        file += is_binary ? bytes(value, std::endian::big) : std::to_string(static_cast<int>(value)) + " ";
-    };
-    for (const int x : {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) add(static_cast<float>(x));
-    if (has_offsets) {
-        file += "\nPOLYGONS 2 4\nOFFSETS vtktypeint64\n";
-        for (const std::int64_t i : {0, 4}) add(i);
-        file += "\nCONNECTIVITY vtktypeint64\n";
-        for (const std::int64_t i : {0, 1, 2, 3}) add(i);
-    } else {
-        file += "\nPOLYGONS 1 5\n";
-        for (const std::int32_t i : {4, 0, 1, 2, 3}) add(i);
-    }
-    if (!is_binary) file.pop_back();
-    return more.empty() ? file : file + "\n" + more;
-}
-
 // One small file of every kind: name and bytes.
 inline std::vector<std::pair<std::string, std::string>> samples() {
     return {{"ascii.vtp", vtp_quad({Format::ascii})},
@@ -162,11 +141,7 @@ inline std::vector<std::pair<std::string, std::string>> samples() {
             {"binary_zlib.vtp", vtp_quad({Format::binary, true})},
             {"raw.vtp", vtp_quad({Format::raw})},
             {"raw_zlib.vtp", vtp_quad({Format::raw, true, true})},
-            {"base64_zlib.vtp", vtp_quad({Format::base64, true})},
-            {"ascii.vtk", vtk_quad(false, false)},
-            {"binary.vtk", vtk_quad(true, false)},
-            {"ascii_offsets.vtk", vtk_quad(false, true)},
-            {"binary_offsets.vtk", vtk_quad(true, true)}};
+            {"base64_zlib.vtp", vtp_quad({Format::base64, true})}};
 }
 
-} // namespace vtk_files
+} // namespace vtp_files

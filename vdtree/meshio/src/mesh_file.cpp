@@ -1,9 +1,10 @@
 // Finds out what a file is, has it read, and does what all formats share.
-#include <unseen/meshio/mesh_io.h>
+#include <unseen/meshio/mesh_file.h>
 
 #include <unseen/meshio/examine.h>
 
 #include "file_output.h"
+#include "formats.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 
@@ -24,44 +25,26 @@ namespace fs = std::filesystem;
 
 namespace {
 
-enum class Format { ply, obj, off, stl, gltf, vtp, legacy_vtk };
-
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 
-std::optional<Format> format_by_ending(const fs::path& name) {
-    const std::string ending = lower_ending(name);
-    if (ending == ".ply") return Format::ply;
-    if (ending == ".obj") return Format::obj;
-    if (ending == ".off") return Format::off;
-    if (ending == ".stl") return Format::stl;
-    if (ending == ".gltf" || ending == ".glb") return Format::gltf;
-    if (ending == ".vtp") return Format::vtp;
-    if (ending == ".vtk") return Format::legacy_vtk;
-    return std::nullopt;
+const Format* format_by_signature(std::string_view bytes) {
+    for (const Format& format : formats())
+        if (format.has_signature != nullptr && format.has_signature(bytes)) return &format;
+    return nullptr;
 }
 
-std::optional<Format> format_by_signature(std::string_view bytes) {
-    if (bytes.starts_with("glTF")) return Format::gltf;
-    if (bytes.starts_with("ply") && bytes.size() > 3 && is_space(bytes[3])) return Format::ply;
-    if (is_vtk_xml(bytes)) return Format::vtp;
-    if (is_legacy_vtk(bytes)) return Format::legacy_vtk;
-    if (starts_with_off_keyword(bytes)) return Format::off;
-    return std::nullopt;
-}
-
-// What no signature tells and no ending says.
-std::optional<Format> format_by_guess(std::string_view bytes) {
-    if (is_binary_stl(bytes)) return Format::stl;
+// For bytes without a signature in a file without an ending.
+const Format* format_by_guess(std::string_view bytes) {
     const std::string_view start = trimmed(bytes.substr(0, std::min<std::size_t>(bytes.size(), 256)));
-    if (start.starts_with("solid") || start.starts_with("SOLID")) return Format::stl;
-    if (start.starts_with("{")) return Format::gltf;
-    if (start.starts_with("v ") || start.starts_with("mtllib ")) return Format::obj;
-    return std::nullopt;
+    if (is_binary_stl(bytes) || start.starts_with("solid") || start.starts_with("SOLID")) return format_named("a.stl");
+    if (start.starts_with("{")) return format_named("a.gltf");
+    if (start.starts_with("v ") || start.starts_with("mtllib ")) return format_named("a.obj");
+    return nullptr;
 }
 
-std::optional<Format> find_format(std::string_view bytes, const fs::path& name) {
-    if (const auto format = format_by_signature(bytes)) return format;
-    if (const auto format = format_by_ending(name)) return format;
+const Format* find_format(std::string_view bytes, const fs::path& name) {
+    if (const Format* format = format_by_signature(bytes)) return format;
+    if (const Format* format = format_named(name)) return format;
     return format_by_guess(bytes);
 }
 
@@ -75,45 +58,24 @@ const char* compression_of(std::string_view bytes) {
     return nullptr;
 }
 
-Result<ReadResult> read_as(Format format, const MeshSource& source) {
-    switch (format) {
-    case Format::ply: return read_ply(source);
-    case Format::obj: return read_obj(source);
-    case Format::off: return read_off(source);
-    case Format::stl: return read_stl(source);
-    case Format::gltf: return read_gltf(source);
-    case Format::vtp: return read_vtp(source);
-    case Format::legacy_vtk: return read_legacy_vtk(source);
-    }
-    return malformed(source, "unknown format.");
-}
-
-// Of the vertices that triangles use. A normal that is not finite is refused, for nobody knows what it was to be; one
-// of length 0, which stands for none as well, is computed from the faces.
-Result<void> check_normals(const MeshSource& source, ReadResult& result) {
-    const Mesh& mesh = result.mesh;
-    if (mesh.normals.empty()) return {};
+// Normals of vertices in use that are zero (which stands for missing) or not finite are computed from the faces.
+void check_normals(ReadResult& result) {
+    Mesh& mesh = result.mesh;
+    if (mesh.normals.empty()) return;
+    for (glm::vec3& normal : mesh.normals)
+        if (!is_finite(normal)) normal = missing_normal;
     std::vector<bool> used(mesh.positions.size(), false);
     for (const Triangle& t : mesh.triangles)
         for (const Index v : t) used[v] = true;
-    std::uint64_t zero = 0;
-    std::size_t first_zero = 0;
-    for (std::size_t v = 0; v < used.size(); ++v) {
-        if (!used[v]) continue;
-        const glm::vec3 n = mesh.normals[v];
-        if (!is_finite(n)) {
-            return malformed(source, "the normal of vertex " + std::to_string(v) +
-                                         " is NaN or infinite; correct it, or leave the normals out.");
-        }
-        if (n != glm::vec3(0.0f)) continue;
-        if (zero++ == 0) first_zero = v;
-    }
-    if (zero > 0) {
-        result.warnings.push_back(counted_were(zero, "normal") +
-                                  " zero or missing and computed from the faces, the first that of vertex " +
-                                  std::to_string(first_zero) + ".");
-    }
-    return {};
+    std::uint64_t lost = 0;
+    std::size_t first = 0;
+    for (std::size_t v = 0; v < used.size(); ++v)
+        if (used[v] && mesh.normals[v] == missing_normal && lost++ == 0) first = v;
+    if (lost > 0)
+        result.warnings.push_back(
+            counted_were(lost, "normal") +
+            " zero, missing or not finite and computed from the faces, the first that of vertex " +
+            std::to_string(first) + ".");
 }
 
 // Colours and UVs take part in costs, where a NaN would spread.
@@ -131,7 +93,6 @@ void repair_attributes(ReadResult& result) {
     std::uint64_t uvs = 0;
     for (glm::vec2& uv : result.mesh.uvs) {
         if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
-        if (!result.bad_uv) result.bad_uv = static_cast<std::uint64_t>(&uv - result.mesh.uvs.data());
         uv = glm::vec2(0.0f);
         ++uvs;
     }
@@ -174,15 +135,22 @@ std::string text_of(const BadParts& bad) {
     return vertices + (bad.vertices > 0 ? "; " : "") + first_of(bad.first_face, bad.faces, "faces");
 }
 
-// Bad vertices are in no triangle any more, and get a place that does not stretch the mesh.
+// Faces without a shape are an error unless they are to be left out; bad vertices that no face uses do no harm. Bad
+// vertices get a place that does not stretch the mesh.
 Result<void> settle_bad_parts(const MeshSource& source, ReadResult& result) {
     if (!result.bad.any()) return {};
     const std::string text = text_of(result.bad);
-    if (!source.options.skip_bad)
-        return malformed(source, text + ". Correct it, or leave out the faces concerned with " +
-                                     Message::of("{read.skip_bad}."));
-    if (result.mesh.triangles.empty()) return malformed(source, "no face is left without the bad ones: " + text + ".");
-    result.warnings.push_back(counted_were(result.bad.left_out, "face") + " left out: " + text + ".");
+    if (result.bad.left_out == 0) {
+        result.warnings.push_back(text + "; no face uses " + (result.bad.vertices == 1 ? "it." : "them."));
+    } else {
+        if (!source.options.skip_bad)
+            return malformed(source, text + ". Correct it, or leave out the faces concerned with " +
+                                         Message::of("{read.skip_bad}."));
+        if (result.mesh.triangles.empty())
+            return malformed(source, "no face is left without the bad ones: " + text + ".");
+        result.warnings.push_back(counted_were(result.bad.left_out, "face") + " left out: " + text + ".");
+    }
+    if (result.mesh.triangles.empty()) return {};
     const glm::dvec3 place = result.mesh.positions[result.mesh.triangles.front().front()];
     for (glm::dvec3& position : result.mesh.positions)
         if (!is_finite(position)) position = place;
@@ -218,7 +186,7 @@ Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result) {
         return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +
                                      " triangles use a vertex twice, so none is left; give a file with proper faces.");
     }
-    if (const Result<void> valid = check_normals(source, result); !valid) return valid.error();
+    check_normals(result);
     hint_at_unwelded(source, result);
     return result;
 }
@@ -249,17 +217,6 @@ glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding) {
     return {srgb_to_linear(encoded.r), srgb_to_linear(encoded.g), srgb_to_linear(encoded.b), encoded.a};
 }
 
-std::optional<fs::path> path_beside(std::string_view name) {
-    std::string slashes(name);
-    std::replace(slashes.begin(), slashes.end(), '\\', '/');
-    const fs::path relative = slashes;
-    const bool leaves_folder = std::find(relative.begin(), relative.end(), "..") != relative.end();
-    if (relative.empty() || relative.is_absolute() || leaves_folder || slashes.find(':') != std::string::npos ||
-        slashes.find('\0') != std::string::npos)
-        return std::nullopt;
-    return relative.lexically_normal();
-}
-
 Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name, const ReadOptions& options,
                                    const fs::path& folder) {
     const std::string shown_name = name.string();
@@ -269,12 +226,15 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name,
     if (const char* compression = compression_of(bytes)) {
         return malformed(source, std::string("it is compressed with ") + compression + "; decompress it first.");
     }
-    const std::optional<Format> format = find_format(bytes, name);
-    if (!format) {
-        return malformed(source, "it is neither PLY, OBJ, OFF, STL, glTF nor VTK; convert it to one of them.");
+    const Format* const format = find_format(bytes, name);
+    if (bytes.starts_with("# vtk DataFile"))
+        return malformed(source,
+                         "it is a legacy file of VTK, which is not read; save it as .vtp (in ParaView: Save Data).");
+    if (format == nullptr) {
+        return malformed(source, "it is neither PLY, OBJ, OFF, STL, glTF nor VTK's VTP; convert it to one of them.");
     }
     try {
-        Result<ReadResult> result = read_as(*format, source);
+        Result<ReadResult> result = format->read(source);
         if (!result) return result;
         return finish_reading(source, std::move(result).value());
     } catch (const std::bad_alloc&) {
