@@ -60,7 +60,6 @@ bool is_vtk_xml(std::string_view bytes);
 // machine.
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
-
 // Counts a vertex with a NaN or infinite coordinate. `where` names it if it is the first.
 template <class Where>
 void check_position(BadParts& bad, const glm::dvec3& position, Where&& where) {

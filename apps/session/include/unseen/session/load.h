@@ -84,7 +84,7 @@ enum class LoadAs { model, scene, automatic };
 
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
-    LoadAs as = LoadAs::automatic;      // for Scene::load(); trees and files of other formats are models
+    LoadAs as = LoadAs::automatic; // for Scene::load(); trees and files of other formats are models
     // An image that replaces those of the mesh's materials, or a folder in which these are looked for, too
     // (meshio::ReadOptions::search_folder).
     std::filesystem::path texture = {};
