@@ -9,7 +9,7 @@
 #include <unseen/session_gpu/tradeoff.h>
 
 #include "bench_tools.h"
-#include "model_file.h"
+#include "load_model.h"
 #include "session_options.h"
 #include "terminal.h"
 

@@ -2,6 +2,7 @@
 // never decides: every field of what can be asked is varied, two at a time, in one session, and each answer is that of a
 // session that has never been asked anything.
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -121,8 +122,9 @@ Answer ask(Session& session, const Question& q) {
     return answer;
 }
 
-// A scene a time, with the lights that the other scenes lack.
+// A scene. The pairs of changes are dealt out over the scenes; every scene has all single changes.
 struct SceneCase {
+    int number;
     const char* name;
     std::function<session::Scene()> make;
 };
@@ -183,6 +185,8 @@ session::Scene under_moving_lights() {
     return scene;
 }
 
+constexpr int scene_count = 5;
+
 class SessionMemory : public testing::TestWithParam<SceneCase> {};
 
 TEST_P(SessionMemory, DecidesNothing) {
@@ -207,6 +211,7 @@ TEST_P(SessionMemory, DecidesNothing) {
     int others = 0;
     for (int i = 0; i < count; ++i)
         for (int k = 0; k < i; ++k) {
+            if ((i + k) % scene_count != GetParam().number) continue;
             Session session = fresh();
             const Answer both = ask(session, changed(i, k));
             others += both != alone[static_cast<std::size_t>(i)];
@@ -214,15 +219,15 @@ TEST_P(SessionMemory, DecidesNothing) {
             ASSERT_TRUE(ask(asked, changed(i, k)) == both) << "changes " << i << " and " << k;
             ASSERT_TRUE(ask(asked, changed(k, k)) == alone[static_cast<std::size_t>(k)]) << k << " after " << i;
         }
-    EXPECT_GT(others, count) << "most changes change something";
+    EXPECT_GT(others, count / 2) << "most changes change something";
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, SessionMemory,
-                         testing::Values(SceneCase{"OwnLight", measured_balls},
-                                         SceneCase{"StillLights", [] { return lit(false, 0); }},
-                                         SceneCase{"Shadows", [] { return lit(true, 0); }},
-                                         SceneCase{"Highlights", [] { return lit(true, 0.05); }},
-                                         SceneCase{"MovingLights", under_moving_lights}),
+                         testing::Values(SceneCase{0, "OwnLight", measured_balls},
+                                         SceneCase{1, "StillLights", [] { return lit(false, 0); }},
+                                         SceneCase{2, "Shadows", [] { return lit(true, 0); }},
+                                         SceneCase{3, "Highlights", [] { return lit(true, 0.05); }},
+                                         SceneCase{4, "MovingLights", under_moving_lights}),
                          [](const auto& of) { return of.param.name; });
 
 } // namespace session_memory_test

@@ -311,7 +311,7 @@ TEST(Vtp, WhatIsCompressedMayNotGrowWithoutLimit) {
     const std::string array = mesh_files::little(1u) + mesh_files::little(million) + mesh_files::little(0u) +
                               mesh_files::little(size_of(zeros)) + zeros;
     const meshio::VtpEncoding zlib{.compressor = "vtkZLibDataCompressor"};
-    meshio::VtpDecoder decoder(zlib, 2 * million);
+    meshio::VtpDecoder decoder(zlib, Budget(0, 0, 2 * million));
     EXPECT_EQ(decoder.decode(array, false, million).size(), million);
     EXPECT_EQ(decoder.decode(array, false, million).size(), million);
     try {
@@ -323,7 +323,7 @@ TEST(Vtp, WhatIsCompressedMayNotGrowWithoutLimit) {
     // What zlib cannot make of so few bytes is not even tried.
     const std::string lie = mesh_files::little(1u) + mesh_files::little(4'000'000'000u) + mesh_files::little(0u) +
                             mesh_files::little(size_of(zeros)) + zeros;
-    meshio::VtpDecoder generous(zlib, std::uint64_t{1} << 40);
+    meshio::VtpDecoder generous(zlib, Budget(0, 0, std::uint64_t{1} << 40));
     EXPECT_THROW(generous.decode(lie, false, 4'000'000'000u), meshio::VtkFault);
     // Nor blocks that are not there.
     const std::string blocks = mesh_files::little(4'000'000'000u) + mesh_files::little(1u) + mesh_files::little(0u);
