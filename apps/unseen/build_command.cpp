@@ -203,7 +203,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const auto start = vdtree::Clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
-    if (const std::string hint = session::hint_at_baked_light(*tree); !hint.empty())
+    if (const Message hint = session::hint_at_baked_light(*tree); !hint.empty())
         print_note(with_option_names(a.mesh + ": " + hint));
     if (!a.no_fold_errors) tree = measure(a, std::move(*tree));
     if (tree && a.lit_fold_errors) tree = measure_under_lights(a, *tree);

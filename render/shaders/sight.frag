@@ -8,7 +8,7 @@ layout(location = 0) uniform ivec2 size;
 layout(location = 1) uniform vec4 masking;      // power, knee, least and largest masker
 layout(location = 2) uniform ivec2 cells;       // of luminance: the first one, how many nodes
 layout(location = 3) uniform ivec2 rows;        // of nodes: the first one, by how much a luminance's bits are shifted
-layout(location = 4) uniform vec4 of_band;      // patches over unlimited gratings, scale of the weights
+layout(location = 4) uniform float of_patch;    // sensitivity to patches over that to unlimited gratings
 #ifdef GAZE
 layout(location = 5) uniform vec4 gaze;         // direction, tangent of a pixel
 layout(location = 6) uniform vec4 eccentricity; // the first node's, nodes a degree, how many
@@ -77,16 +77,16 @@ void main() {
         vec3 node = node_of(luminance[i], ivec2(min(4 * at.x + i, size.x - 1), at.y));
         float sensitivity = exact_exp2(node.x);
         // Maskers work where they are: their contrasts count in thresholds of patches.
-        float masker = abs(node.y * contrast[i] + node.z * around[i]) * sensitivity * of_band.x;
+        float masker = abs(node.y * contrast[i] + node.z * around[i]) * sensitivity * of_patch;
 #ifdef MASKERS
         maskers[i] = 4 * at.x + i < size.x ? min(masker, masking.w) : 0.0; // nothing is outside
 #else
         float raised = 1.0 + exact_exp2(masking.x * exact_log2(clamp(masker, masking.z, masking.w)));
         float elevation = exact_exp2(exact_log2(raised) / masking.y);
 #ifdef THRESHOLDS
-        steps[i] = luminance[i] * elevation / (sensitivity * of_band.x);
+        steps[i] = luminance[i] * elevation / (sensitivity * of_patch);
 #else
-        float to_thresholds = of_band.y * (sensitivity / (luminance[i] * elevation));
+        float to_thresholds = (sensitivity / (luminance[i] * elevation));
         own[i] = to_thresholds * node.y;
         smoothed[i] = to_thresholds * node.z;
 #endif

@@ -354,7 +354,7 @@ void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const G
     program.set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
     program.set(2, glm::ivec2(tables.first_luminance, tables.luminances));
     program.set(3, glm::ivec2(static_cast<int>(level) * tables.eccentricities, tables.luminance_shift));
-    program.set(4, glm::vec4(tables.bands[level].of_patch, 0, 0, 0));
+    program.set(4, tables.bands[level].of_patch);
     if (tables.gaze) {
         program.set(5, glm::vec4(tables.gaze->direction, static_cast<float>(tables.gaze->tangent_per_pixel)));
         program.set(6, glm::vec4(tables.first_eccentricity, 1 / tables.eccentricity_step,

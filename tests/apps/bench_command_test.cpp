@@ -99,7 +99,7 @@ TEST_F(BenchCommandTest, TakesTargetsFromAFile) {
     EXPECT_EQ(row_named(report, "full perceptual tests")["holds_must"], false);
     EXPECT_TRUE(row_named(report, "teleport, 1.47 k")["must"].is_null());
     EXPECT_TRUE(report["load_average"].is_number());
-    EXPECT_THAT(outcome.out, ::testing::ContainsRegex("still view [^\n]* us +100")) << "its target";
+    EXPECT_THAT(outcome.out, ::testing::ContainsRegex("still view [^\n]* us +1,000")) << "its target";
     const bool is_busy = report["load_average"] > 0.5;
     EXPECT_EQ(outcome.out.find("the machine was busy") != std::string::npos, is_busy);
 }
@@ -129,7 +129,7 @@ TEST_F(BenchCommandTest, IsAProgramOfItsOwn) {
     EXPECT_THAT(outcome.err, HasSubstr("unseen-bench"));
     const Outcome help = bench({"--help"});
     EXPECT_EQ(help.status, 0);
-    for (const char* verb : {"engine", "perception", "effects", "budget"}) EXPECT_THAT(help.out, HasSubstr(verb));
+    for (const char* verb : {"engine", "perception", "points", "scenes"}) EXPECT_THAT(help.out, HasSubstr(verb));
 }
 
 TEST_F(BenchCommandTest, SuggestsWhatWasMeant) {

@@ -29,7 +29,7 @@ TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
     EXPECT_EQ(profile["version"], 3);
     EXPECT_LT(report["summation"]["low"], 1);
     EXPECT_GT(report["summation"]["high"], 1);
-    EXPECT_EQ(profile["summation"][0], report["summation"]["own"]);
+    EXPECT_NEAR(profile["summation"][0].get<double>(), report["summation"]["own"].get<double>(), 1e-14);
     EXPECT_THAT(outcome.out, HasSubstr("wide patches: unlimited ones are seen"));
     EXPECT_EQ(profile["date"], "2001-06-25");
     EXPECT_EQ(profile["conditions"], "dim room");

@@ -130,7 +130,7 @@ struct SceneCase {
 };
 
 vdtree::Mesh coloured_ball() {
-    vdtree::Mesh mesh = shapes::bumpy_sphere(3, 0.03);
+    vdtree::Mesh mesh = shapes::bumpy_sphere(2, 0.03);
     for (const glm::dvec3& p : mesh.positions)
         mesh.colours.emplace_back(0.5 + 0.4 * std::sin(3 * p.x), 0.5 + 0.3 * p.y, 0.5, 1);
     return mesh;
@@ -149,7 +149,7 @@ session::Scene measured_balls() {
     static const vdtree::VertexTree coloured = *session::measured_under_lights(
                                         *session::measured(support::built(coloured_ball()))),
                                     grey = *session::measured_under_lights(
-                                        *session::measured(support::built(shapes::bumpy_sphere(3, 0.02))));
+                                        *session::measured(support::built(shapes::bumpy_sphere(2, 0.02))));
     return three_balls(coloured, grey);
 }
 
@@ -228,6 +228,6 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SessionMemory,
                                          SceneCase{2, "Shadows", [] { return lit(true, 0); }},
                                          SceneCase{3, "Highlights", [] { return lit(true, 0.05); }},
                                          SceneCase{4, "MovingLights", under_moving_lights}),
-                         [](const auto& of) { return of.param.name; });
+                         [](const auto& info) { return info.param.name; });
 
 } // namespace session_memory_test

@@ -95,7 +95,7 @@ TEST_F(TradeoffCommandTest, ThresholdsAreOfImperceptibleCuts) {
     EXPECT_LE(kept("4"), kept("1"));
     EXPECT_LE(kept("1"), kept("0.25"));
     EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "2", "--full"}).err,
-                HasSubstr("--full and --threshold exclude each other"));
+                HasSubstr("--threshold acts on the goal imperceptible alone"));
     EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "0"}).err, HasSubstr("--threshold"));
 }
 

@@ -25,6 +25,11 @@ bool has_chroma(Sight& sight) {
     return *known;
 }
 
+// Whether a lit object's errors are there, in the session or in the tree, which takes no measuring.
+bool has_lit_errors(const Sight& sight) {
+    return sight.cache.lit_folds || perception::has_lit_folds(sight.object.tree);
+}
+
 struct Choice {
     FoldTest test = FoldTest::error;
     std::string_view why = {};
@@ -42,7 +47,7 @@ Choice suitable_test(Sight& sight, bool chroma, bool may_measure) {
         return {FoldTest::luebke_hallen_safe, "the test error does not know textures over vertices of several hues"};
     if (sight.lighting && sight.is_crowded)
         return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
-    if (sight.lighting && sight.cache.lit_folds) return {};
+    if (sight.lighting && has_lit_errors(sight)) return {};
     if ((!sight.lighting && perception::has_fold_measurement(tree)) ||
         (may_measure && tree.interior_count() <= most_measured))
         return {};
@@ -85,14 +90,15 @@ Result<Decision> decide(Sight& sight, const Request& request, std::size_t object
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
-    Choice choice = suitable_test(sight, request.chroma && has_chroma(sight), folds && request.may_measure);
+    // The full model needs no measuring, so what is measured already does not decide its test.
+    Choice choice = suitable_test(sight, request.chroma && has_chroma(sight), !folds || request.may_measure);
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
     if (const auto known = check_knowledge(sight, choice.test, request.chroma, request.shown.has_value()); !known)
         return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
-    if (measures && !request.may_measure)
+    if (measures && !request.may_measure && !(sight.lighting && has_lit_errors(sight)))
         return invalid_field(
             "{request.fold_test = }error goes by errors that the tree does not hold: allow {request.may_measure}, or "
             "call {session::measured()}.");

@@ -51,8 +51,8 @@ Result<void> validate(const Request& r) {
         return invalid_field("{request.milliseconds} has no meaning for the full model.");
     if (!is_positive(r.threshold)) return invalid_field("{request.threshold} must be above 0 and finite.");
     if (r.threshold != 1 && r.goal.kind != Goal::Kind::imperceptible)
-        return invalid_field(
-            "{request.threshold} is of the goal imperceptible: the others say themselves how much is folded.");
+        return invalid_field("{request.threshold} acts on the goal imperceptible alone: leave it out, other goals say "
+                             "how much is folded.");
     if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid_field("{request.hysteresis} must be from 1 to 2.");
     return {};
 }

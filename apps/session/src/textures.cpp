@@ -109,7 +109,8 @@ public:
     // A sentence on the images that could not be decoded, and the triangles that are drawn without; or nothing.
     void warn(std::uint64_t triangles, std::vector<Message>& warnings) const {
         if (complaints_.empty()) return;
-        const std::string first = complaints_.front().substr(0, complaints_.front().size() - 1);
+        std::string first = complaints_.front();
+        if (first.ends_with('.')) first.pop_back();
         const std::string count = complaints_.size() == 1 ? "" : "the first of " + std::to_string(complaints_.size());
         warnings.push_back(
             Message::of("{} the colour of the material alone, as an image could not be decoded ({}{}); "

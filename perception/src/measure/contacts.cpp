@@ -29,7 +29,8 @@ constexpr Index at_once = 16;                 // triangles looked at together,
 constexpr std::size_t most_candidates = 512;  // unless so many are near any of them
 constexpr std::size_t most_listed = 100;      // triangles around a triangle's corners; amid more, pairs are looked at
 constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
-constexpr std::size_t most_boxes = 16000;     // looked at for one triangle: coincident vertices have one node
+constexpr std::size_t most_boxes =
+    std::size_t{1} << 32; // for all triangles together, in trees so flat that nodes have very many: some seconds
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
@@ -123,7 +124,8 @@ public:
     explicit ContactFinder(std::span<const SoundTree> trees)
         : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
-          boxes_(interior_), of_leaf_(tree_) {
+          boxes_(interior_), of_leaf_(tree_),
+          boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         is_textured_ = !trees.front().texture().empty();
         for (const SoundTree& tree : trees) luminances_.push_back(tree.luminance().subspan(interior_));
         const auto leaves = tree_.positions().subspan(interior_);
@@ -257,7 +259,7 @@ private:
             scratch.waiting.pop_back();
             if (++nodes > most_nodes) return false;
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) {
-                if (++boxes > most_boxes) return false;
+                if (++boxes > boxes_a_triangle_) return false;
                 if (const Box box = box_of(corners(t)); around.meets(box)) scratch.candidates.push_back({box, t});
             }
             if (scratch.candidates.size() > most) return false;
@@ -302,6 +304,7 @@ private:
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
     LeafTriangles of_leaf_;
+    std::size_t boxes_a_triangle_; // at most
 };
 
 } // namespace

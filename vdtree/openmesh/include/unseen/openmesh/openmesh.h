@@ -1,5 +1,5 @@
 // openmesh: trees from OpenMesh meshes, and cuts back into them. Headers alone; link OpenMesh (BSD, three clauses) yourself.
-// <unseen/openmesh/decimater_clusterer.h> has OpenMesh's decimater as a clusterer.
+// The decimater as a clusterer: <unseen/openmesh/decimater_clusterer.h>, which is included at the end.
 //
 //     OpenMesh::IO::read_mesh(mesh, "bunny.ply");
 //     const auto tree = openmesh::build_tree(mesh);
@@ -206,3 +206,6 @@ Result<Made<M>> extract_mesh(const vdtree::Cut& cut, const Options& options = {}
 }
 
 } // namespace unseen::openmesh
+
+// Uses what is above.
+#include <unseen/openmesh/decimater_clusterer.h>
