@@ -35,7 +35,7 @@ struct Choice {
     std::string_view why = {};
 };
 
-// Of the tests by luminance one that knows the scene, and colours where they count.
+// Chooses a perceptual test that handles this scene, and its colours if they count.
 Choice suitable_test(Sight& sight, bool chroma, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
     if (sight.lighting && !sight.lights->stands_still())

@@ -9,7 +9,7 @@
 namespace unseen::session {
 namespace {
 
-// Of what may move unseen: so much is left to a moving eye before a criterion is made anew.
+// The share of the invisible shift that the eye may use up by moving before a criterion is made anew.
 constexpr double share_left_to_motion = 0.7;
 // More nodes than this share beyond those that have to be are not kept.
 constexpr double most_kept_too_many = 0.25;
@@ -37,7 +37,7 @@ std::vector<Standing> all_standing(const SceneShadows& all) {
     return standing;
 }
 
-// Of lights that move: everywhere. To look at them anew in each frame takes longer than it spares.
+// Moving lights: outlines are kept everywhere. Testing them in each frame costs more than it saves.
 LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting, bool stands_still) {
     LitReceivers lit{std::move(lighting), {}};
     for (const vdtree::LightSource& light : lit.lighting.lights)

@@ -25,7 +25,7 @@ public:
     double in_cdm2(double relative) const { return luminances_.in_cdm2(relative); }
     double difference_in_cdm2(double relative) const { return luminances_.difference_in_cdm2(relative); }
 
-    // Of a contrast, and of a luminance in cd/m2.
+    // For a contrast and a luminance in cd/m2.
     int contrast_level(double difference, double base) const {
         return static_cast<int>(pattern_contrasts.of(difference / std::max(base, luminances_.lowest()))) - 1;
     }

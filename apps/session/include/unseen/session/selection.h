@@ -85,7 +85,7 @@ public:
     double change(std::span<const float> picture, const PixelRect& changed) const;
     void take(std::span<const float> picture, const PixelRect& changed); // holds that one from now on
 
-    // Of a whole picture, without what is held: the same but for the order of the sums.
+    // The loss of a whole picture, ignoring what is held. Equal but for the order of the sums.
     double of(std::span<const float> picture) const;
 
     int places() const noexcept { return columns_ * rows_; } // that the loss is summed over
@@ -257,7 +257,7 @@ enum class SelectionBlend {
 struct SelectionFollowOptions {
     std::uint64_t budget = 0; // triangles of objects in the frame; 0: that of the selections. Of costs alone.
     SelectionBlend blend = SelectionBlend::costs;
-    // Of costs: an object gets a better level only where its loss is above so many times that of what is done for it.
+    // An object gets a better level only if its loss exceeds this many times the loss of what makes room for it.
     double hysteresis = 1.25; // 1 or more
     int most_changes = 4;     // of a frame, beyond those that the budget asks for; 1 or more
 };
