@@ -37,7 +37,7 @@ std::vector<Standing> all_standing(const SceneShadows& all) {
     return standing;
 }
 
-// Moving lights: outlines are kept everywhere. Testing them in each frame costs more than it saves.
+// Under moving lights every receiver counts as lit: testing them in each frame costs more than it saves.
 LitReceivers lit_by(const ShadowReceivers& receivers, vdtree::Lighting lighting, bool stands_still) {
     LitReceivers lit{std::move(lighting), {}};
     for (const vdtree::LightSource& light : lit.lighting.lights)
