@@ -207,5 +207,5 @@ Result<Made<M>> extract_mesh(const vdtree::Cut& cut, const Options& options = {}
 
 } // namespace unseen::openmesh
 
-// Uses what is above.
+// At the end, as it uses the declarations above.
 #include <unseen/openmesh/decimater_clusterer.h>
