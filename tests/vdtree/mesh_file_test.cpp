@@ -6,6 +6,7 @@
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
+#include "read_bytes.h"
 
 #include <chrono>
 #include <cmath>
@@ -25,20 +26,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::string_literals;
+using support::error_of;
+using support::read;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-meshio::ReadResult read(const std::string& bytes, const std::string& name, const meshio::ReadOptions& options = {}) {
-    Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
-    EXPECT_TRUE(result) << result.error().message;
-    return result ? std::move(*result) : meshio::ReadResult{};
-}
-
-std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
-    EXPECT_FALSE(result) << name << " was read";
-    return result ? "" : result.error().message;
-}
 
 // A folder of its own for each test, removed with everything in it.
 class MeshFiles : public testing::Test {

@@ -19,6 +19,7 @@
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "mesh_writers.h"
+#include "read_bytes.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "value_types.h"
@@ -30,16 +31,11 @@ using namespace std::string_literals;
 using meshio::SourceDocument;
 using meshio::ValueType;
 using meshio::VertexArray;
+using support::read;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
 constexpr double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
-
-meshio::ReadResult read(const std::string& bytes, const std::string& name) {
-    Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
-    EXPECT_TRUE(result) << result.error().message;
-    return result ? std::move(*result) : meshio::ReadResult{};
-}
 
 template <class T>
 VertexArray array_of(const std::string& name, ValueType type, std::uint32_t components, const std::vector<T>& values) {

@@ -13,6 +13,7 @@
 
 #include "mesh_readers.h"
 #include "mesh_writers.h"
+#include "read_bytes.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "value_types.h"
@@ -27,22 +28,12 @@ namespace fs = std::filesystem;
 using namespace std::string_literals;
 using meshio::ValueType;
 using meshio::VertexArray;
+using support::error_of;
+using support::read;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using vtp_files::Format;
 using vtp_files::Style;
-
-meshio::ReadResult read(const std::string& bytes, const std::string& name, const meshio::ReadOptions& options = {}) {
-    Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
-    EXPECT_TRUE(result) << result.error().message;
-    return result ? std::move(*result) : meshio::ReadResult{};
-}
-
-std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
-    EXPECT_FALSE(result) << name << " was read";
-    return result ? "" : result.error().message;
-}
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
     const std::size_t at = text.find(from);
