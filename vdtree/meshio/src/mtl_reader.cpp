@@ -148,7 +148,7 @@ private:
     // An image that lies elsewhere is written beside the library, and so is named otherwise there.
     void rename(std::string_view name, const std::filesystem::path& uri) {
         const auto path = plain_path(name);
-        if (*path == uri || (folder_ / *path).lexically_normal() == uri) return;
+        if (path && (*path == uri || (folder_ / *path).lexically_normal() == uri)) return;
         const auto at = static_cast<std::size_t>(name.data() - bytes_.data());
         text_.append(bytes_.substr(copied_, at - copied_))
             .append(uri.lexically_relative(folder_.empty() ? "." : folder_).generic_string());
