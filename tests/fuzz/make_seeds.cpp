@@ -28,6 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace unseen::vdtree;
+using namespace std::string_literals;
 namespace meshio = unseen::meshio;
 namespace shapes = unseen::shapes;
 
@@ -72,7 +73,8 @@ void make_meshes(const fs::path& folder) {
           "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
           "\"nodes\":[0]}]}");
     write(folder / "colours.mtl",
-          "\7newmtl a\nKd 0.5 0.25 1\nd 0.5\nmap_Kd -s 2 2 1 -o 0 0 0 images/a.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n");
+          "\7newmtl a\nKd 0.5 0.25 1\nd 0.5\nmap_Kd -s 2 2 1 -o 0 0 0 images/a.png\nnewmtl b\nKe 1 1 1\nTr 0.5\n"
+          "map_Kd no\0path.png\n"s);
 }
 
 // Read as a scene: instances, a camera, lights.
