@@ -16,20 +16,22 @@ using namespace measurement;
 BorderShifts::BorderShifts(const SoundTree& tree, const LeafTriangles& of_leaf)
     : tree_(tree), border_(tree, of_leaf), interior_(tree.interior_count()), positions_(tree.positions()),
       first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
-      triangles_(tree.triangles()), support_(tree.support_spheres()), gave_up_(interior_) {}
+      triangles_(tree.triangles()), support_(tree.support_spheres()), levels_below_(interior_) {}
 
 float BorderShifts::shift(NodeId node, std::span<const Index> crossing,
                           const FunctionRef<NodeId(Index leaf)>& stand_in) {
     if (border_.is_empty() || !(tree_.bounds()[node].flags & irregular_ring)) return 0;
     if (!(support_[node].radius > 0)) return 0; // all of it is at one point
     thread_local Scratch scratch;
-    bool gave_up_below = false;
-    tree_.for_each_child(node, [&](NodeId child) { gave_up_below |= child < interior_ && gave_up_[child]; });
+    int below = 0;
+    tree_.for_each_child(node, [&](NodeId child) {
+        if (child < interior_) below = std::max(below, levels_below_[child] + 1);
+    });
     const std::size_t looks = most_border_looks + border_looks_an_edge * (border_of(node).size() + crossing.size());
-    scratch.looks_left = gave_up_below ? 0 : looks;
+    scratch.looks_left = below < most_border_levels ? looks : 0;
     const float borders = distance_of_borders(node, crossing, stand_in, scratch);
     const float shift = turned_reach(node, crossing, borders, scratch);
-    gave_up_[node] |= scratch.looks_left == 0;
+    levels_below_[node] = static_cast<std::uint16_t>(scratch.looks_left > 0 ? below : most_border_levels);
     return shift;
 }
 

@@ -23,8 +23,8 @@ public:
     // that turn over reach beyond the border, in any state of the neighbours that are no larger than the node.
     // `crossing`: triangles with a corner in the support, among them all with one outside. 0 where the node is nowhere
     // near a border. Ask about the children before; threads may ask about different nodes at once. Cost: some products
-    // for each edge of the border below the node, as long as the mesh's parts do not lie through each other; at most some
-    // hundreds, after which the answer errs upwards.
+    // for each edge of the border below the node, as long as the mesh's parts do not lie through each other and the tree
+    // is no deeper than foliage's; at most some hundreds, after which the answer errs upwards.
     float shift(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
                 const FunctionRef<vdtree::NodeId(vdtree::Index leaf)>& stand_in);
 
@@ -63,7 +63,8 @@ private:
     std::span<const vdtree::NodeId> parents_;
     std::span<const vdtree::Triangle> triangles_;
     std::span<const vdtree::Sphere> support_;
-    std::vector<std::uint8_t> gave_up_; // by interior node: there was too much to be looked at, or below
+    // By interior node, of those near the border; most_border_levels where there was too much to be looked at, or below.
+    std::vector<std::uint16_t> levels_below_;
 };
 
 } // namespace unseen::perception

@@ -36,6 +36,8 @@ inline constexpr std::size_t most_border_ends =
 // large, for the nodes above, too, which would look at the same. Not kept with a measurement.
 inline constexpr std::size_t most_border_looks = 1u << 16;
 inline constexpr std::size_t border_looks_an_edge = 256;
+// Nodes near a border that lie each in the next: 40 in trees of foliage. Above more, nothing is looked at, either.
+inline constexpr int most_border_levels = 256;
 
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells
