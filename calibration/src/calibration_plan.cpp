@@ -1,9 +1,9 @@
 // Plans: which gratings to measure on a display.
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
-#include <utility>
+#include <ranges>
+#include <set>
 
 #include <unseen/vdtree/internal/errors.h>
 
@@ -53,17 +53,12 @@ std::vector<GratingPlace> wide_places(const CalibrationPlan& plan, const percept
                                       const CsfTable& expected) {
     constexpr std::size_t coarsest = 2;         // frequencies
     constexpr double least_improvement = 1.189; // 1.5 dB, or the patch says nothing about summation
-    std::vector<double> frequencies, eccentricities;
+    std::set<double> frequencies, eccentricities;
     for (const GratingPlace& place : plan.places) {
         if (place.is_wide()) continue;
-        frequencies.push_back(place.frequency_cpd);
-        eccentricities.push_back(place.eccentricity_deg);
+        frequencies.insert(place.frequency_cpd);
+        eccentricities.insert(place.eccentricity_deg);
     }
-    for (std::vector<double>* values : {&frequencies, &eccentricities}) {
-        std::sort(values->begin(), values->end());
-        values->erase(std::unique(values->begin(), values->end()), values->end());
-    }
-    frequencies.resize(std::min(frequencies.size(), coarsest));
     // The display's smaller side, in circles of two standard deviations.
     const double side = std::min(perception::physical_field(display, display.width_px).value(),
                                  perception::physical_field(display, display.height_px).value());
@@ -73,15 +68,12 @@ std::vector<GratingPlace> wide_places(const CalibrationPlan& plan, const percept
         return area >= least_wide_deg2 && summation_gain(place) >= least_improvement && fits(display, place) &&
                is_measurable(plan, expected, place);
     };
-    for (const double frequency : frequencies) {
-        const auto nearest = std::find_if(eccentricities.begin(), eccentricities.end(), [&](double e) {
-            return is_useful({frequency, e, area});
-        });
+    for (const double frequency : frequencies | std::views::take(coarsest)) {
+        const auto is_useful_at = [&](double eccentricity) { return is_useful({frequency, eccentricity, area}); };
+        const auto nearest = std::ranges::find_if(eccentricities, is_useful_at);
         if (nearest == eccentricities.end()) continue;
         wide.push_back({frequency, *nearest, area});
-        const auto farthest = std::find_if(eccentricities.rbegin(), eccentricities.rend(), [&](double e) {
-            return is_useful({frequency, e, area});
-        });
+        const auto farthest = std::find_if(eccentricities.rbegin(), eccentricities.rend(), is_useful_at);
         if (*farthest != *nearest) wide.push_back({frequency, *farthest, area});
     }
     return wide;
@@ -118,38 +110,36 @@ Result<void> validate(const CalibrationPlan& plan) {
     if (plan.places.empty() || plan.places.size() > most_plan_places)
         return invalid_argument("A calibration needs 1 to " + std::to_string(most_plan_places) + " places, not " +
                                 std::to_string(plan.places.size()) + ".");
-    for (std::size_t i = 0; i < plan.places.size(); ++i) {
-        const auto& [frequency, eccentricity, area] = plan.places[i];
-        const std::string where = in_brackets("places", i);
+    Result<void> result;
+    const auto expect = [&](bool holds, const std::string& rule, const std::string& value) {
+        if (!holds && result) result = invalid_argument(rule + ", not " + value + ".");
+    };
+    for (auto place = plan.places.begin(); place != plan.places.end(); ++place) {
+        const auto& [frequency, eccentricity, area] = *place;
+        const std::string where = in_brackets("places", static_cast<std::size_t>(place - plan.places.begin()));
         constexpr double coarsest_cpd = 1.0 / 16, finest_cpd = 64; // of the tables
-        if (!(frequency >= coarsest_cpd && frequency <= finest_cpd))
-            return invalid_argument(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) +
-                                    ".");
-        if (!(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg))
-            return invalid_argument(where + ": the eccentricity must lie in 0 to 90 degrees, not " +
-                                    to_text(eccentricity) + ".");
-        constexpr double largest_deg2 = 1e4; // a quarter of the sphere
-        if (!(area >= 0 && area <= largest_deg2))
-            return invalid_argument(where + ": the area must lie in 0 to 10,000 square degrees, not " + to_text(area) +
-                                    ".");
-        if (std::find(plan.places.begin(), plan.places.begin() + static_cast<std::ptrdiff_t>(i), plan.places[i]) !=
-            plan.places.begin() + static_cast<std::ptrdiff_t>(i))
-            return invalid_argument(where + " is there twice.");
+        constexpr double largest_deg2 = 1e4;                       // a quarter of the sphere
+        expect(frequency >= coarsest_cpd && frequency <= finest_cpd,
+               where + ": the frequency must lie in 1/16 to 64 cpd", number_text(frequency));
+        expect(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg,
+               where + ": the eccentricity must lie in 0 to 90 degrees", number_text(eccentricity));
+        expect(area >= 0 && area <= largest_deg2, where + ": the area must lie in 0 to 10,000 square degrees",
+               number_text(area));
+        if (result && std::find(plan.places.begin(), place, *place) != place)
+            result = invalid_argument(where + " is there twice.");
     }
-    if (std::all_of(plan.places.begin(), plan.places.end(), std::mem_fn(&GratingPlace::is_wide)))
-        return invalid_argument("All places are of wide patches: add one of 1.5 cycles radius.");
-    if (plan.trials < 1 || plan.trials > most_plan_trials)
-        return invalid_argument("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
-    if (plan.settings < 2 || plan.settings > most_plan_settings)
-        return invalid_argument("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
-    if (!(plan.luminance.value() > 0 && plan.luminance.value() <= brightest_cdm2))
-        return invalid_argument("The luminance must be above 0 and at most 1e6 cd/m2, not " +
-                                to_text(plan.luminance.value()) + ".");
-    if (plan.seed > exact_integers)
-        return invalid_argument("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
-    if (!(plan.highest_contrast > 0 && plan.highest_contrast <= 1))
-        return invalid_argument("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
-    return {};
+    if (result && std::ranges::all_of(plan.places, &GratingPlace::is_wide))
+        result = invalid_argument("All places are of wide patches: add one of 1.5 cycles radius.");
+    const double luminance = plan.luminance.value(), contrast = plan.highest_contrast;
+    expect(plan.trials >= 1 && plan.trials <= most_plan_trials, "There must be 1 to 100,000 trials",
+           std::to_string(plan.trials));
+    expect(plan.settings >= 2 && plan.settings <= most_plan_settings, "There must be 2 to 1000 settings a place",
+           std::to_string(plan.settings));
+    expect(luminance > 0 && luminance <= brightest_cdm2, "The luminance must be above 0 and at most 1e6 cd/m2",
+           number_text(luminance));
+    expect(plan.seed <= exact_integers, "The seed must be at most 2^53", std::to_string(plan.seed));
+    expect(contrast > 0 && contrast <= 1, "The highest contrast must lie in 0..1", number_text(contrast));
+    return result;
 }
 
 } // namespace unseen::calibration

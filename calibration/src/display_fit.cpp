@@ -24,9 +24,9 @@ std::string append_row(PhotometerTable& table, std::string_view line) {
     const auto code = finite_from(trimmed(line.substr(0, comma)));
     const auto luminance = comma == line.npos ? std::nullopt : finite_from(trimmed(line.substr(comma + 1)));
     if (!code || !luminance) return "must be a code and a luminance in cd/m2, such as 128,43.5";
-    if (!(*code >= 0 && *code <= 255)) return "the code must lie in 0..255, not " + to_text(*code);
-    if (!(*luminance >= 0)) return "the luminance must be 0 cd/m2 or more, not " + to_text(*luminance);
-    if (table.code.empty() && *code != 0) return "the first code must be 0, not " + to_text(*code);
+    if (!(*code >= 0 && *code <= 255)) return "the code must lie in 0..255, not " + number_text(*code);
+    if (!(*luminance >= 0)) return "the luminance must be 0 cd/m2 or more, not " + number_text(*luminance);
+    if (table.code.empty() && *code != 0) return "the first code must be 0, not " + number_text(*code);
     if (!table.code.empty() && !(*code / 255 > table.code.back())) return "the codes must ascend";
     if (!table.code.empty() && !(*luminance > table.luminance.back())) return "the luminances must ascend";
     table.code.push_back(*code / 255);
@@ -41,14 +41,14 @@ Result<double> fit_gamma(std::span<const BrightnessMatch> matches) {
     for (const BrightnessMatch& m : matches) {
         if (!(m.white > 0 && m.white < 1 && m.code > 0 && m.code < 1))
             return invalid_argument("A brightness match must lie between black and white, not be code " +
-                                    to_text(m.code) + " for " + to_text(m.white) + " of white.");
+                                    number_text(m.code) + " for " + number_text(m.white) + " of white.");
         upper += std::log(m.white) * std::log(m.code);
         lower += std::log(m.code) * std::log(m.code);
     }
     if (!(lower > 0)) return invalid_argument("There are no brightness matches to fit a gamma to.");
     const double gamma = upper / lower;
     if (!(gamma >= least_gamma && gamma <= largest_gamma))
-        return invalid_argument("The matches give a gamma of " + to_text(gamma) +
+        return invalid_argument("The matches give a gamma of " + number_text(gamma) +
                                 ", which no display has (0.5 to 5): match again.");
     return gamma;
 }

@@ -1,8 +1,9 @@
 // Display profiles: every key is read with its range, then the whole is validated as any display is.
 #include <unseen/calibration/display_profile.h>
 
+#include <array>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 #include "json_file.h"
 
@@ -12,164 +13,114 @@ namespace {
 using perception::Display;
 using perception::TransferFunction;
 
-constexpr double unbounded = std::numeric_limits<double>::max();
-constexpr Range positive{.minimum = 0, .maximum = unbounded, .minimum_allowed = false};
 constexpr Range not_negative{.minimum = 0, .maximum = unbounded};
-constexpr Range share{.minimum = 0, .maximum = 1};
 // Pixels along one side; far above any screen, and safe to square.
 constexpr Range pixel_count{.minimum = 1, .maximum = 1e6, .whole = true};
 
+constexpr std::pair<std::string_view, TransferFunction> transfers[] = {{"srgb", TransferFunction::srgb},
+                                                                       {"linear", TransferFunction::linear},
+                                                                       {"pq", TransferFunction::pq},
+                                                                       {"table", TransferFunction::table}};
+
 // From the pitch, or from the diagonal of a screen with square pixels.
-Result<double> read_pixel_pitch(const JsonObject& object, int width_px, int height_px) {
-    if (object.has("pixel_pitch_m") && object.has("diagonal_m")) {
-        return object.key_error("diagonal_m", "and key \"pixel_pitch_m\" say the same: remove one");
-    }
+double read_pixel_pitch(const JsonObject& object, const Display& display) {
+    if (object.has("pixel_pitch_m") && object.has("diagonal_m"))
+        object.fail_at("diagonal_m", "and key \"pixel_pitch_m\" say the same: remove one");
     if (object.has("pixel_pitch_m")) return object.number("pixel_pitch_m", positive);
-    if (!object.has("diagonal_m")) {
-        return object.error("the size of the screen is missing: give key \"pixel_pitch_m\" or \"diagonal_m\"");
-    }
-    const Result<double> diagonal = object.number("diagonal_m", positive);
-    if (!diagonal) return diagonal.error();
-    return *diagonal / std::hypot(width_px, height_px);
+    if (object.has("diagonal_m"))
+        return object.number("diagonal_m", positive) / std::hypot(display.width_px, display.height_px);
+    object.fail("the size of the screen is missing: give key \"pixel_pitch_m\" or \"diagonal_m\"");
+    return 0;
 }
 
-Result<void> read_transfer(const JsonObject& object, Display& display) {
-    double gamma = 0;
-    if (const auto as_number = object.get("transfer", gamma, positive); as_number && gamma > 0) {
+void read_transfer(const JsonObject& object, Display& display) {
+    if (!object.has("transfer")) return;
+    const nlohmann::json& value = object["transfer"];
+    if (value.is_number() && value.get<double>() > 0) {
         display.transfer = TransferFunction::gamma;
-        display.gamma = gamma;
-        return {};
+        display.gamma = value.get<double>();
+        return;
     }
-    std::string text = "srgb";
-    if (const auto as_string = object.get("transfer", text); as_string && text == "srgb") {
-        display.transfer = TransferFunction::srgb;
-        return {};
-    }
-    for (const auto& [name, transfer] : {std::pair{"linear", TransferFunction::linear},
-                                         {"pq", TransferFunction::pq},
-                                         {"table", TransferFunction::table}}) {
-        if (text != name) continue;
+    for (const auto& [name, transfer] : transfers) {
+        if (value != name) continue;
         display.transfer = transfer;
-        return {};
+        return;
     }
-    return object.key_error("transfer",
-                            "must be \"srgb\", \"linear\", \"pq\", \"table\", or a gamma as a number above 0");
+    object.fail_at("transfer", "must be \"srgb\", \"linear\", \"pq\", \"table\", or a gamma as a number above 0");
 }
 
 // The keys that only some displays have.
-Result<void> read_table(const JsonObject& object, Display& display) {
-    const bool wanted = display.transfer == TransferFunction::table;
-    if (!wanted && object.has("transfer_table"))
-        return object.key_error("transfer_table", "needs \"transfer\": \"table\"");
-    if (!wanted) return {};
-    const auto array = object.array("transfer_table");
-    if (!array) return array.error();
-    return object.append_numbers(**array, "transfer_table", std::nullopt, display.table);
+void read_table(const JsonObject& object, Display& display) {
+    if (display.transfer == TransferFunction::table)
+        display.table = object.numbers(object.array("transfer_table"), "transfer_table");
+    else if (object.has("transfer_table")) object.fail_at("transfer_table", "needs \"transfer\": \"table\"");
 }
 
-Result<void> read_lens(const JsonObject& object, Display& display) {
-    if (auto ok = object.get("field_deg", display.field_deg, {.minimum = 0, .maximum = 359, .minimum_allowed = false});
-        !ok)
-        return ok;
-    if (!object.has("pixels_per_degree_at")) return {};
-    const auto rows = object.array("pixels_per_degree_at");
-    if (!rows) return rows.error();
-    for (const auto& row : **rows) {
-        std::vector<double> values;
-        const std::string where = "pixels_per_degree_at[" + std::to_string(display.lens.size()) + "]";
-        if (auto ok = object.append_numbers(row, where, 2, values); !ok) return ok;
-        display.lens.push_back({values[0], values[1]});
-    }
-    if (display.lens.empty()) return object.key_error("pixels_per_degree_at", "is empty");
-    return {};
+void read_lens(const JsonObject& object, Display& display) {
+    object.get("field_deg", display.field_deg, {.minimum = 0, .maximum = 359, .minimum_allowed = false});
+    if (!object.has("pixels_per_degree_at")) return;
+    for (const auto& row : object.rows("pixels_per_degree_at", 2)) display.lens.push_back({row[0], row[1]});
+    if (display.lens.empty()) object.fail_at("pixels_per_degree_at", "is empty");
 }
 
 } // namespace
 
 Result<Display> read_display(const std::filesystem::path& file) {
-    const auto object =
-        JsonObject::read(file, {"name", "width_px", "height_px", "pixel_pitch_m", "diagonal_m", "viewing_distance_m",
-                                "peak_cdm2", "black_cdm2", "transfer", "ambient_lux", "reflectivity", "source",
-                                "transfer_table", "pixels_per_degree_at", "field_deg"});
-    if (!object) return object.error();
-
+    const JsonObject object(file, {"name", "width_px", "height_px", "pixel_pitch_m", "diagonal_m", "viewing_distance_m",
+                                   "peak_cdm2", "black_cdm2", "transfer", "ambient_lux", "reflectivity", "source",
+                                   "transfer_table", "pixels_per_degree_at", "field_deg"});
     Display display;
     display.name = file.stem().string();
+    display.transfer = TransferFunction::srgb;
     std::string source;
-    if (auto ok = object->get("name", display.name); !ok) return ok.error();
-    if (auto ok = object->get("source", source); !ok) return ok.error();
-
-    const auto width = object->number("width_px", pixel_count), height = object->number("height_px", pixel_count);
-    if (!width) return width.error();
-    if (!height) return height.error();
-    display.width_px = static_cast<int>(*width);
-    display.height_px = static_cast<int>(*height);
-
-    const auto pitch = read_pixel_pitch(*object, display.width_px, display.height_px);
-    if (!pitch) return pitch.error();
-    const auto distance = object->number("viewing_distance_m", positive);
-    if (!distance) return distance.error();
-    const auto peak = object->number("peak_cdm2", positive), black = object->number("black_cdm2", positive);
-    if (!peak) return peak.error();
-    if (!black) return black.error();
-    if (!(*black < *peak)) {
-        return object->key_error("black_cdm2", "must be below peak_cdm2, but is " + to_text(*black));
-    }
-    display.pixel_pitch = perception::Metres(*pitch);
-    display.distance = perception::Metres(*distance);
-    display.peak = perception::Luminance(*peak);
-    display.black = perception::Luminance(*black);
-
-    if (auto ok = read_transfer(*object, display); !ok) return ok.error();
-    if (auto ok = read_table(*object, display); !ok) return ok.error();
-    if (auto ok = read_lens(*object, display); !ok) return ok.error();
+    object.get("name", display.name);
+    object.get("source", source);
+    display.width_px = static_cast<int>(object.number("width_px", pixel_count));
+    display.height_px = static_cast<int>(object.number("height_px", pixel_count));
+    display.pixel_pitch = perception::Metres(read_pixel_pitch(object, display));
+    display.distance = perception::Metres(object.number("viewing_distance_m", positive));
+    display.peak = perception::Luminance(object.number("peak_cdm2", positive));
+    display.black = perception::Luminance(object.number("black_cdm2", positive));
+    if (!(display.black < display.peak))
+        object.fail_at("black_cdm2", "must be below peak_cdm2, but is " + number_text(display.black.value()));
+    read_transfer(object, display);
+    read_table(object, display);
+    read_lens(object, display);
     double ambient = display.ambient.value();
-    if (auto ok = object->get("ambient_lux", ambient, not_negative); !ok) return ok.error();
-    if (auto ok = object->get("reflectivity", display.reflectivity, share); !ok) return ok.error();
+    object.get("ambient_lux", ambient, not_negative);
+    object.get("reflectivity", display.reflectivity, zero_to_one);
     display.ambient = perception::Lux(ambient);
-
-    if (auto ok = validate(display); !ok) return object->error(ok.error().message);
+    if (const auto valid = validate(display); !valid) object.fail(valid.error().message);
+    if (!object) return object.error();
     return display;
 }
 
 Result<void> write_display(const std::filesystem::path& file, const Display& display) {
     if (auto ok = validate(display); !ok) return ok;
-    std::string transfer = to_text(display.gamma);
-    if (display.transfer == TransferFunction::srgb) transfer = "\"srgb\"";
-    if (display.transfer == TransferFunction::linear) transfer = "\"linear\"";
-    if (display.transfer == TransferFunction::pq) transfer = "\"pq\"";
-    if (display.transfer == TransferFunction::table) transfer = "\"table\"";
+    std::string transfer = number_text(display.gamma);
+    for (const auto& [name, function] : transfers)
+        if (display.transfer == function) transfer = to_json(name);
 
-    std::string text = "{\n    \"name\": " + to_json(display.name);
-    const auto add = [&](const char* key, const std::string& value) {
-        text.append(",\n    \"").append(key).append("\": ").append(value);
-    };
-    add("width_px", std::to_string(display.width_px));
-    add("height_px", std::to_string(display.height_px));
-    add("pixel_pitch_m", to_text(display.pixel_pitch.value()));
-    add("viewing_distance_m", to_text(display.distance.value()));
-    add("peak_cdm2", to_text(display.peak.value()));
-    add("black_cdm2", to_text(display.black.value()));
-    add("transfer", transfer);
-    add("ambient_lux", to_text(display.ambient.value()));
-    add("reflectivity", to_text(display.reflectivity));
-    if (display.transfer == TransferFunction::table) {
-        std::string values;
-        for (const double value : display.table) values.append(values.empty() ? "[" : ", ").append(to_text(value));
-        add("transfer_table", values + "]");
-    }
+    JsonWriter json("    ");
+    json.add_text("name", display.name);
+    json.add("width_px", display.width_px);
+    json.add("height_px", display.height_px);
+    json.add("pixel_pitch_m", display.pixel_pitch.value());
+    json.add("viewing_distance_m", display.distance.value());
+    json.add("peak_cdm2", display.peak.value());
+    json.add("black_cdm2", display.black.value());
+    json.add("transfer", transfer);
+    json.add("ambient_lux", display.ambient.value());
+    json.add("reflectivity", display.reflectivity);
+    if (display.transfer == TransferFunction::table) json.add("transfer_table", to_json(display.table));
     if (!display.lens.empty()) {
         std::string rows;
         for (const perception::PixelsPerDegreeAt& at : display.lens)
-            rows.append(rows.empty() ? "[[" : ", [")
-                .append(to_text(at.angle_deg))
-                .append(", ")
-                .append(to_text(at.pixels_per_degree))
-                .append("]");
-        add("pixels_per_degree_at", rows + "]");
+            rows += (rows.empty() ? "[" : ", ") + to_json(std::array{at.angle_deg, at.pixels_per_degree});
+        json.add("pixels_per_degree_at", rows + "]");
     }
-    if (display.field_deg > 0) add("field_deg", to_text(display.field_deg));
-    return write_text(file, text.append("\n}\n"));
+    if (display.field_deg > 0) json.add("field_deg", display.field_deg);
+    return json.write(file);
 }
 
 } // namespace unseen::calibration

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numbers>
 
@@ -18,12 +17,10 @@ namespace {
 using Kind = vdtree::LightSource::Kind;
 using nlohmann::json;
 
-constexpr double unbounded = std::numeric_limits<double>::max();
 // Beyond, single floats overflow where distances are squared; nothing is so bright or so far away.
 constexpr double brightest = 1e6, farthest = 1e12; // times white; world units
 constexpr Range distance_range{.minimum = 0, .maximum = farthest, .minimum_allowed = false};
 constexpr Range intensity_range{.minimum = 0, .maximum = brightest};
-constexpr Range share{.minimum = 0, .maximum = 1};
 constexpr Range any_number{.minimum = -unbounded, .maximum = unbounded};
 constexpr Range half_angle{.minimum = 0, .maximum = 180};
 constexpr double fastest_deg_per_s = 360000; // a thousand turns a second
@@ -37,31 +34,31 @@ std::string too_many_cast(std::size_t casting) {
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
-Result<glm::dvec3> vector(const JsonObject& object, std::string_view key) {
-    if (!object.has(key)) return object.key_error(key, "is missing: it must be an array of three numbers");
-    std::vector<double> v;
-    if (auto ok = object.append_numbers(object[key], std::string(key), 3, v); !ok) return ok.error();
-    for (const double x : v)
-        if (!std::isfinite(x)) return object.key_error(key, "must have finite numbers");
-    return glm::dvec3(v[0], v[1], v[2]);
+glm::dvec3 vector(const JsonObject& object, std::string_view key) {
+    if (!object.has(key)) {
+        object.fail_at(key, "is missing: it must be an array of three numbers");
+        return glm::dvec3(0);
+    }
+    const std::vector<double> v = object.numbers(object[key], std::string(key), 3);
+    if (!std::ranges::all_of(v, [](double x) { return std::isfinite(x); }))
+        object.fail_at(key, "must have finite numbers");
+    return {v[0], v[1], v[2]};
 }
 
-Result<glm::dvec3> location(const JsonObject& object, std::string_view key) {
-    const auto v = vector(object, key);
-    if (!v) return v;
+glm::dvec3 location(const JsonObject& object, std::string_view key) {
+    const glm::dvec3 v = vector(object, key);
     for (int k = 0; k < 3; ++k)
-        if (std::abs((*v)[k]) > farthest)
-            return object.key_error(key, "must lie within 1e12 world units of the origin, but has " + to_text((*v)[k]));
+        if (std::abs(v[k]) > farthest)
+            object.fail_at(key, "must lie within 1e12 world units of the origin, but has " + number_text(v[k]));
     return v;
 }
 
 // Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
-Result<glm::dvec3> direction(const JsonObject& object, std::string_view key) {
-    const auto v = vector(object, key);
-    if (!v) return v;
-    const double largest = std::max({std::abs(v->x), std::abs(v->y), std::abs(v->z)});
-    if (!(largest > 0)) return object.key_error(key, "must not be 0, 0, 0: that is no direction");
-    return glm::normalize(*v / largest);
+glm::dvec3 direction(const JsonObject& object, std::string_view key) {
+    const glm::dvec3 v = vector(object, key);
+    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    if (!(largest > 0)) object.fail_at(key, "must not be 0, 0, 0: that is no direction");
+    return glm::normalize(v / largest);
 }
 
 double angle_between(glm::dvec3 a, glm::dvec3 b) { return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)); }
@@ -80,53 +77,41 @@ struct LightRig::Reader {
 
     Result<void> read(const std::filesystem::path& file) {
         rig.file_ = file;
-        const auto object = JsonObject::read(file, {"ambient", "material", "lights"});
-        if (!object) return object.error();
-        if (auto ok = object->get("ambient", rig.ambient_, share); !ok) return ok;
-        if (object->has("material"))
-            if (auto ok = read_material(*object); !ok) return ok;
-        const auto lights = object->array("lights");
-        if (!lights) return lights.error();
-        if ((*lights)->size() > vdtree::most_lights)
-            return object->key_error("lights", "has " + std::to_string((*lights)->size()) + " lights, but at most " +
-                                                   std::to_string(vdtree::most_lights) + " can be drawn");
-        bool any = rig.ambient_ > 0;
-        std::size_t casting = 0;
-        for (const json& value : **lights) {
-            if (auto ok = read_light(*object, value); !ok) return ok;
-            const Light& light = rig.lights_.back(); // keyframes take the intensity's place
-            casting += light.at_rest.casts_shadow;
-            any = any || (light.keys.empty() ? light.at_rest.intensity > 0
-                                             : std::any_of(light.keys.begin(), light.keys.end(),
-                                                           [](const Key& key) { return key.intensity > 0; }));
+        const JsonObject object(file, {"ambient", "material", "lights"});
+        object.get("ambient", rig.ambient_, zero_to_one);
+        if (object.has("material")) read_material(object);
+        const json& lights = object.array("lights");
+        if (lights.size() > vdtree::most_lights)
+            object.fail_at("lights", "has " + std::to_string(lights.size()) + " lights, but at most " +
+                                         std::to_string(vdtree::most_lights) + " can be drawn");
+        for (const json& value : lights) {
+            read_light(object, value);
+            if (!object) return object.error();
         }
-        if (casting > vdtree::most_shadow_lights) return object->key_error("lights", "has " + too_many_cast(casting));
-        if (!any)
-            return object->error(
+        const std::size_t casting = rig.casting().size();
+        if (casting > vdtree::most_shadow_lights) object.fail_at("lights", "has " + too_many_cast(casting));
+        const bool is_lit = std::ranges::any_of(rig.lights_, [](const Light& light) {
+            if (light.keys.empty()) return light.at_rest.intensity > 0;
+            return std::ranges::any_of(light.keys, [](const Key& key) { return key.intensity > 0; });
+        });
+        if (!is_lit && !(rig.ambient_ > 0))
+            object.fail(
                 "the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");
-        return {};
+        return object ? Result<void>() : object.error();
     }
 
 private:
-    Result<void> read_material(const JsonObject& file) {
-        const auto material = file.child(file["material"], "material", {"specular", "shininess"});
-        if (!material) return material.error();
-        const auto specular = material->number("specular", share);
-        if (!specular) return specular.error();
-        const auto shininess = material->number("shininess", {.minimum = 1, .maximum = vdtree::most_shininess});
-        if (!shininess) return shininess.error();
-        rig.specular_ = *specular;
-        rig.shininess_ = *shininess;
-        return {};
+    void read_material(const JsonObject& file) {
+        const JsonObject material = file.child(file["material"], "material", {"specular", "shininess"});
+        rig.specular_ = material.number("specular", zero_to_one);
+        rig.shininess_ = material.number("shininess", {.minimum = 1, .maximum = vdtree::most_shininess});
     }
 
     // The keys that each type has, all of them wanted, but for the motions.
-    Result<JsonObject> object_of(const JsonObject& file, const json& value, const std::string& place,
-                                 std::string& type) {
+    JsonObject object_of(const JsonObject& file, const json& value, const std::string& place, std::string& type) {
         if (!value.is_object() || !value.contains("type") || !value["type"].is_string())
-            return file.key_error(place,
-                                  "must be an object with a key \"type\": directional, point, spot or headlight");
-        type = value["type"].get<std::string>();
+            file.fail_at(place, "must be an object with a key \"type\": directional, point, spot or headlight");
+        else type = value["type"].get<std::string>();
         if (type == "directional")
             return file.child(value, place, {"type", "direction", "intensity", "shadow", "orbit", "keyframes"});
         if (type == "point")
@@ -136,131 +121,86 @@ private:
             return file.child(value, place,
                               {"type", "position", "direction", "intensity", "distance", "inner_degrees",
                                "outer_degrees", "shadow", "orbit", "keyframes"});
-        if (type == "headlight") return file.child(value, place, {"type", "intensity"});
-        return file.key_error(place + ".type",
-                              "must be directional, point, spot or headlight, but is " + to_json(type));
+        if (type != "headlight")
+            file.fail_at(place + ".type", "must be directional, point, spot or headlight, but is " + to_json(type));
+        return file.child(value, place, {"type", "intensity"});
     }
 
-    Result<void> read_light(const JsonObject& file, const json& value) {
+    void read_light(const JsonObject& file, const json& value) {
         std::string type;
-        const auto object = object_of(file, value, "lights[" + std::to_string(rig.lights_.size()) + "]", type);
-        if (!object) return object.error();
-        Light light;
+        const JsonObject object = object_of(file, value, in_brackets("lights", rig.lights_.size()), type);
+        Light& light = rig.lights_.emplace_back();
         vdtree::LightSource& source = light.at_rest;
         light.is_headlight = type == "headlight";
         source.kind = type == "point" ? Kind::point : type == "spot" ? Kind::spot : Kind::directional;
-        const auto intensity = object->number("intensity", intensity_range);
-        if (!intensity) return intensity.error();
-        source.intensity = *intensity;
-        if (type == "directional" || type == "spot") {
-            const auto v = direction(*object, "direction");
-            if (!v) return v.error();
-            source.direction = *v;
-        }
+        source.intensity = object.number("intensity", intensity_range);
+        if (type == "directional" || type == "spot") source.direction = direction(object, "direction");
         if (source.kind != Kind::directional) {
-            const auto v = location(*object, "position");
-            if (!v) return v.error();
-            source.position = *v;
-            const auto distance = object->number("distance", distance_range);
-            if (!distance) return distance.error();
-            source.distance = *distance;
+            source.position = location(object, "position");
+            source.distance = object.number("distance", distance_range);
         }
-        if (source.kind == Kind::spot)
-            if (auto ok = read_angles(*object, source); !ok) return ok;
-        if (auto ok = object->get("shadow", source.casts_shadow); !ok) return ok;
-        if (auto ok = read_motion(*object, light); !ok) return ok;
+        if (source.kind == Kind::spot) read_angles(object, source);
+        object.get("shadow", source.casts_shadow);
+        if (object.has("orbit") && object.has("keyframes"))
+            object.fail_at("orbit", "and \"keyframes\" exclude each other: remove one");
+        if (object.has("orbit")) read_orbit(object, light);
+        if (object.has("keyframes")) read_keys(object, light);
         rig.moves_ = rig.moves_ || light.degrees_per_second != 0 || light.keys.size() > 1;
         rig.follows_camera_ = rig.follows_camera_ || light.is_headlight;
-        rig.lights_.push_back(std::move(light));
-        return {};
     }
 
-    Result<void> read_angles(const JsonObject& object, vdtree::LightSource& source) {
-        const auto inner = object.number("inner_degrees", half_angle),
-                   outer = object.number("outer_degrees", half_angle);
-        if (!inner) return inner.error();
-        if (!outer) return outer.error();
-        source.inner_cosine = std::cos(radians(*inner));
-        source.outer_cosine = std::cos(radians(*outer));
+    void read_angles(const JsonObject& object, vdtree::LightSource& source) {
+        const double inner = object.number("inner_degrees", half_angle),
+                     outer = object.number("outer_degrees", half_angle);
+        source.inner_cosine = std::cos(radians(inner));
+        source.outer_cosine = std::cos(radians(outer));
         constexpr double least_edge_deg = 0.5;
-        if (!(*outer - *inner >= least_edge_deg))
-            return object.key_error("inner_degrees", "must be half a degree less than outer_degrees, at least");
-        return {};
+        if (!(outer - inner >= least_edge_deg))
+            object.fail_at("inner_degrees", "must be half a degree less than outer_degrees, at least");
     }
 
-    Result<void> read_motion(const JsonObject& object, Light& light) {
-        if (object.has("orbit") && object.has("keyframes"))
-            return object.key_error("orbit", "and \"keyframes\" exclude each other: remove one");
-        if (object.has("orbit")) return read_orbit(object, light);
-        if (object.has("keyframes")) return read_keys(object, light);
-        return {};
-    }
-
-    Result<void> read_orbit(const JsonObject& object, Light& light) {
+    void read_orbit(const JsonObject& object, Light& light) {
         const bool has_position = light.at_rest.kind != Kind::directional;
-        const auto orbit = has_position
-                               ? object.child(object["orbit"], "orbit", {"axis", "degrees_per_second", "centre"})
-                               : object.child(object["orbit"], "orbit", {"axis", "degrees_per_second"});
-        if (!orbit) return orbit.error();
-        const auto axis = direction(*orbit, "axis");
-        if (!axis) return axis.error();
-        const auto speed =
-            orbit->number("degrees_per_second", {.minimum = -fastest_deg_per_s, .maximum = fastest_deg_per_s});
-        if (!speed) return speed.error();
-        light.axis = *axis;
-        light.degrees_per_second = *speed;
-        light.has_centre = orbit->has("centre");
-        if (!light.has_centre) return {};
-        const auto centre = location(*orbit, "centre");
-        if (!centre) return centre.error();
-        light.centre = *centre;
-        return {};
+        const JsonObject orbit = has_position
+                                     ? object.child(object["orbit"], "orbit", {"axis", "degrees_per_second", "centre"})
+                                     : object.child(object["orbit"], "orbit", {"axis", "degrees_per_second"});
+        light.axis = direction(orbit, "axis");
+        light.degrees_per_second =
+            orbit.number("degrees_per_second", {.minimum = -fastest_deg_per_s, .maximum = fastest_deg_per_s});
+        light.has_centre = orbit.has("centre");
+        if (light.has_centre) light.centre = location(orbit, "centre");
     }
 
-    Result<void> read_keys(const JsonObject& object, Light& light) {
-        const auto keys = object.array("keyframes");
-        if (!keys) return keys.error();
-        if ((*keys)->empty()) return object.key_error("keyframes", "is empty");
-        const bool has_position = light.at_rest.kind != Kind::directional,
-                   has_direction = light.at_rest.kind != Kind::point;
-        const json* first = nullptr;
-        for (const json& value : **keys) {
-            const std::string place = "keyframes[" + std::to_string(light.keys.size()) + "]";
-            const auto frame = object.child(value, place, {"time_s", "position", "direction", "intensity"});
-            if (!frame) return frame.error();
-            if (!first) first = &value;
+    void read_keys(const JsonObject& object, Light& light) {
+        const json& keys = object.array("keyframes");
+        if (keys.empty()) object.fail_at("keyframes", "is empty");
+        for (const json& value : keys) {
+            const JsonObject frame = object.child(value, in_brackets("keyframes", light.keys.size()),
+                                                  {"time_s", "position", "direction", "intensity"});
+            if (!frame) return;
             for (const char* key : {"position", "direction", "intensity"})
-                if (frame->has(key) != first->contains(key))
-                    return frame->key_error(key, "must be in all keyframes of the light, or in none");
-            if (frame->has("position") && !has_position)
-                return frame->key_error("position", "is nothing that a directional light has");
-            if (frame->has("direction") && !has_direction)
-                return frame->key_error("direction", "is nothing that a point light has");
+                if (value.contains(key) != keys[0].contains(key))
+                    frame.fail_at(key, "must be in all keyframes of the light, or in none");
+            if (frame.has("position") && light.at_rest.kind == Kind::directional)
+                frame.fail_at("position", "is nothing that a directional light has");
+            if (frame.has("direction") && light.at_rest.kind == Kind::point)
+                frame.fail_at("direction", "is nothing that a point light has");
             Key key{0, light.at_rest.position, light.at_rest.direction, light.at_rest.intensity};
-            const auto seconds = frame->number("time_s", any_number);
-            if (!seconds) return seconds.error();
-            key.seconds = *seconds;
+            key.seconds = frame.number("time_s", any_number);
             if (!light.keys.empty() && !(key.seconds > light.keys.back().seconds))
-                return frame->key_error("time_s", "must be later than that of the keyframe before");
-            if (auto ok = frame->get("intensity", key.intensity, intensity_range); !ok) return ok;
-            if (frame->has("position")) {
-                const auto v = location(*frame, "position");
-                if (!v) return v.error();
-                key.position = *v;
-            }
-            if (frame->has("direction")) {
-                const auto v = direction(*frame, "direction");
-                if (!v) return v.error();
-                key.direction = *v;
+                frame.fail_at("time_s", "must be later than that of the keyframe before");
+            frame.get("intensity", key.intensity, intensity_range);
+            if (frame.has("position")) key.position = location(frame, "position");
+            if (frame.has("direction")) {
+                key.direction = direction(frame, "direction");
                 if (!light.keys.empty() &&
                     angle_between(light.keys.back().direction, key.direction) > std::numbers::pi - opposite)
-                    return frame->key_error(
+                    frame.fail_at(
                         "direction",
                         "is opposite to the one before: put a keyframe between them that says which way round");
             }
             light.keys.push_back(key);
         }
-        return {};
     }
 };
 
@@ -347,8 +287,8 @@ std::string LightRig::description() const {
     }
     std::string text;
     for (const auto& [name, count] : counts) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + name;
-    if (ambient_ > 0) text += (text.empty() ? "ambient " : ", ambient ") + to_text(ambient_);
-    if (specular_ > 0) text += ", highlights of " + to_text(specular_);
+    if (ambient_ > 0) text += (text.empty() ? "ambient " : ", ambient ") + number_text(ambient_);
+    if (specular_ > 0) text += ", highlights of " + number_text(specular_);
     return text;
 }
 

@@ -19,17 +19,25 @@ enum Column { dataset, frequency, temporal, eccentricity, luminance, area, sensi
 constexpr std::array<std::string_view, column_count> column_names = {
     "dataset", "frequency_cpd", "temporal_hz", "eccentricity_deg", "luminance_cdm2", "area_deg2", "sensitivity"};
 
-// Decibels and the weight of each sensitivity.
+// The weight of each sensitivity: all studies count alike.
+std::vector<double> weights_of(std::span<const MeasuredSensitivity> people) {
+    std::map<std::string_view, int> counts;
+    for (const MeasuredSensitivity& m : people) ++counts[m.study];
+    std::vector<double> weights;
+    for (const MeasuredSensitivity& m : people)
+        weights.push_back(1.0 / counts[m.study] / static_cast<double>(counts.size()));
+    return weights;
+}
+
+// Descending decibels over the model, with their weights.
 struct Weighted {
     double decibels, weight;
 };
 std::vector<Weighted> compared(std::span<const MeasuredSensitivity> people, const Model& model) {
-    std::map<std::string_view, int> counts;
-    for (const MeasuredSensitivity& m : people) ++counts[m.study];
+    const std::vector<double> weights = weights_of(people);
     std::vector<Weighted> all;
-    for (const MeasuredSensitivity& m : people)
-        all.push_back({20 * std::log10(m.sensitivity / model(m.stimulus)),
-                       1.0 / counts[m.study] / static_cast<double>(counts.size())});
+    for (std::size_t i = 0; i < people.size(); ++i)
+        all.push_back({20 * std::log10(people[i].sensitivity / model(people[i].stimulus)), weights[i]});
     std::sort(all.begin(), all.end(), [](const Weighted& a, const Weighted& b) { return a.decibels > b.decibels; });
     return all;
 }
@@ -140,17 +148,16 @@ struct AtFovea {
 };
 
 std::vector<AtFovea> at_fovea(std::span<const MeasuredSensitivity> people) {
-    std::map<std::string, int> counts;
-    for (const MeasuredSensitivity& m : people) ++counts[m.study];
+    constexpr auto castle = perception::CsfModel::castle;
+    const std::vector<double> weights = weights_of(people);
     std::vector<AtFovea> all;
-    for (const MeasuredSensitivity& m : people) {
-        Stimulus still = m.stimulus, foveal = still;
-        still.temporal = foveal.temporal = perception::Hertz(0);
+    for (std::size_t i = 0; i < people.size(); ++i) {
+        Stimulus still = people[i].stimulus;
+        still.temporal = perception::Hertz(0);
+        Stimulus foveal = still;
         foveal.eccentricity = perception::Degrees(0);
-        const auto castle = perception::CsfModel::castle;
         const double fall = perception::sensitivity(castle, still) / perception::sensitivity(castle, foveal);
-        all.push_back({foveal, 20 * std::log10(m.sensitivity / fall),
-                       1.0 / counts[m.study] / static_cast<double>(counts.size())});
+        all.push_back({foveal, 20 * std::log10(people[i].sensitivity / fall), weights[i]});
     }
     return all;
 }

@@ -30,7 +30,6 @@ constexpr double still = 5e-4; // log10 units, a fiftieth of a grid step
 // What observers' psychometric functions are taken to be one of; 3.5 and a lapse rate of 0.01 are QUEST's own. A choice
 // of lapse rates was tried: it costs more certainty than it gains with careless observers.
 constexpr double possible_slopes[] = {1.8, 2.5, 3.5, 5};
-constexpr double usual_lapse = 0.01;
 
 // Settings scatter at least so much (log10 units): a few that happen to agree do not make a place certain.
 constexpr double least_scatter = 0.04;
@@ -60,11 +59,11 @@ Result<void> check(const Summation& measured, const CalibrationPlan& plan) {
     const perception::SquareDegrees unlimited(std::numeric_limits<double>::infinity());
     const double worse_below = 1 / perception::summation_gain(CyclesPerDegree(lowest_cpd), unlimited);
     if (measured.high >= worse_below) return {};
-    const auto text = [](double value) { return to_text(std::round(100 * value) / 100); };
+    const auto text = [](double value) { return number_text(std::round(100 * value) / 100); };
     return invalid_argument("Wide patches were seen worse than small ones of the same bars: " + text(measured.own) +
                             " times as well as by the law of area (95%: " + text(measured.low) + " to " +
                             text(measured.high) + "), where below " + text(worse_below) + " is worse at " +
-                            to_text(lowest_cpd) +
+                            number_text(lowest_cpd) +
                             " cpd. No eye does so: some of the patch was hidden, or the answers were careless. Measure "
                             "again, or without wide patches.");
 }
@@ -86,17 +85,15 @@ const std::vector<Answer>& Procedure::answers() const noexcept { return state_->
 Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     if (auto valid = validate(plan); !valid) return valid.error();
     QuestGrid grid = standard_grid();
-    if (plan.method == Method::two_interval) {
-        grid.slope.assign(std::begin(possible_slopes), std::end(possible_slopes));
-        grid.lapse = {usual_lapse};
-    }
+    if (plan.method == Method::two_interval) grid.slope.assign(std::begin(possible_slopes), std::end(possible_slopes));
     double highest_threshold = 0;
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
         const double threshold = -log10_expected(expected, plan.places[i], plan.luminance);
         if (!(threshold >= lowest_log10_contrast))
             return invalid_argument(in_brackets("places", i) + ": a sensitivity of " +
-                                    to_text(std::pow(10, -threshold)) + " is expected, but none above " +
-                                    to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured.");
+                                    number_text(std::pow(10, -threshold)) + " is expected, but none above " +
+                                    number_text(std::round(std::pow(10, -lowest_log10_contrast))) +
+                                    " can be measured.");
         highest_threshold = std::max(highest_threshold, std::min(threshold, farthest_log10_threshold));
     }
     std::vector<double>& thresholds = grid.log10_threshold;
@@ -106,12 +103,10 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     const double highest = std::log10(plan.highest_contrast);
     std::erase_if(grid.log10_contrast, [&](double c) { return c > highest; });
     if (grid.log10_contrast.empty())
-        return invalid_argument("The display's highest contrast, " + to_text(plan.highest_contrast) +
+        return invalid_argument("The display's highest contrast, " + number_text(plan.highest_contrast) +
                                 ", shows nothing that could be measured.");
     if (grid.log10_contrast.back() < highest) grid.log10_contrast.push_back(highest);
-    auto blank = QuestPlus::create(grid);
-    if (!blank) return blank.error();
-    return Procedure(std::make_unique<State>(std::move(plan), std::move(expected), std::move(*blank)));
+    return Procedure(std::make_unique<State>(std::move(plan), std::move(expected), QuestPlus(grid)));
 }
 
 int Procedure::trials() const noexcept {
@@ -157,7 +152,7 @@ Trial Procedure::next() const {
 Procedure::State::Prospect Procedure::State::look_ahead() const {
     Prospect prospect;
     for (std::size_t i = 0; i < quests.size(); ++i) {
-        const SensitivityField::Belief belief = field.belief(i);
+        const Belief belief = field.belief(i);
         const double above = (belief.mean + std::log10(plan.highest_contrast)) / belief.deviation;
         prospect.visible.push_back(std::erfc(-above / std::numbers::sqrt2) / 2);
         const double mean = quests[i].log10_threshold().mean;
@@ -237,7 +232,7 @@ void Procedure::State::combine() {
     for (const QuestPlus& quest : quests) evidence.push_back(quest.log_evidence());
     std::vector<double> functions(evidence.front().size());
     const auto believe_others = [&](std::size_t i) {
-        const SensitivityField::Belief others = field.without_own(i);
+        const Belief others = field.without_own(i);
         for (std::size_t t = 0; t < thresholds.size(); ++t) {
             const double z = (-thresholds[t] - others.mean) / others.deviation;
             prior[t] = -z * z / 2;
@@ -254,7 +249,7 @@ void Procedure::State::combine() {
             if (asked[i] == 0) continue;
             const double before = field.belief(i).mean;
             believe_others(i);
-            const QuestPlus::Belief belief = quests[i].log10_threshold();
+            const Belief belief = quests[i].log10_threshold();
             field.set_own(i, {-belief.mean, std::max(belief.deviation, least_deviation)});
             change = std::max(change, std::abs(field.belief(i).mean - before));
         }

@@ -16,11 +16,6 @@ inline constexpr double widest_eccentricity_deg = 90;
 inline constexpr double brightest_cdm2 = 1e6;
 inline constexpr std::uint64_t exact_integers = std::uint64_t{1} << 53; // what JSON keeps
 
-// "name[i]".
-inline std::string in_brackets(const char* name, std::size_t i) {
-    return std::string(name).append("[").append(std::to_string(i)).append("]");
-}
-
 // The log10 sensitivity that a table predicts for a patch.
 double log10_expected(const perception::CsfTable& table, const GratingPlace& place, perception::Luminance luminance);
 

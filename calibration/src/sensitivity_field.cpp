@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "procedure_state.h"
+
 namespace unseen::calibration {
 namespace {
 
@@ -100,7 +102,7 @@ SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perc
     : table_(std::move(expected)), luminance_(luminance), precision_(places.size(), 0.0), shift_(places.size(), 0.0) {
     for (const GratingPlace& place : places) {
         sites_.push_back(site(place));
-        expected_.push_back(log10_expected(place));
+        expected_.push_back(log10_expected(table_, place, luminance_));
     }
     const std::size_t n = places.size();
     prior_.resize(n * n);
@@ -110,26 +112,21 @@ SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perc
     update();
 }
 
-double SensitivityField::log10_expected(const GratingPlace& at) const {
-    return std::log10(table_.sensitivity(perception::CyclesPerDegree(at.frequency_cpd),
-                                         perception::Degrees(at.eccentricity_deg), luminance_) *
-                      summation_gain(at));
-}
-
 Site SensitivityField::site(const GratingPlace& at) const {
     // What a place has lost does not depend on the patch there.
-    const double here = log10_expected({at.frequency_cpd, at.eccentricity_deg});
+    const double here = log10_expected(table_, {at.frequency_cpd, at.eccentricity_deg}, luminance_),
+                 best = log10_expected(table_, {middle_cpd, 0}, luminance_);
     const double share = at.is_wide() ? perception::summation_share(perception::CyclesPerDegree(at.frequency_cpd),
                                                                     perception::SquareDegrees(at.area_deg2))
                                       : 0;
-    return {at, std::clamp(log10_expected({middle_cpd, 0}) - here, 0.0, most_loss), share};
+    return {at, std::clamp(best - here, 0.0, most_loss), share};
 }
 
-SensitivityField::Belief SensitivityField::belief(std::size_t i) const {
+Belief SensitivityField::belief(std::size_t i) const {
     return {expected_[i] + mean_[i], std::sqrt(covariance_[i * size() + i])};
 }
 
-SensitivityField::Belief SensitivityField::without_own(std::size_t i) const {
+Belief SensitivityField::without_own(std::size_t i) const {
     const double variance = covariance_[i * size() + i];
     // At least the posterior's own precision is left: a factor's can exceed it by rounding only.
     const double rest = std::max(1 / variance - precision_[i], 1e-9 / variance);
@@ -151,14 +148,11 @@ void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
     const double own = std::max(precision - rest_precision, 1e-6 * rest_precision);
     const double shift =
         (with_own.mean - expected_[i]) * (own + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
-    change_factor(i, own - precision_[i], shift - shift_[i]);
-}
-
-// One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed
-// anew.
-void SensitivityField::change_factor(std::size_t i, double more_precision, double more_shift) {
+    const double more_precision = own - precision_[i], more_shift = shift - shift_[i];
     precision_[i] += more_precision;
     shift_[i] += more_shift;
+    // One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed
+    // anew.
     constexpr int most_changes = 200;
     if (++changes_ > most_changes) return update();
     const std::size_t n = size();
@@ -194,24 +188,19 @@ void SensitivityField::update() {
         for (std::size_t j = 0; j < n; ++j) mean_[i] += covariance_[i * n + j] * shift_[j];
 }
 
-namespace {
-
-// The posterior of a quantity whose covariances with the places' deviations are `with_places`.
-SensitivityField::Belief predict(const std::vector<double>& prior, const std::vector<double>& precision,
-                                 const std::vector<double>& shift, const std::vector<double>& with_places,
-                                 double variance) {
-    const std::size_t n = precision.size();
-    const std::vector<double> factor = weighted_factor(prior, precision);
+Belief SensitivityField::predict(double variance, const FunctionRef<double(const Site&)>& covariance_with) const {
+    const std::size_t n = size();
+    const std::vector<double> factor = weighted_factor(prior_, precision_);
     // w = R (I + R K R)^-1 R applied to the factors' means, where they have any precision.
     std::vector<double> pull(n), reach(n);
     for (std::size_t i = 0; i < n; ++i) {
-        const double root = std::sqrt(precision[i]);
-        pull[i] = root > 0 ? shift[i] / root : 0;
-        reach[i] = root * with_places[i];
+        const double root = std::sqrt(precision_[i]);
+        pull[i] = root > 0 ? shift_[i] / root : 0;
+        reach[i] = root * covariance_with(sites_[i]);
     }
     solve_lower(factor, n, pull);
     solve_lower(factor, n, reach);
-    SensitivityField::Belief belief;
+    Belief belief;
     for (std::size_t i = 0; i < n; ++i) {
         belief.mean += reach[i] * pull[i];
         variance -= reach[i] * reach[i];
@@ -220,25 +209,18 @@ SensitivityField::Belief predict(const std::vector<double>& prior, const std::ve
     return belief;
 }
 
-} // namespace
-
-SensitivityField::Belief SensitivityField::deviation(const GratingPlace& at) const {
-    std::vector<double> with_places;
+Belief SensitivityField::deviation(const GratingPlace& at) const {
     const Site here = site(at);
-    for (const Site& s : sites_) with_places.push_back(covariance(here, s));
-    return predict(prior_, precision_, shift_, with_places, covariance(here, here));
+    return predict(covariance(here, here), [&](const Site& s) { return covariance(here, s); });
 }
 
-SensitivityField::Belief SensitivityField::log10_summation() const {
-    std::vector<double> with_places;
-    for (const Site& s : sites_) with_places.push_back(summation * summation * s.share);
-    return predict(prior_, precision_, shift_, with_places, summation * summation);
+Belief SensitivityField::log10_summation() const {
+    return predict(summation * summation, [](const Site& s) { return summation * summation * s.share; });
 }
 
-SensitivityField::Belief SensitivityField::local_deviation(std::size_t i) const {
-    std::vector<double> with_places;
-    for (const Site& s : sites_) with_places.push_back(local_covariance(sites_[i], s));
-    return predict(prior_, precision_, shift_, with_places, local_covariance(sites_[i], sites_[i]));
+Belief SensitivityField::local_deviation(std::size_t i) const {
+    const Site& here = sites_[i];
+    return predict(local_covariance(here, here), [&](const Site& s) { return local_covariance(here, s); });
 }
 
 } // namespace unseen::calibration

@@ -25,39 +25,37 @@ constexpr double largest_seed = 9007199254740992.0; // 2^53, to which JSON count
 constexpr std::string_view study_format = "unseen study";
 constexpr int version = 1;
 
-std::optional<StudyTask> task_named(std::string_view text) {
-    for (const StudyTask task : {StudyTask::which, StudyTask::differ})
-        if (name(task) == text) return task;
-    return std::nullopt;
-}
+constexpr std::array<std::string_view, 2> task_names = {"which", "differ"};
+constexpr std::array<std::string_view, 4> choice_names = {"left", "right", "same", "different"};
+constexpr std::array<std::string_view, 3> step_names = {"decrease", "maintain", "increase"};
 
-std::optional<StudyChoice> choice_named(std::string_view text) {
-    for (const StudyChoice choice : {StudyChoice::left, StudyChoice::right, StudyChoice::same, StudyChoice::different})
-        if (name(choice) == text) return choice;
-    return std::nullopt;
+template <class Enum, std::size_t size>
+std::optional<Enum> named(const std::array<std::string_view, size>& names, std::string_view text) {
+    const auto found = std::ranges::find(names, text);
+    if (found == names.end()) return std::nullopt;
+    return static_cast<Enum>(found - names.begin());
 }
 
 bool belongs_to(StudyChoice choice, StudyTask task) {
     return (choice == StudyChoice::left || choice == StudyChoice::right) == (task == StudyTask::which);
 }
 
-bool is_of_one_picture(const StudyPair& pair) { return pair.original == pair.other; }
-
-// FNV-1a, the same on every machine.
-std::uint64_t hash_of(std::string_view text) {
-    std::uint64_t hash = 0xcbf29ce484222325u;
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-    return hash;
+// Whether a choice names the other picture, or says that the pictures differ; and whether that is right.
+bool says_seen(StudyChoice choice, bool is_other_left) {
+    if (choice == StudyChoice::same || choice == StudyChoice::different) return choice == StudyChoice::different;
+    return (choice == StudyChoice::left) == is_other_left;
 }
+bool is_right(StudyTask task, bool is_seen, bool is_of_one_picture) {
+    return task == StudyTask::which ? is_seen : is_seen != is_of_one_picture;
+}
+
+bool is_of_one_picture(const StudyPair& pair) { return pair.original == pair.other; }
 
 } // namespace
 
-std::string_view name(StudyTask task) { return task == StudyTask::which ? "which" : "differ"; }
-
-std::string_view name(StudyChoice choice) {
-    constexpr std::array<std::string_view, 4> names = {"left", "right", "same", "different"};
-    return names[static_cast<std::size_t>(choice)];
-}
+std::string_view name(StudyTask task) { return task_names[static_cast<std::size_t>(task)]; }
+std::string_view name(StudyChoice choice) { return choice_names[static_cast<std::size_t>(choice)]; }
+std::string_view name(LevelStep step) { return step_names[static_cast<std::size_t>(step)]; }
 
 Result<void> validate(const Study& study) {
     if (study.repeats < 1 || study.repeats > 1000) return invalid_argument("study: repeats must be from 1 to 1000.");
@@ -86,78 +84,69 @@ Result<void> validate(const Study& study) {
 
 Result<void> write_study(const fs::path& file, const Study& study) {
     if (const auto valid = validate(study); !valid) return valid;
-    const fs::path folder = file.parent_path();
-    std::string text = "{\n\"format\": " + to_json(study_format) + ",\n\"version\": " + std::to_string(version) +
-                       ",\n\"task\": " + to_json(name(study.task)) +
-                       ",\n\"repeats\": " + std::to_string(study.repeats) +
-                       ",\n\"seed\": " + std::to_string(study.seed) +
-                       ",\n\"pixels_per_degree\": " + to_text(study.pixels_per_degree) + ",\n\"pairs\": [";
-    for (std::size_t i = 0; i < study.pairs.size(); ++i) {
-        const StudyPair& pair = study.pairs[i];
+    JsonWriter json;
+    json.add_text("format", study_format);
+    json.add("version", version);
+    json.add_text("task", name(study.task));
+    json.add("repeats", study.repeats);
+    json.add("seed", study.seed);
+    json.add("pixels_per_degree", study.pixels_per_degree);
+    std::string pairs;
+    for (const StudyPair& pair : study.pairs) {
         const auto path = [&](const fs::path& picture) {
-            return to_json(picture.lexically_proximate(folder).generic_string());
+            return to_json(picture.lexically_proximate(file.parent_path()).generic_string());
         };
-        text += std::string(i > 0 ? "," : "") + "\n{\"condition\": " + to_json(pair.condition) +
-                ", \"original\": " + path(pair.original) + ", \"other\": " + path(pair.other) +
-                ", \"training\": " + (pair.is_training ? "true" : "false");
-        if (pair.is_predicted_seen)
-            text += std::string(", \"predicted_seen\": ") + (*pair.is_predicted_seen ? "true" : "false");
-        text += "}";
+        const auto truth = [](bool value) { return value ? "true" : "false"; };
+        pairs += (pairs.empty() ? "\n" : ",\n") + ("{\"condition\": " + to_json(pair.condition)) +
+                 ", \"original\": " + path(pair.original) + ", \"other\": " + path(pair.other) +
+                 ", \"training\": " + truth(pair.is_training);
+        if (pair.is_predicted_seen) pairs += std::string(", \"predicted_seen\": ") + truth(*pair.is_predicted_seen);
+        pairs += "}";
     }
-    return write_text(file, text + "\n]\n}\n");
+    json.add("pairs", "[" + pairs + "\n]");
+    return json.write(file);
 }
 
 Result<Study> read_study(const fs::path& file) {
-    auto object =
-        JsonObject::read(file, {"format", "version", "task", "repeats", "seed", "pixels_per_degree", "pairs"});
-    if (!object) return object.error();
-    std::string format, task;
-    if (auto ok = object->get("format", format); !ok) return ok.error();
-    if (format != study_format) return object->key_error("format", "must be \"unseen study\".");
-    const auto of_version = object->number("version", {1, 1e6, true, true});
-    if (!of_version) return of_version.error();
-    if (*of_version != version)
-        return object->key_error("version", "is " + to_text(*of_version) + ", which this program does not know.");
+    const JsonObject object(file, {"format", "version", "task", "repeats", "seed", "pixels_per_degree", "pairs"});
     Study study;
-    if (auto ok = object->get("task", task); !ok) return ok.error();
-    const auto known = task_named(task);
-    if (!known) return object->key_error("task", "must be \"which\" or \"differ\".");
-    study.task = *known;
-    const auto repeats = object->number("repeats", {1, 1000, true, true});
-    if (!repeats) return repeats.error();
-    study.repeats = static_cast<int>(*repeats);
-    const auto seed = object->number("seed", {0, largest_seed, true, true});
-    if (!seed) return seed.error();
-    study.seed = static_cast<std::uint64_t>(*seed);
-    const auto ppd = object->number("pixels_per_degree", {0, 1e6, false, false});
-    if (!ppd) return ppd.error();
-    study.pixels_per_degree = *ppd;
-    const auto pairs = object->array("pairs");
-    if (!pairs) return pairs.error();
-    if ((*pairs)->size() > most_pairs) return object->key_error("pairs", "has more than 10,000 pairs.");
-    for (std::size_t i = 0; i < (*pairs)->size(); ++i) {
-        auto child = object->child((**pairs)[i], "pairs[" + std::to_string(i) + "]",
-                                   {"condition", "original", "other", "training", "predicted_seen"});
-        if (!child) return child.error();
-        StudyPair pair;
-        if (auto ok = child->get("condition", pair.condition); !ok) return ok.error();
+    std::string format, task;
+    object.get("format", format);
+    if (format != study_format) object.fail_at("format", "must be \"unseen study\".");
+    const double of_version = object.number("version", {.minimum = 1, .maximum = 1e6, .whole = true});
+    if (of_version != version)
+        object.fail_at("version", "is " + number_text(of_version) + ", which this program does not know.");
+    object.get("task", task);
+    const auto known = named<StudyTask>(task_names, task);
+    if (!known) object.fail_at("task", "must be \"which\" or \"differ\".");
+    study.task = known.value_or(StudyTask::which);
+    study.repeats = static_cast<int>(object.number("repeats", {.minimum = 1, .maximum = 1000, .whole = true}));
+    study.seed =
+        static_cast<std::uint64_t>(object.number("seed", {.minimum = 0, .maximum = largest_seed, .whole = true}));
+    study.pixels_per_degree =
+        object.number("pixels_per_degree", {.minimum = 0, .maximum = 1e6, .minimum_allowed = false});
+    const nlohmann::json& pairs = object.array("pairs");
+    if (pairs.size() > most_pairs) object.fail_at("pairs", "has more than 10,000 pairs.");
+    for (std::size_t i = 0; i < pairs.size() && object; ++i) {
+        const JsonObject child = object.child(pairs[i], in_brackets("pairs", i),
+                                              {"condition", "original", "other", "training", "predicted_seen"});
+        StudyPair& pair = study.pairs.emplace_back();
+        child.get("condition", pair.condition);
         for (const auto& [key, to] : {std::pair("original", &pair.original), std::pair("other", &pair.other)}) {
             std::string path;
-            if (auto ok = child->get(key, path); !ok) return ok.error();
+            child.get(key, path);
             const fs::path relative = fs::path(path).lexically_normal();
             if (path.empty() || relative.is_absolute() || *relative.begin() == "..")
-                return child->key_error(key, "must name a picture in the study's folder.");
+                child.fail_at(key, "must name a picture in the study's folder.");
             *to = file.parent_path() / relative;
         }
-        if (auto ok = child->get("training", pair.is_training); !ok) return ok.error();
-        if (child->has("predicted_seen")) {
-            bool seen = false;
-            if (auto ok = child->get("predicted_seen", seen); !ok) return ok.error();
-            pair.is_predicted_seen = seen;
-        }
-        study.pairs.push_back(std::move(pair));
+        child.get("training", pair.is_training);
+        bool is_seen = false;
+        child.get("predicted_seen", is_seen);
+        if (child.has("predicted_seen")) pair.is_predicted_seen = is_seen;
     }
-    if (const auto valid = validate(study); !valid) return object->error(valid.error().message);
+    if (const auto valid = validate(study); !valid) object.fail(valid.error().message);
+    if (!object) return object.error();
     return study;
 }
 
@@ -183,59 +172,41 @@ std::vector<StudyTrial> trials_of(const Study& study, std::string_view subject) 
     return trials;
 }
 
-bool StudyAnswer::says_seen(const Study& study) const {
-    if (study.task == StudyTask::differ) return choice == StudyChoice::different;
-    return (choice == StudyChoice::left) == trial.is_other_left;
-}
-
 bool StudyAnswer::is_right(const Study& study) const {
-    if (study.task == StudyTask::which) return says_seen(study);
-    return says_seen(study) != is_of_one_picture(study.pairs[trial.pair]);
+    return calibration::is_right(study.task, says_seen(choice, trial.is_other_left),
+                                 is_of_one_picture(study.pairs[trial.pair]));
 }
 
 // ---- discrete levels
-
-namespace {
-
-constexpr std::array<LevelStep, 3> all_steps = {LevelStep::decrease, LevelStep::maintain, LevelStep::increase};
-
-// What level_condition() says, read back.
-std::optional<std::pair<int, LevelStep>> level_step_of(std::string_view condition) {
-    constexpr std::string_view begin = "level ";
-    const std::size_t comma = condition.find(", ");
-    if (!condition.starts_with(begin) || comma == condition.npos) return std::nullopt;
-    const auto kept = number_from<int>(condition.substr(begin.size(), comma - begin.size()));
-    for (const LevelStep step : all_steps)
-        if (kept && condition == level_condition(*kept, step)) return std::pair(*kept, step);
-    return std::nullopt;
-}
-
-} // namespace
-
-std::string_view name(LevelStep step) {
-    constexpr std::array<std::string_view, 3> names = {"decrease", "maintain", "increase"};
-    return names[static_cast<std::size_t>(step)];
-}
 
 std::string level_condition(int kept, LevelStep step) {
     return "level " + std::to_string(kept) + ", " + std::string(name(step));
 }
 
+namespace {
+
+// What level_condition() says, read back.
+std::optional<std::pair<int, LevelStep>> level_step_of(std::string_view condition) {
+    constexpr std::string_view begin = "level ", between = ", ";
+    const std::size_t comma = condition.find(between);
+    if (!condition.starts_with(begin) || comma == condition.npos) return std::nullopt;
+    const auto kept = number_from<int>(condition.substr(begin.size(), comma - begin.size()));
+    const auto step = named<LevelStep>(step_names, condition.substr(comma + between.size()));
+    if (!kept || !step || condition != level_condition(*kept, *step)) return std::nullopt;
+    return std::pair(*kept, *step);
+}
+
+} // namespace
+
 std::span<const StepResult> steps_of_2007() {
-    using enum LevelStep;
     // The printed percentages are these counts of 88, cut off behind the first decimal.
-    static constexpr std::array<StepResult, 12> table = {{{2, decrease, {69, 88}},
-                                                          {2, maintain, {71, 88}},
-                                                          {2, increase, {29, 88}},
-                                                          {3, decrease, {69, 88}},
-                                                          {3, maintain, {74, 88}},
-                                                          {3, increase, {67, 88}},
-                                                          {4, decrease, {64, 88}},
-                                                          {4, maintain, {28, 88}},
-                                                          {4, increase, {71, 88}},
-                                                          {5, decrease, {29, 88}},
-                                                          {5, maintain, {54, 88}},
-                                                          {5, increase, {63, 88}}}};
+    static const std::vector<StepResult> table = [] {
+        std::vector<StepResult> steps;
+        for (const std::uint64_t agreed : {69, 71, 29, 69, 74, 67, 64, 28, 71, 29, 54, 63})
+            steps.push_back(
+                {2 + static_cast<int>(steps.size() / 3), static_cast<LevelStep>(steps.size() % 3), {agreed, 88}});
+        return steps;
+    }();
     return table;
 }
 
@@ -246,7 +217,7 @@ namespace {
 constexpr std::array<std::string_view, 12> columns = {"subject", "trial",    "condition", "original",
                                                       "other",   "training", "task",      "predicted",
                                                       "side",    "answer",   "right",     "seconds"};
-enum Column {
+enum {
     subject_,
     trial_,
     condition_,
@@ -260,24 +231,23 @@ enum Column {
     right_,
     seconds_
 };
-using Line = std::array<std::string, columns.size()>;
+using Line = std::vector<std::string>;
+
+const Line& header() {
+    static const Line line(columns.begin(), columns.end());
+    return line;
+}
 
 std::string joined(const Line& line) {
     std::string text;
     for (std::size_t i = 0; i < line.size(); ++i) text += (i > 0 ? "," : "") + csv_field(line[i]);
-    return text + "\n";
-}
-
-Line header() {
-    Line line;
-    std::copy(columns.begin(), columns.end(), line.begin());
-    return line;
+    return text;
 }
 
 // What an answer's line says, but for what was answered.
 Line line_of(const Study& study, std::string_view subject, const StudyTrial& trial) {
     const StudyPair& pair = study.pairs[trial.pair];
-    Line line;
+    Line line(columns.size());
     line[subject_] = subject;
     line[trial_] = std::to_string(trial.number);
     line[condition_] = pair.condition;
@@ -285,95 +255,89 @@ Line line_of(const Study& study, std::string_view subject, const StudyTrial& tri
     line[other_] = pair.other.filename().string();
     line[training_] = pair.is_training ? "1" : "0";
     line[task_] = name(study.task);
-    line[predicted_] = pair.is_predicted_seen ? (*pair.is_predicted_seen ? "seen" : "unseen") : "";
+    if (pair.is_predicted_seen) line[predicted_] = *pair.is_predicted_seen ? "seen" : "unseen";
     line[side_] = trial.is_other_left ? "left" : "right";
     return line;
 }
 
-struct Numbered {
+Error wrong_line(const fs::path& file, int number, const std::string& what) {
+    return {ErrorCode::malformed_data, file.string() + ":" + std::to_string(number) + ": " + what};
+}
+
+// A line of write_answers(), and what it says whatever study it is of.
+struct AnswerLine {
     int number; // in the file, from 1
-    Line line;
-};
-
-// Reads a table with the columns of write_answers().
-Result<std::vector<Numbered>> read_lines(const fs::path& file) {
-    const auto text = read_text_file(file);
-    if (!text) return text.error();
-    const auto records = parse_csv(*text, file.string(), columns.size());
-    if (!records) return records.error();
-    const auto wrong = [&](int number, const std::string& what) {
-        return Error{ErrorCode::malformed_data, file.string() + ":" + std::to_string(number) + ": " + what};
-    };
-    std::vector<Numbered> lines;
-    for (const CsvRecord& record : *records) {
-        if (record.fields.size() < columns.size())
-            return wrong(record.line, "there are " + std::to_string(record.fields.size()) + " fields in place of " +
-                                          std::to_string(columns.size()) + ": these are no answers of a study.");
-        std::ranges::copy(record.fields, lines.emplace_back(Numbered{record.line, {}}).line.begin());
-    }
-    if (lines.empty() || lines.front().line != header())
-        return wrong(1, "the first line must name the columns " +
-                            joined(header()).substr(0, joined(header()).size() - 1) + ".");
-    lines.erase(lines.begin());
-    return lines;
-}
-
-Error wrong_line(const fs::path& file, const Numbered& numbered, const std::string& what) {
-    return {ErrorCode::malformed_data, file.string() + ":" + std::to_string(numbered.number) + ": " + what};
-}
-
-// A line's own fields, whatever study it is of.
-struct Said {
+    Line fields;
     StudyTask task;
     StudyChoice choice;
     double seconds;
 };
-Result<Said> said(const fs::path& file, const Numbered& numbered) {
-    const Line& line = numbered.line;
-    const auto task = task_named(line[task_]);
-    if (!task) return wrong_line(file, numbered, "the task is '" + line[task_] + "', and none that is known.");
-    const auto choice = choice_named(line[answer_]);
+
+Result<std::vector<AnswerLine>> read_lines(const fs::path& file) {
+    const auto text = read_text_file(file);
+    if (!text) return text.error();
+    auto records = parse_csv(*text, file.string(), columns.size());
+    if (!records) return records.error();
+    std::vector<AnswerLine> lines;
+    for (auto& [number, fields] : *records) {
+        if (fields.size() < columns.size())
+            return wrong_line(file, number,
+                              "there are " + std::to_string(fields.size()) + " fields in place of " +
+                                  std::to_string(columns.size()) + ": these are no answers of a study.");
+        lines.push_back({number, std::move(fields), {}, {}, 0});
+    }
+    if (lines.empty() || lines.front().fields != header())
+        return wrong_line(file, 1, "the first line must name the columns " + joined(header()) + ".");
+    lines.erase(lines.begin());
+    return lines;
+}
+
+Result<void> take_answer(const fs::path& file, AnswerLine& line) {
+    const auto wrong = [&](const std::string& what) { return wrong_line(file, line.number, what); };
+    const auto task = named<StudyTask>(task_names, line.fields[task_]);
+    if (!task) return wrong("the task is '" + line.fields[task_] + "', and none that is known.");
+    const auto choice = named<StudyChoice>(choice_names, line.fields[answer_]);
     if (!choice || !belongs_to(*choice, *task))
-        return wrong_line(file, numbered, "'" + line[answer_] + "' is no answer to the task " + line[task_] + ".");
-    const auto seconds = finite_from(line[seconds_]);
-    if (!seconds || !(*seconds >= 0)) return wrong_line(file, numbered, "'" + line[seconds_] + "' are no seconds.");
-    return Said{*task, *choice, *seconds};
+        return wrong("'" + line.fields[answer_] + "' is no answer to the task " + line.fields[task_] + ".");
+    const auto seconds = finite_from(line.fields[seconds_]);
+    if (!seconds || !(*seconds >= 0)) return wrong("'" + line.fields[seconds_] + "' are no seconds.");
+    line.task = *task, line.choice = *choice, line.seconds = *seconds;
+    return {};
 }
 
 } // namespace
 
 Result<void> write_answers(const fs::path& file, const Study& study, std::string_view subject,
                            std::span<const StudyAnswer> answers) {
-    std::string text = joined(header());
+    std::string text = joined(header()) + "\n";
     for (const StudyAnswer& answer : answers) {
         Line line = line_of(study, subject, answer.trial);
         line[answer_] = name(answer.choice);
         line[right_] = answer.is_right(study) ? "1" : "0";
-        line[seconds_] = to_text(std::round(answer.seconds * 1000) / 1000);
-        text += joined(line);
+        line[seconds_] = number_text(std::round(answer.seconds * 1000) / 1000);
+        text += joined(line) + "\n";
     }
     return write_text(file, text);
 }
 
 Result<std::vector<StudyAnswer>> read_answers(const fs::path& file, const Study& study, std::string_view subject) {
-    const auto lines = read_lines(file);
+    auto lines = read_lines(file);
     if (!lines) return lines.error();
     const std::vector<StudyTrial> trials = trials_of(study, subject);
     std::vector<StudyAnswer> answers;
-    for (const Numbered& numbered : *lines) {
-        if (answers.size() == trials.size()) return wrong_line(file, numbered, "the study has no more trials.");
+    for (AnswerLine& line : *lines) {
+        if (answers.size() == trials.size()) return wrong_line(file, line.number, "the study has no more trials.");
         const StudyTrial& trial = trials[answers.size()];
-        const auto heard = said(file, numbered);
-        if (!heard) return heard.error();
+        if (const auto taken = take_answer(file, line); !taken) return taken.error();
         Line expected = line_of(study, subject, trial);
-        for (const Column own : {answer_, right_, seconds_}) expected[own] = numbered.line[own];
+        for (const auto own : {answer_, right_, seconds_}) expected[own] = line.fields[own];
         for (std::size_t i = 0; i < columns.size(); ++i)
-            if (expected[i] != numbered.line[i])
-                return wrong_line(file, numbered,
-                                  "the column " + std::string(columns[i]) + " is '" + numbered.line[i] +
+            if (expected[i] != line.fields[i])
+                return wrong_line(file, line.number,
+                                  "the column " + std::string(columns[i]) + " is '" + line.fields[i] +
                                       "' where this study has '" + expected[i] +
                                       "' for this subject: these answers are of another one.");
-        answers.push_back({trial, heard->choice, heard->seconds});
+        answers.push_back({trial, line.choice, line.seconds});
     }
     return answers;
 }
@@ -443,38 +407,37 @@ Result<StudyAnalysis> analyse_answers(std::span<const fs::path> files) {
     std::map<std::string, Share> training; // right answers by subject
     Share false_alarms, agreed;
     for (const fs::path& file : files) {
-        const auto lines = read_lines(file);
+        auto lines = read_lines(file);
         if (!lines) return lines.error();
-        for (const Numbered& numbered : *lines) {
-            const Line& line = numbered.line;
-            const auto heard = said(file, numbered);
-            if (!heard) return heard.error();
-            if (std::ranges::find(all.subjects, line[subject_]) == all.subjects.end())
-                all.subjects.push_back(line[subject_]);
-            const bool is_same = line[original_] == line[other_];
-            const bool seen = heard->task == StudyTask::differ ? heard->choice == StudyChoice::different
-                                                               : name(heard->choice) == line[side_];
-            const bool right = heard->task == StudyTask::which ? seen : seen != is_same;
-            if (line[training_] == "1") {
-                add(training[line[subject_]], right);
+        for (AnswerLine& line : *lines) {
+            if (const auto taken = take_answer(file, line); !taken) return taken.error();
+            const Line& fields = line.fields;
+            if (std::ranges::find(all.subjects, fields[subject_]) == all.subjects.end())
+                all.subjects.push_back(fields[subject_]);
+            const bool is_same = fields[original_] == fields[other_];
+            const bool is_seen = says_seen(line.choice, fields[side_] == "left");
+            if (fields[training_] == "1") {
+                add(training[fields[subject_]], is_right(line.task, is_seen, is_same));
                 continue;
             }
             auto tally = std::ranges::find_if(tallies, [&](const Tally& t) {
-                return t.result.condition == line[condition_] && t.result.task == heard->task;
+                return t.result.condition == fields[condition_] && t.result.task == line.task;
             });
             if (tally == tallies.end()) {
-                tallies.emplace_back();
-                tally = std::prev(tallies.end());
-                tally->result.condition = line[condition_], tally->result.task = heard->task;
+                tally = tallies.emplace(tally);
+                tally->result.condition = fields[condition_], tally->result.task = line.task;
                 tally->is_of_one_picture = is_same;
             }
-            add(tally->result.seen, seen);
-            tally->seconds.push_back(heard->seconds);
-            if (heard->task == StudyTask::differ && is_same) add(false_alarms, seen);
-            if (line[predicted_].empty() || heard->task == StudyTask::which) tally->is_predicted = false;
-            else
-                add(tally->agreed, seen == (line[predicted_] == "seen")),
-                    add(agreed, seen == (line[predicted_] == "seen"));
+            add(tally->result.seen, is_seen);
+            tally->seconds.push_back(line.seconds);
+            if (line.task == StudyTask::differ && is_same) add(false_alarms, is_seen);
+            if (fields[predicted_].empty() || line.task == StudyTask::which) {
+                tally->is_predicted = false;
+            } else {
+                const bool agrees = is_seen == (fields[predicted_] == "seen");
+                add(tally->agreed, agrees);
+                add(agreed, agrees);
+            }
         }
     }
     for (Tally& tally : tallies) {

@@ -35,8 +35,6 @@ constexpr double rounding = 1e-14;
 // Of the radius: a smallest sphere is defined by up to four points through a linear system, which near-degenerate
 // sets make ill-conditioned; the radius, being a minimum, suffers only to second order.
 constexpr double radius_tolerance = 1e-9;
-// What enclosing_sphere() promises.
-constexpr double promised_excess = 1e-4;
 
 struct NamedPoints {
     const char* name;
@@ -109,10 +107,8 @@ std::vector<NamedPoints> point_sets() {
     };
 }
 
-void expect_contains(const DSphere& sphere, const Points& points, const std::vector<DSphere>& spheres = {}) {
+void expect_contains(const DSphere& sphere, const Points& points) {
     for (const glm::dvec3& p : points) ASSERT_LE(glm::distance(p, sphere.centre), sphere.radius * (1 + rounding));
-    for (const DSphere& s : spheres)
-        ASSERT_LE(glm::distance(s.centre, sphere.centre) + s.radius, sphere.radius * (1 + rounding));
 }
 
 TEST(SmallestSphere, ContainsItsPointsAndIsTheSmallest) {
@@ -169,41 +165,6 @@ TEST(SmallestSphere, IsTheSameForTheSamePoints) {
     }
 }
 
-TEST(EnclosingSphere, ContainsPointsAndSpheresAndIsNearlyTheSmallest) {
-    std::mt19937_64 random(3);
-    for (const NamedPoints& set : point_sets()) {
-        for (const double scale : {1.0, 1e-19, 1e30}) {
-            SCOPED_TRACE(std::string(set.name) + " times " + std::to_string(scale));
-            for (int round = 0; round < 12; ++round) {
-                Points points;
-                std::vector<DSphere> spheres;
-                for (const glm::dvec3& p : set.make(random)) {
-                    if (random() % 3 == 0) points.push_back(p * scale);
-                    else spheres.push_back({p * scale, scale * std::pow(10.0, random_between(random, -3, 0.5))});
-                }
-                if (random() % 4 == 0) spheres.push_back({glm::dvec3(0), -1}); // contains nothing, asks for nothing
-                const DSphere sphere = enclosing_sphere(points, spheres);
-                std::erase_if(spheres, [](const DSphere& s) { return s.radius < 0; });
-                expect_contains(sphere, points, spheres);
-#ifdef UNSEEN_TEST_WITH_CGAL
-                const double exact = exact_radius(points, spheres);
-                ASSERT_LE(sphere.radius, exact * (1 + promised_excess + radius_tolerance))
-                    << points.size() << " points, " << spheres.size() << " spheres";
-                ASSERT_GE(sphere.radius, exact * (1 - rounding));
-#endif
-            }
-        }
-    }
-}
-
-TEST(EnclosingSphere, KeepsASphereThatContainsTheOthers) {
-    const Points points = {{0.1, 0, 0}};
-    const std::vector<DSphere> spheres = {{{0, 0, 0}, 1}, {{0.2, 0.1, 0}, 0.3}};
-    const DSphere sphere = enclosing_sphere(points, spheres);
-    expect_contains(sphere, points, spheres);
-    EXPECT_LE(sphere.radius, 1 + promised_excess);
-}
-
 // What a lane holds, and what is promised of its sphere.
 struct Lane {
     std::vector<glm::vec3> points;
@@ -215,11 +176,14 @@ struct Lane {
         for (const Sphere& s : spheres) wide_spheres.push_back({glm::dvec3(s.centre), s.radius});
         for (const glm::dvec3& p : wide_points) ASSERT_TRUE(support::contains(sphere, p, 0));
         for (const DSphere& s : wide_spheres) ASSERT_TRUE(support::contains(sphere, s.centre, s.radius));
+#ifdef UNSEEN_TEST_WITH_CGAL
         constexpr double float_rounding = 2e-7; // of the centre's coordinates, and of the radius
-        const DSphere about = enclosing_sphere(wide_points, wide_spheres);
-        ASSERT_LE(sphere.radius,
-                  about.radius * (1 + slack + float_rounding) + float_rounding * glm::length(about.centre))
+        ASSERT_LE(sphere.radius, exact_radius(wide_points, wide_spheres) * (1 + slack + float_rounding) +
+                                     float_rounding * glm::length(glm::dvec3(sphere.centre)))
             << points.size() << " points, " << spheres.size() << " spheres";
+#else
+        static_cast<void>(slack);
+#endif
     }
 };
 

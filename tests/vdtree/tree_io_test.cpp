@@ -25,7 +25,6 @@
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"
-#include "files/byte_order.h"
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
@@ -42,26 +41,6 @@ using support::built;
 using support::TempFolder;
 using support::TreeFile;
 using testing::HasSubstr;
-
-// Of elements that cross the ends of the pieces, as those of 40 bytes do a page's.
-TEST(ByteOrder, IsThatOfWholeElementsWhateverThePieces) {
-    constexpr ElementLayout layout{40, 28, 4};
-    std::vector<std::byte> given(40 * 100);
-    for (std::size_t i = 0; i < given.size(); ++i) given[i] = static_cast<std::byte>(i * 37 + i / 256);
-    std::vector<std::byte> expected = given;
-    for (std::size_t element = 0; element < given.size(); element += 40)
-        for (std::size_t number = element; number < element + 28; number += 4)
-            for (std::size_t i = 0; i < 4; ++i) expected[number + i] = given[number + 3 - i];
-    for (const std::size_t piece : {4, 16, 64, 1024, 4000}) {
-        std::vector<std::byte> swapped = given;
-        for (std::size_t at = 0; at < swapped.size(); at += piece)
-            swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
-        EXPECT_EQ(swapped, expected) << piece;
-        for (std::size_t at = 0; at < swapped.size(); at += piece)
-            swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
-        EXPECT_EQ(swapped, given) << piece;
-    }
-}
 
 class TreeIo : public testing::Test {
 protected:

@@ -39,10 +39,8 @@ public:
         const double distance = glm::length(apart);
         if (distance + b.radius <= a.radius) {
             sphere_ = a;
-            count_ = 0;
         } else if (distance + a.radius <= b.radius) {
             sphere_ = b;
-            count_ = 0;
         } else {
             points_[0] = a.centre, points_[1] = b.centre;
             if (a.radius != 0 || b.radius != 0) {
@@ -63,7 +61,8 @@ public:
 
     const DSphere& sphere() const { return sphere_; }
 
-    // Makes the smallest sphere around the basis and what of a ball is farthest outside of its sphere.
+    // Makes the smallest sphere around the basis and what of a ball is farthest outside of its sphere. For balls the
+    // points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
     void add(const DSphere& ball) {
         if (ball.radius == 0) return add(ball.centre);
         const glm::dvec3 away = ball.centre - sphere_.centre;
@@ -84,12 +83,12 @@ private:
         Best best;
         for (int i = 0; i < count_ && !best.found; ++i) {
             const glm::dvec3 half = (at(i) - p) * 0.5;
-            consider(best, {p + half, squared(half)}, {i});
+            consider(best, {p + half, squared(half)}, {i, -1, -1});
         }
         // A pair's sphere that contains the others is the smallest, but one of more points need not be.
         if (!best.found) {
             for (int i = 0; i < count_; ++i)
-                for (int j = i + 1; j < count_; ++j) consider(best, around(p, at(i), at(j)), {i, j});
+                for (int j = i + 1; j < count_; ++j) consider(best, around(p, at(i), at(j)), {i, j, -1});
             for (int i = 0; i < count_; ++i)
                 for (int j = i + 1; j < count_; ++j)
                     for (int k = j + 1; k < count_; ++k) consider(best, around(p, at(i), at(j), at(k)), {i, j, k});
@@ -101,19 +100,15 @@ private:
         }
         std::array<glm::dvec3, 4> kept;
         int count = 0;
-        for (int i = 0; i < 3; ++i)
-            if (best.with[static_cast<std::size_t>(i)] >= 0)
-                kept[static_cast<std::size_t>(count++)] = at(best.with[static_cast<std::size_t>(i)]);
+        for (const int i : best.with)
+            if (i >= 0) kept[static_cast<std::size_t>(count++)] = at(i);
         kept[static_cast<std::size_t>(count++)] = p;
         points_ = kept;
         count_ = count;
         sphere_ = {best.sphere.centre, std::sqrt(best.sphere.squared_radius)};
     }
 
-    struct Subset {
-        std::array<int, 3> with{-1, -1, -1};
-        Subset(std::initializer_list<int> which) { std::copy(which.begin(), which.end(), with.begin()); }
-    };
+    using Subset = std::array<int, 3>; // of the points; -1: one less
     // Roots are only taken of the best.
     struct Candidate {
         glm::dvec3 centre = glm::dvec3(0);
@@ -122,7 +117,7 @@ private:
     struct Best {
         bool found = false;
         Candidate sphere;
-        std::array<int, 3> with{-1, -1, -1};
+        Subset with{-1, -1, -1};
     };
 
     glm::dvec3 at(int i) const { return points_[static_cast<std::size_t>(i)]; }
@@ -132,10 +127,10 @@ private:
             return;
         const double limit = sphere.squared_radius * (1 + 2 * containment_slack);
         for (int i = 0; i < count_; ++i) {
-            if (i == subset.with[0] || i == subset.with[1] || i == subset.with[2]) continue;
+            if (std::ranges::find(subset, i) != subset.end()) continue;
             if (!(squared(at(i) - sphere.centre) <= limit)) return;
         }
-        best = {true, sphere, subset.with};
+        best = {true, sphere, subset};
     }
 
     // The smallest spheres with three and with four points on them.
@@ -159,104 +154,28 @@ private:
     DSphere sphere_;
 };
 
-struct Farthest {
-    DSphere ball;
-    double reach; // from the centre to the ball's far side
-};
-
-// Points and balls as one list of balls, relative to the first.
-class Balls {
-public:
-    Balls(std::span<const glm::dvec3> points, std::span<const DSphere> spheres)
-        : points_(points), spheres_(spheres), origin_(points.empty() ? spheres[0].centre : points[0]) {}
-
-    glm::dvec3 origin() const { return origin_; }
-    DSphere first() const { return {glm::dvec3(0), points_.empty() ? spheres_[0].radius : 0}; }
-
-    Farthest farthest(glm::dvec3 from) const {
-        const glm::dvec3 centre = from + origin_;
-        double largest = -1;
-        const glm::dvec3* point = nullptr;
-        for (const glm::dvec3& p : points_) {
-            const double d = squared(p - centre);
-            if (d > largest) {
-                largest = d;
-                point = &p;
-            }
-        }
-        Farthest out{{point ? *point - origin_ : glm::dvec3(0), 0}, point ? std::sqrt(largest) : -1};
-        for (const DSphere& s : spheres_) {
-            const double reach = glm::distance(s.centre, centre) + s.radius;
-            if (s.radius >= 0 && reach > out.reach) out = {{s.centre - origin_, s.radius}, reach};
-        }
-        return out;
-    }
-
-private:
-    std::span<const glm::dvec3> points_;
-    std::span<const DSphere> spheres_;
-    glm::dvec3 origin_;
-};
-
-// Points that somebody else keeps, relative to one of them; for the time of one call.
-class FarPoints {
-public:
-    FarPoints(glm::dvec3 origin, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest)
-        : origin_(origin), farthest_(farthest) {}
-
-    DSphere first() const { return {glm::dvec3(0), 0}; }
-    Farthest farthest(glm::dvec3 from) const {
-        const glm::dvec3 centre = from + origin_, point = farthest_(centre);
-        return {{point - origin_, 0}, glm::distance(point, centre)};
-    }
-
-private:
-    glm::dvec3 origin_;
-    const FunctionRef<glm::dvec3(glm::dvec3)>& farthest_;
-};
-
-// Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls
-// the points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
-template <class AnyBalls>
-DSphere grow_basis(AnyBalls& balls, double slack) {
-    // A pair far apart is a good beginning.
-    const DSphere one = balls.farthest(balls.first().centre).ball;
-    const DSphere other = balls.farthest(one.centre).ball;
-    Basis basis(one, other);
-    for (int round = 0;; ++round) {
-        const DSphere& sphere = basis.sphere();
-        const auto [ball, reach] = balls.farthest(sphere.centre);
-        if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
-            return {sphere.centre, std::max(sphere.radius, reach)};
-        basis.add(ball);
-    }
-}
-
-DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
-    while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
-    if (points.empty() && spheres.empty()) return {};
-    Balls balls(points, spheres);
-    const DSphere sphere = grow_basis(balls, slack);
-    return {sphere.centre + balls.origin(), sphere.radius};
-}
-
-// A point's distance loses a few units in the last place.
-constexpr double exact_slack = 1e-13;
-// What enclosing_sphere() may exceed the smallest radius by.
-constexpr double sphere_slack = 1e-4;
-
 } // namespace
 
-DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(points, {}, exact_slack); }
-
 DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) {
-    FarPoints points(first, farthest);
-    const DSphere sphere = grow_basis(points, exact_slack);
-    return {sphere.centre + first, sphere.radius};
+    constexpr double slack = 1e-13; // a point's distance loses a few units in the last place
+    // Relative to the first point. A pair far apart is a good beginning.
+    const glm::dvec3 one = farthest(first) - first, other = farthest(one + first) - first;
+    Basis basis({one, 0}, {other, 0});
+    for (int round = 0;; ++round) {
+        const DSphere& sphere = basis.sphere();
+        const glm::dvec3 centre = sphere.centre + first, point = farthest(centre);
+        const double reach = glm::distance(point, centre);
+        if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
+            return {centre, std::max(sphere.radius, reach)};
+        basis.add({point - first, 0});
+    }
 }
 
-DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres) {
-    return enclose(points, spheres, sphere_slack);
+DSphere smallest_sphere(std::span<const glm::dvec3> points) {
+    if (points.empty()) return {};
+    return smallest_sphere(points[0], [&](glm::dvec3 from) {
+        return *std::ranges::max_element(points, {}, [&](glm::dvec3 p) { return squared(p - from); });
+    });
 }
 
 // ---- several at once

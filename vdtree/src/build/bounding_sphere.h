@@ -19,16 +19,10 @@ struct DSphere {
     double radius = -1; // negative: contains nothing
 };
 
-// The smallest sphere that contains all points (Welzl 1991, move to front). Deterministic.
-// Cost: expected linear for the sizes used here (tens of points).
-DSphere smallest_sphere(std::span<const glm::dvec3> points);
-// Likewise of points that somebody else keeps, one of which is `first`: asks now and then, ten times or so, for the one
-// that is farthest from a place.
+// The smallest sphere that contains all points, which somebody else keeps (Welzl 1991, move to front): asks now and then,
+// ten times or so, for the point that is farthest from a place. `first`: any of them. Deterministic.
 DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3 from)>& farthest);
-
-// Nearly the smallest sphere that contains all points and all spheres: the radius exceeds the smallest one by a
-// relative 1e-4 at most, and contains them all.
-DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres);
+DSphere smallest_sphere(std::span<const glm::dvec3> points);
 
 // Several sets of points and spheres, each to be enclosed by a sphere of its own, at the same time: the farthest points
 // of all are looked for together, and what takes long for one of them is done while others wait for it. Keeps its

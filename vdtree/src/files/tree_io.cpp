@@ -16,7 +16,6 @@
 
 #include <unseen/vdtree/internal/atomic_file.h>
 
-#include "files/byte_order.h"
 #include "files/mapped_file.h"
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
@@ -32,7 +31,8 @@ constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;     // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
 
-// All integers and floats little-endian.
+static_assert(std::endian::native == std::endian::little, "The file holds the arrays as they are in memory.");
+
 struct Header {
     std::array<char, 8> magic;
     std::uint32_t version;
@@ -48,7 +48,7 @@ struct Section {
     std::array<char, 20> name;
     std::uint32_t domain; // an AttributeDomain; part_of_tree: one of the tree's own arrays
     std::uint32_t element_bytes;
-    std::uint32_t component_bytes; // what a host of the other byte order swaps
+    std::uint32_t component_bytes; // of the numbers in an element, for readers of another byte order
     std::uint64_t count;
     std::uint64_t offset;
 };
@@ -74,12 +74,6 @@ static_assert(sizeof(Facts) == 88);
 std::uint64_t checksum(const void* data, std::size_t bytes) { return XXH3_64bits(data, bytes); }
 
 std::uint64_t pages_of(const Section& s) { return (s.count * s.element_bytes + page_bytes - 1) / page_bytes; }
-
-// A section's elements, of which bounds begin with floats and end with single bytes.
-ElementLayout layout_of(const Section& s) {
-    const bool is_bounds = s.domain == part_of_tree && name_of(s) == "bounds" && s.element_bytes == sizeof(NodeBounds);
-    return {s.element_bytes, is_bounds ? sizeof(Sphere) : s.element_bytes, s.component_bytes};
-}
 
 // Walks every stored array of a tree, in file order: f(name, vector).
 template <class Geometry, class Luminance, class F>
@@ -115,8 +109,6 @@ bool is_of_texture(std::string_view name) { return name == "texture" || name == 
 
 // Sections that are there only where they have elements.
 bool is_optional(std::string_view name) { return is_of_texture(name) || name == "document"; }
-
-enum class OpenMode { read, map };
 
 template <class T>
 constexpr std::uint32_t component_bytes() {
@@ -186,10 +178,18 @@ class Writer {
 public:
     template <class T>
     void add(std::string_view name, std::span<const T> values, std::uint32_t component) {
-        add(name, part_of_tree, sizeof(T), component, std::as_bytes(values));
+        add({{std::string(name), AttributeDomain{part_of_tree}, sizeof(T), component, values.size()},
+             nullptr,
+             std::as_bytes(values)});
     }
     void add(const Attribute& a) {
-        add(a.name, static_cast<std::uint32_t>(a.domain), a.element_bytes, a.component_bytes, a.bytes);
+        Section& s = sections_.emplace_back();
+        std::copy_n(a.name.begin(), std::min(a.name.size(), s.name.size()), s.name.begin());
+        s.domain = static_cast<std::uint32_t>(a.domain);
+        s.element_bytes = a.element_bytes;
+        s.component_bytes = a.component_bytes;
+        s.count = a.bytes.size() / a.element_bytes;
+        data_.push_back(a.bytes);
     }
 
     Result<void> write(const std::filesystem::path& file, const Progress& progress) {
@@ -203,36 +203,21 @@ public:
                 return Error{ErrorCode::cancelled, "Writing " + file.string() + " was cancelled."};
             const std::vector<std::byte> padding(sections_[i].offset - position);
             if (const auto r = out->write(padding); !r) return r;
-            if (const auto r = write_pages(*out, i); !r) return r;
+            if (const auto r = out->write(data_[i]); !r) return r;
             position = sections_[i].offset + data_[i].size();
         }
         return out->commit();
     }
 
 private:
-    void add(std::string_view name, std::uint32_t domain, std::size_t element, std::uint32_t component,
-             std::span<const std::byte> bytes) {
-        Section s{};
-        std::copy_n(name.begin(), std::min(name.size(), s.name.size()), s.name.begin());
-        s.domain = domain;
-        s.element_bytes = static_cast<std::uint32_t>(element);
-        s.component_bytes = component;
-        s.count = bytes.size() / element;
-        sections_.push_back(s);
-        data_.push_back(bytes);
-    }
-
     std::uint64_t table_bytes() const {
         return sizeof(Header) + sections_.size() * sizeof(Section) + checksums_.size() * sizeof(std::uint64_t);
     }
 
     void layout() {
-        for (std::size_t i = 0; i < sections_.size(); ++i) {
-            for (std::size_t at = 0; at < data_[i].size(); at += page_bytes) {
-                const auto page = little_endian(i, at);
-                checksums_.push_back(checksum(page.data(), page.size()));
-            }
-        }
+        for (const std::span<const std::byte> bytes : data_)
+            for (std::size_t at = 0; at < bytes.size(); at += page_bytes)
+                checksums_.push_back(checksum(&bytes[at], std::min<std::size_t>(page_bytes, bytes.size() - at)));
         std::uint64_t offset = table_bytes();
         for (std::size_t i = 0; i < sections_.size(); ++i) {
             offset = (offset + section_alignment - 1) / section_alignment * section_alignment;
@@ -242,57 +227,25 @@ private:
         file_bytes_ = offset;
     }
 
-    // A page of a section as it stands in the file.
-    std::span<const std::byte> little_endian(std::size_t section, std::size_t at) {
-        const auto page = data_[section].subspan(at, std::min<std::size_t>(page_bytes, data_[section].size() - at));
-        if constexpr (std::endian::native == std::endian::little) return page;
-        swapped_.assign(page.begin(), page.end());
-        swap_elements(swapped_.data(), swapped_.size(), at, layout_of(sections_[section]));
-        return swapped_;
-    }
-
     Result<void> write_table(AtomicFile& out) {
-        std::vector<Section> table = sections_;
-        std::vector<std::uint64_t> sums = checksums_;
-        Header h{};
-        h.magic = magic;
-        h.version = format_version;
-        h.section_count = static_cast<std::uint32_t>(table.size());
-        h.file_bytes = file_bytes_;
-        h.page_count = sums.size();
-        if constexpr (std::endian::native == std::endian::big) {
-            for (Section& s : table) {
-                swap_components(reinterpret_cast<std::byte*>(&s.domain), 12, 4);
-                swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
-            }
-            swap_components(reinterpret_cast<std::byte*>(sums.data()), sums.size() * 8, 8);
-            swap_components(reinterpret_cast<std::byte*>(&h.version), 8, 4);
-            swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 16, 8);
-        }
-        std::vector<std::byte> bytes(table.size() * sizeof(Section) + sums.size() * 8);
-        std::memcpy(bytes.data(), table.data(), table.size() * sizeof(Section));
-        if (!sums.empty()) std::memcpy(bytes.data() + table.size() * sizeof(Section), sums.data(), sums.size() * 8);
-        h.table_checksum = checksum(bytes.data(), bytes.size());
-        if constexpr (std::endian::native == std::endian::big)
-            swap_components(reinterpret_cast<std::byte*>(&h.table_checksum), 8, 8);
+        const auto sections = std::as_bytes(std::span(sections_)), sums = std::as_bytes(std::span(checksums_));
+        std::vector<std::byte> table(sections.begin(), sections.end());
+        table.insert(table.end(), sums.begin(), sums.end());
+        Header h{magic,
+                 format_version,
+                 static_cast<std::uint32_t>(sections_.size()),
+                 file_bytes_,
+                 checksums_.size(),
+                 checksum(table.data(), table.size()),
+                 0};
         h.header_checksum = checksum(&h, offsetof(Header, header_checksum));
-        if constexpr (std::endian::native == std::endian::big)
-            swap_components(reinterpret_cast<std::byte*>(&h.header_checksum), 8, 8);
         if (const auto r = out.write(std::as_bytes(std::span(&h, 1))); !r) return r;
-        return out.write(bytes);
-    }
-
-    Result<void> write_pages(AtomicFile& out, std::size_t section) {
-        if constexpr (std::endian::native == std::endian::little) return out.write(data_[section]);
-        for (std::size_t at = 0; at < data_[section].size(); at += page_bytes)
-            if (const auto r = out.write(little_endian(section, at)); !r) return r;
-        return {};
+        return out.write(table);
     }
 
     std::vector<Section> sections_;
     std::vector<std::span<const std::byte>> data_;
     std::vector<std::uint64_t> checksums_;
-    std::vector<std::byte> swapped_;
     std::uint64_t file_bytes_ = 0;
 };
 
@@ -300,8 +253,9 @@ private:
 
 class Reader {
 public:
-    Reader(const std::filesystem::path& file, OpenMode mode, const Progress& progress)
-        : file_(file), mode_(mode), progress_(progress) {}
+    // `maps`: the arrays stay in the file until they are used.
+    Reader(const std::filesystem::path& file, bool maps, const Progress& progress)
+        : file_(file), maps_(maps), progress_(progress) {}
 
     Result<VertexTree> read();
 
@@ -312,11 +266,11 @@ private:
     Result<void> read_table();
     const Section* find(std::string_view name) const;
     template <class T>
+    Result<const Section*> section_of(std::string_view name) const;
+    template <class T>
     Result<void> read_section(std::string_view name, std::vector<T>& out);
     Result<void> read_pages(const Section& section, std::byte* bytes);
     Result<std::span<const std::byte>> mapped_bytes(const Section& section) const;
-    template <class T>
-    Result<void> map_section(std::string_view name, Array<T>& out);
     Result<void> read_attributes(std::size_t interior_count, std::size_t node_count,
                                  std::vector<Attribute>& attributes);
     template <class T>
@@ -327,7 +281,7 @@ private:
     Result<void> check_ranges(const TreeGeometry& g) const;
 
     const std::filesystem::path& file_;
-    const OpenMode mode_;
+    const bool maps_;
     const Progress& progress_;
     std::shared_ptr<const MappedFile> mapping_;
     std::ifstream in_;
@@ -347,10 +301,6 @@ Result<void> Reader::read_table() {
     if (!in_.read(reinterpret_cast<char*>(&h), sizeof h)) return fail("The file ends within its header.");
     if (h.magic != magic) return fail("This is no vertex tree (.vdt).");
     const std::uint64_t sum = checksum(&h, offsetof(Header, header_checksum));
-    if constexpr (std::endian::native == std::endian::big) {
-        swap_components(reinterpret_cast<std::byte*>(&h.version), 8, 4);
-        swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 32, 8);
-    }
     if (h.version != format_version)
         return Error{ErrorCode::unsupported,
                      file_.string() +
@@ -374,13 +324,6 @@ Result<void> Reader::read_table() {
     if (h.section_count > 0) std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
     if (h.page_count > 0)
         std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
-    if constexpr (std::endian::native == std::endian::big) {
-        for (Section& s : sections_) {
-            swap_components(reinterpret_cast<std::byte*>(&s.domain), 12, 4);
-            swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
-        }
-        swap_components(reinterpret_cast<std::byte*>(checksums_.data()), checksums_.size() * 8, 8);
-    }
     std::uint64_t pages = 0;
     for (const Section& s : sections_) {
         const std::string name(name_of(s));
@@ -399,13 +342,20 @@ const Section* Reader::find(std::string_view name) const {
 }
 
 template <class T>
-Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
+Result<const Section*> Reader::section_of(std::string_view name) const {
     const Section* section = find(name);
     if (!section) return fail("Section " + std::string(name) + " is missing.");
     if (section->element_bytes != sizeof(T))
         return fail("Section " + std::string(name) + " has elements of another size.");
-    out.resize(section->count);
-    return read_pages(*section, reinterpret_cast<std::byte*>(out.data()));
+    return section;
+}
+
+template <class T>
+Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
+    const auto section = section_of<T>(name);
+    if (!section) return section.error();
+    out.resize((*section)->count);
+    return read_pages(**section, reinterpret_cast<std::byte*>(out.data()));
 }
 
 Result<void> Reader::read_pages(const Section& section, std::byte* bytes) {
@@ -421,7 +371,6 @@ Result<void> Reader::read_pages(const Section& section, std::byte* bytes) {
             return fail("The file ends within section " + name + "; it was cut short while it was read.");
         if (checksum(bytes + at, size) != checksums_[page])
             return fail("Page " + std::to_string(at / page_bytes) + " of section " + name + " is damaged.");
-        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, at, layout_of(section));
     }
     return {};
 }
@@ -438,18 +387,6 @@ Result<std::span<const std::byte>> Reader::mapped_bytes(const Section& section) 
     return bytes.subspan(section.offset, size);
 }
 
-template <class T>
-Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
-    const Section* section = find(name);
-    if (!section) return fail("Section " + std::string(name) + " is missing.");
-    if (section->element_bytes != sizeof(T))
-        return fail("Section " + std::string(name) + " has elements of another size.");
-    const auto bytes = mapped_bytes(*section);
-    if (!bytes) return bytes.error();
-    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), section->count));
-    return {};
-}
-
 // Attributes of names that nobody here knows, too. Their values are their owners' to check.
 Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t node_count,
                                      std::vector<Attribute>& attributes) {
@@ -463,7 +400,7 @@ Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t nod
         for (const Attribute& before : attributes)
             if (before.name == a.name) return fail("Attribute " + a.name + " is there twice.");
         if (attributes.size() == most_attributes) return fail("There are more attributes than a tree can have.");
-        if (mode_ == OpenMode::map) {
+        if (maps_) {
             const auto bytes = mapped_bytes(s);
             if (!bytes) return bytes.error();
             a.owner = mapping_;
@@ -482,20 +419,24 @@ Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t nod
 template <class T>
 Result<void> Reader::open_section(std::string_view name, Array<T>& out) {
     if (is_optional(name) && !find(name)) return {};
-    if (mode_ == OpenMode::map) return map_section(name, out);
-    std::vector<T> values;
-    const auto r = read_section(name, values);
-    out = std::move(values);
-    return r;
+    if (!maps_) {
+        std::vector<T> values;
+        const auto r = read_section(name, values);
+        out = std::move(values);
+        return r;
+    }
+    const auto section = section_of<T>(name);
+    if (!section) return section.error();
+    const auto bytes = mapped_bytes(**section);
+    if (!bytes) return bytes.error();
+    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), (*section)->count));
+    return {};
 }
 
 Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l) const {
     const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
     if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
         return fail("The tree has no nodes or no triangles.");
-    const auto expect = [&](bool holds, const char* name) {
-        return holds ? Result<void>() : Result<void>(fail("Section " + std::string(name) + " has the wrong length."));
-    };
     const std::size_t leaves = nodes - interior;
     const std::pair<bool, const char*> checks[] = {
         {g.positions.size() == nodes, "positions"},
@@ -520,7 +461,7 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {g.texels.empty() == g.texture.empty(), "texels"},
         {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
     for (const auto& [holds, name] : checks)
-        if (const auto r = expect(holds, name); !r) return r;
+        if (!holds) return fail("Section " + std::string(name) + " has the wrong length.");
     if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
     return {};
 }
@@ -553,13 +494,7 @@ Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
     if (const auto r = read_section("facts", facts); !r) return r.error();
     if (const auto r = read_section("ranges", ranges); !r) return r.error();
     if (facts.size() != 1) return fail("Section facts has the wrong length.");
-    Facts& f = facts[0];
-    if constexpr (std::endian::native == std::endian::big) {
-        swap_components(reinterpret_cast<std::byte*>(f.origin), sizeof f.origin, 8);
-        swap_components(reinterpret_cast<std::byte*>(f.bounding_sphere), 40, 4);
-        swap_components(reinterpret_cast<std::byte*>(&f.dropped_triangles), 8, 8);
-        swap_components(reinterpret_cast<std::byte*>(&f.closedness), 8, 4);
-    }
+    const Facts& f = facts[0];
     if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
     if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward))
         return fail("Section facts is malformed.");
@@ -581,7 +516,7 @@ Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
 
 Result<VertexTree> Reader::read() {
     if (const auto r = read_table(); !r) return r.error();
-    if (mode_ == OpenMode::map) {
+    if (maps_) {
         auto mapping = MappedFile::open(file_);
         if (!mapping) return mapping.error();
         mapping_ = std::move(*mapping);
@@ -606,10 +541,9 @@ Result<VertexTree> Reader::read() {
     if (const auto r = check_ranges(g); !r) return r.error();
     if (const auto r = read_attributes(g.first_leaf.size(), g.parents.size(), data->attributes); !r) return r.error();
     l.textured = !g.texture.empty();
-    if (mode_ == OpenMode::map) {
+    if (maps_) {
         data->checks = std::make_shared<NodeChecks>(g, l);
-        const char* fault = fault_in_root(g);
-        if (fault) return fail(std::string("Node 0 ") + fault);
+        if (const char* fault = fault_in_root(g)) return fail(std::string("Node 0 ") + fault);
         if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
     } else {
         if (const auto r = check_structure(g); !r) return r.error();
@@ -639,13 +573,7 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
         if (is_of_texture(name) && !l.textured) return;
         writer.add(name, std::span<const T>(values), component_bytes<T>());
     });
-    Facts facts = facts_of(g, l);
-    if constexpr (std::endian::native == std::endian::big) {
-        swap_components(reinterpret_cast<std::byte*>(facts.origin), sizeof facts.origin, 8);
-        swap_components(reinterpret_cast<std::byte*>(facts.bounding_sphere), 40, 4);
-        swap_components(reinterpret_cast<std::byte*>(&facts.dropped_triangles), 8, 8);
-        swap_components(reinterpret_cast<std::byte*>(&facts.closedness), 8, 4);
-    }
+    const Facts facts = facts_of(g, l);
     const std::vector<std::byte> ranges = pack_ranges(g.ranges);
     writer.add("facts", std::span<const Facts>(&facts, 1), 1);
     writer.add("ranges", std::span<const std::byte>(ranges), 1);
@@ -654,14 +582,10 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
 }
 
 Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& progress) {
-    return Reader(file, OpenMode::read, progress).read();
+    return Reader(file, false, progress).read();
 }
 
-Result<VertexTree> map_tree(const std::filesystem::path& file) {
-    // Mapped bytes stand as they are: hosts of the other byte order read the file.
-    constexpr OpenMode mode = std::endian::native == std::endian::little ? OpenMode::map : OpenMode::read;
-    return Reader(file, mode, {}).read();
-}
+Result<VertexTree> map_tree(const std::filesystem::path& file) { return Reader(file, true, {}).read(); }
 
 bool is_tree_file(const std::filesystem::path& file) {
     std::error_code error;

@@ -66,7 +66,6 @@ struct StudyAnswer {
 
     // `which`: whether it names the other picture. `differ`: whether it is right about the pictures differing.
     bool is_right(const Study& study) const;
-    bool says_seen(const Study& study) const; // `which`: as is_right()
 };
 
 // A subject's answers as CSV, one a line: subject, trial, condition, original, other, training, task, predicted, side,

@@ -6,6 +6,7 @@
 
 #include <unseen/calibration/procedure.h>
 #include <unseen/perception/csf.h>
+#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::calibration {
 
@@ -25,8 +26,6 @@ namespace unseen::calibration {
 // for each place. Cost of set_own(): places^2; of a prediction: places^3.
 class SensitivityField {
 public:
-    using Belief = calibration::Belief; // of log10 sensitivity
-
     // `expected` gives the mean at `luminance`.
     SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected,
                      perception::Luminance luminance);
@@ -56,10 +55,10 @@ public:
     };
 
 private:
-    double log10_expected(const GratingPlace& at) const;
     Site site(const GratingPlace& at) const;
     void update();
-    void change_factor(std::size_t i, double more_precision, double more_shift);
+    // The posterior of a quantity of mean 0, by its covariances with the places' deviations.
+    Belief predict(double variance, const FunctionRef<double(const Site&)>& covariance_with) const;
 
     perception::CsfTable table_;
     perception::Luminance luminance_;
