@@ -1,15 +1,9 @@
 // unseen-bench accuracy, on a mesh so small that the figures mean little: every axis is there, with its default.
 #include "run_bench.h"
 
-#include <algorithm>
-#include <filesystem>
-#include <set>
-
 namespace accuracy_bench_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class AccuracyBenchTest : public BenchTest {
 protected:

@@ -1,13 +1,6 @@
 // What a picture hides folds, and nobody sees it: by drawings of scenes whose parts lie behind others.
 #include <unseen/session_gpu/as_seen.h>
 
-#include <cmath>
-#include <limits>
-#include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/depth.h>
 #include <unseen/render/renderer.h>
@@ -15,11 +8,11 @@
 #include "built.h"
 #include "measured.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::session::as_seen_test {
 namespace {
 
-using ::testing::HasSubstr;
 using vdtree::Mesh;
 using vdtree::VertexTree;
 
@@ -64,10 +57,8 @@ TEST_F(AsSeen, FoldsWhatIsBehindAndShowsTheSame) {
     for (const glm::dvec3 direction : {glm::dvec3(0, 0, 1), glm::dvec3(-0.3, 0.2, 1), glm::dvec3(1, 0.1, 0.3)}) {
         const vdtree::View view = view_of(session, direction);
         const Request request{.purpose = Purpose::picture};
-        const auto usual = session.simplify(view, request);
-        ASSERT_TRUE(usual) << usual.error().message;
-        const auto as_seen = simplify_as_seen(session, context_, view, request);
-        ASSERT_TRUE(as_seen) << as_seen.error().message;
+        const auto usual = require(session.simplify(view, request));
+        const auto as_seen = require(simplify_as_seen(session, context_, view, request));
         if (direction.x <= 0) {
             EXPECT_LT(as_seen->stats.triangles, 0.9 * usual->stats.triangles);
         } else {
@@ -75,9 +66,8 @@ TEST_F(AsSeen, FoldsWhatIsBehindAndShowsTheSame) {
         }
         vdtree::Cut whole(session.tree());
         whole.unfold_all();
-        const auto judged = perception::judge_modern(picture_of(context_, session, whole, view),
-                                                     picture_of(context_, session, as_seen->cuts[0], view), {});
-        ASSERT_TRUE(judged);
+        const auto judged = require(perception::judge_modern(
+            picture_of(context_, session, whole, view), picture_of(context_, session, as_seen->cuts[0], view), {}));
         EXPECT_EQ(judged->visible_pixels, 0u) << judged->max_ratio;
     }
 }
@@ -93,8 +83,7 @@ TEST_F(AsSeen, DepthsAreThoseOfTheFarthestSample) {
     render::GpuCut cut(*render::GpuTree::create(context_, tree));
     ASSERT_TRUE(cut.follow(whole));
     const render::Item item{cut, {}};
-    const auto depth = render::farthest_depth(context_, {&item, 1}, view);
-    ASSERT_TRUE(depth) << depth.error().message;
+    const auto depth = require(render::farthest_depth(context_, {&item, 1}, view));
     const double focal = 32 / std::tan(view.fov_y_degrees * std::acos(-1.0) / 360);
     int on_ball = 0;
     for (int y = 0; y < 64; ++y)

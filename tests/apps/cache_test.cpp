@@ -376,8 +376,7 @@ TEST_F(CacheTest, AProgramChoosesTheFolderOrNone) {
 }
 
 TEST_F(CacheTest, MeasuringTellsItsProgress) {
-    const auto tree = session::load_tree(path("ball.obj"), {.measures = false, .cache = {.is_off = true}});
-    ASSERT_TRUE(tree);
+    const auto tree = require(session::load_tree(path("ball.obj"), {.measures = false, .cache = {.is_off = true}}));
     std::vector<double> shares;
     const auto note = [&](double share, const char*) { return shares.push_back(share), true; };
     ASSERT_TRUE(session::measured(*tree, 2, note));

@@ -90,8 +90,7 @@ TEST_F(CalibrateWindowTest, AdjustmentShowsAGratingAndTakesTheContrast) {
     EXPECT_LT(given[1][1], -1);
 
     // A patch of 2 cpd in the middle: about 17.45 pixels a degree, so 8.7 a cycle, and grey at the edge.
-    const auto picture = unseen::perception::read_image(path("s.png"));
-    ASSERT_TRUE(picture) << picture.error().message;
+    const auto picture = require(unseen::perception::read_image(path("s.png")));
     ASSERT_EQ(picture->image.width, 360);
     ASSERT_EQ(picture->image.height, 240);
     const int y = 240 / 2 + 12; // beside the cross

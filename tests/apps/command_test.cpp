@@ -1,19 +1,10 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
-#include <chrono>
-#include <map>
 
 #include "run_command.h"
 
 namespace command_test {
 
 using namespace unseen::app::testing;
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::Ge;
-using ::testing::HasSubstr;
-using ::testing::Le;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 class UsageTest : public CommandTest {};
 class BuildTest : public CommandTest {};

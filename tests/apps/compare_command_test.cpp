@@ -22,8 +22,7 @@ protected:
         return image;
     }
     void write(const std::string& name, const Image& image) const {
-        const auto written = unseen::perception::write_image(path(name), image);
-        ASSERT_TRUE(written) << written.error().message;
+        const auto written = require(unseen::perception::write_image(path(name), image));
     }
     Json compare(std::vector<std::string> words) const {
         words.insert(words.begin(), "compare");
@@ -158,16 +157,14 @@ TEST_F(CompareTest, WritesMaps) {
     write("b.pfm", disc(40, 20));
     for (const std::string model : {"modern", "second", "rpg99"}) {
         compare({"a.pfm", "b.pfm", "--model", model, "--map", "map.png", "--threshold-map", "t.pfm"});
-        const auto map = unseen::perception::read_image(path("map.png"));
-        ASSERT_TRUE(map) << map.error().message;
+        const auto map = require(unseen::perception::read_image(path("map.png")));
         EXPECT_GE(map->image.width, 128);
         EXPECT_GT(map->image.height, 128 + 20) << "a scale below";
         EXPECT_EQ(map->image.channels, 3);
         // Red or yellow in the disc's rim, where the difference is seen; blue or black in the far corner.
         const Image& image = map->image;
         EXPECT_GT(image.at(64 + 33, 64, 0), image.at(64 + 33, 64, 2)) << model;
-        const auto thresholds = unseen::perception::read_image(path("t.pfm"));
-        ASSERT_TRUE(thresholds) << thresholds.error().message;
+        const auto thresholds = require(unseen::perception::read_image(path("t.pfm")));
         EXPECT_TRUE(thresholds->is_absolute);
         for (const float threshold : thresholds->image.values) ASSERT_GT(threshold, 0.0f) << model;
         fs::remove(path("map.png"));

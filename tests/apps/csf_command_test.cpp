@@ -238,8 +238,7 @@ TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
 
 TEST_F(CsfCommandTest, PlotsCurves) {
     ASSERT_EQ(run({"csf", "--plot", "csf.png"}).status, 0);
-    const auto plot = unseen::perception::read_image(path("csf.png"));
-    ASSERT_TRUE(plot) << plot.error().message;
+    const auto plot = require(unseen::perception::read_image(path("csf.png")));
     EXPECT_GE(plot->image.width, 600);
     std::size_t coloured = 0; // curves are, axes and text are not
     for (std::size_t i = 0; i + 2 < plot->image.values.size(); i += 3)

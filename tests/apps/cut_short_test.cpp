@@ -1,7 +1,5 @@
 // Builds and trees that are cut short: by a full disk, a kill, or somebody who truncates or overwrites a mapped tree.
 #include <csignal>
-#include <fstream>
-#include <vector>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>
@@ -12,9 +10,6 @@
 namespace cut_short_test {
 
 using namespace unseen::app::testing;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::UnorderedElementsAre;
 
 class CutShortTest : public CommandTest {
 protected:
@@ -27,8 +22,7 @@ protected:
 
 // Trees of 256 MiB and more are mapped.
 TEST_F(CutShortTest, ATreeCutShortOrOverwrittenWhileItIsDrawnIsAnError) {
-    const auto tree = unseen::vdtree::build_tree(unseen::shapes::bumpy_sphere(4).view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(unseen::vdtree::build_tree(unseen::shapes::bumpy_sphere(4).view()));
     constexpr std::size_t ballast = (std::size_t{256} << 20) / sizeof(float);
     const auto heavy =
         tree->with_attribute("ballast", unseen::vdtree::AttributeDomain::tree, std::vector<float>(ballast, 1.0f));

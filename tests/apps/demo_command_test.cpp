@@ -1,5 +1,4 @@
 // unseen demo: without a file, with a display and without one.
-#include <utility>
 
 #include "run_command.h"
 #include "virtual_display.h"
@@ -7,7 +6,6 @@
 namespace demo_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
 
 class DemoCommandTest : public CommandTest {
 protected:

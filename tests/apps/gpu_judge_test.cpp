@@ -2,16 +2,6 @@
 // beside, of all shapes and luminances; and refuses what that one refuses.
 #include <unseen/session_gpu/gpu_judge.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/renderer.h>
@@ -31,7 +21,6 @@ using perception::JudgeOptions;
 using session::GpuJudge;
 using support::flat;
 using support::noise;
-using ::testing::HasSubstr;
 using GpuJudgeTest = render::testing::GlTest;
 
 // Of all pixels but one in a thousand.
@@ -88,10 +77,8 @@ void expect_alike(const render::Context& context, const Pair& pair, const JudgeO
     ASSERT_TRUE(cpu && cpu_map) << pair.name;
     const std::string what = pair.name + " of " + std::to_string(pair.reference.width) + "x" +
                              std::to_string(pair.reference.height) + (options.gaze_px ? " aside" : "");
-    auto gpu = GpuJudge::create(context, pair.reference, options);
-    ASSERT_TRUE(gpu) << what << ": " << gpu.error().message;
-    const auto judged = gpu->judge(pair.test);
-    ASSERT_TRUE(judged) << what << ": " << judged.error().message;
+    auto gpu = require(GpuJudge::create(context, pair.reference, options));
+    const auto judged = require(gpu->judge(pair.test));
     const auto& v = judged->visibility.values;
     EXPECT_LE(error_of(v, cpu->visibility.values, full_floor), full_tolerance) << what;
     // Summed up as they are in the map.
@@ -100,8 +87,7 @@ void expect_alike(const render::Context& context, const Pair& pair, const JudgeO
     EXPECT_EQ(judged->visible_pixels,
               static_cast<std::uint64_t>(std::count_if(v.begin(), v.end(), [](float x) { return !(x < 1); })))
         << what;
-    const auto map = gpu->threshold_map();
-    ASSERT_TRUE(map) << what << ": " << map.error().message;
+    const auto map = require(gpu->threshold_map());
     EXPECT_LE(error_of(map->values, cpu_map->values, 0), full_tolerance) << what;
     EXPECT_EQ(context.take_errors(), "") << what;
 }
@@ -155,8 +141,7 @@ TEST_F(GpuJudgeTest, JudgesForOtherObserversAndDisplays) {
 
 TEST_F(GpuJudgeTest, JudgesRenderedPictures) {
     const auto tree = support::built(shapes::bumpy_sphere(4));
-    auto renderer = render::Renderer::create(context(), tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(context(), tree));
     vdtree::View view;
     view.width = view.height = 300;
     view = vdtree::frame_sphere(tree.origin(), 1.1, {0.3, 0.2, 1}, 0.8, view);
@@ -195,16 +180,13 @@ TEST_F(GpuJudgeTest, JudgesTexturesAsTheyLie) {
     auto texture_a = up_a->texture(), texture_b = up_b->texture();
     texture_a.scale = texture_b.scale = scale;
     texture_a.offset = texture_b.offset = black;
-    auto judge = GpuJudge::create(context(), texture_a, {});
-    ASSERT_TRUE(judge) << judge.error().message;
-    const auto summary = judge->judge(texture_b);
-    ASSERT_TRUE(summary) << summary.error().message;
+    auto judge = require(GpuJudge::create(context(), texture_a, {}));
+    const auto summary = require(judge->judge(texture_b));
     const auto in_cdm2 = [&](Image image) {
         for (float& v : image.values) v = v * scale + black;
         return image;
     };
-    const auto cpu = perception::judge_modern(in_cdm2(a), in_cdm2(b), {});
-    ASSERT_TRUE(cpu);
+    const auto cpu = require(perception::judge_modern(in_cdm2(a), in_cdm2(b), {}));
     EXPECT_NEAR(summary->largest / cpu->max_ratio, 1, full_tolerance);
     EXPECT_EQ(judge->judge(texture_a)->largest, 0);
 }
@@ -212,18 +194,14 @@ TEST_F(GpuJudgeTest, JudgesTexturesAsTheyLie) {
 TEST_F(GpuJudgeTest, SeesNothingInEqualPicturesAndTheSameInTheSame) {
     const Image a = noise(203, 150, 20, 0.9, 1), b = noise(203, 150, 20, 0.9, 2);
     for (const JudgeOptions& options : {JudgeOptions{}, looking_aside(203)}) {
-        auto judge = GpuJudge::create(context(), a, options);
-        ASSERT_TRUE(judge) << judge.error().message;
-        const auto first = judge->judge(b);
-        ASSERT_TRUE(first);
+        auto judge = require(GpuJudge::create(context(), a, options));
+        const auto first = require(judge->judge(b));
         EXPECT_GT(first->visible_pixels, 0U);
-        const auto nothing = judge->judge(a);
-        ASSERT_TRUE(nothing);
+        const auto nothing = require(judge->judge(a));
         EXPECT_EQ(nothing->max_ratio, 0);
         EXPECT_EQ(nothing->visible_pixels, 0U);
         EXPECT_THAT(nothing->visibility.values, ::testing::Each(0.F));
-        auto other = GpuJudge::create(context(), a, options);
-        ASSERT_TRUE(other);
+        auto other = require(GpuJudge::create(context(), a, options));
         EXPECT_EQ(judge->judge(b)->visibility.values, first->visibility.values);
         EXPECT_EQ(other->judge(b)->visibility.values, first->visibility.values);
     }
@@ -241,12 +219,9 @@ TEST_F(GpuJudgeTest, StaysFiniteInTheDarkAndInTheSun) {
                 for (int x = 0; x < 66; x += 2) b.at(x, y) = dots;
             for (const JudgeOptions& options : {JudgeOptions{}, looking_aside(66), steep, behind})
                 for (const auto& [reference, test] : {std::pair(a, b), std::pair(b, a)}) {
-                    auto judge = GpuJudge::create(context(), reference, options);
-                    ASSERT_TRUE(judge) << judge.error().message;
-                    const auto judged = judge->judge(test);
-                    ASSERT_TRUE(judged) << judged.error().message;
-                    const auto map = judge->threshold_map();
-                    ASSERT_TRUE(map) << map.error().message;
+                    auto judge = require(GpuJudge::create(context(), reference, options));
+                    const auto judged = require(judge->judge(test));
+                    const auto map = require(judge->threshold_map());
                     const auto is_sound = [](float v) { return v >= 0 && std::isfinite(v); };
                     EXPECT_TRUE(std::isfinite(judged->max_ratio));
                     EXPECT_TRUE(
@@ -270,11 +245,9 @@ TEST_F(GpuJudgeTest, ThresholdsOfFlatFieldsAreTheClosedForm) {
     constexpr double base_band = 0.02; // which may know a better frequency
     const double ppd = perception::pixels_per_degree(perception::Display{}).value();
     for (const double luminance : {0.7, 21.0, 95.0}) {
-        auto judge = GpuJudge::create(context(), flat(1024, 1024, static_cast<float>(luminance)),
-                                      {.gain = perception::median_person.gain});
-        ASSERT_TRUE(judge) << judge.error().message;
-        const auto map = judge->threshold_map();
-        ASSERT_TRUE(map) << map.error().message;
+        auto judge = require(GpuJudge::create(context(), flat(1024, 1024, static_cast<float>(luminance)),
+                                              {.gain = perception::median_person.gain}));
+        const auto map = require(judge->threshold_map());
         double best = 0;
         for (int k = 0; k < 8; ++k) {
             perception::Stimulus s;
@@ -291,8 +264,7 @@ TEST_F(GpuJudgeTest, ThresholdsOfFlatFieldsAreTheClosedForm) {
 
 TEST_F(GpuJudgeTest, RefusesWhatTheCpuRefuses) {
     const Image good = flat(8, 9, 1);
-    auto judge = GpuJudge::create(context(), good, {});
-    ASSERT_TRUE(judge) << judge.error().message;
+    auto judge = require(GpuJudge::create(context(), good, {}));
     for (const float value : {-1.0F, -std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::quiet_NaN(),
                               std::numeric_limits<float>::infinity()}) {
         Image bad = good;
@@ -332,13 +304,11 @@ TEST_F(GpuJudgeTest, RefusesWhatTheCpuRefuses) {
 }
 
 TEST_F(GpuJudgeTest, KnowsNoEccentricityWithoutAGaze) {
-    const auto none = perception::judge_tables(640, 480, 1, 100, {});
-    ASSERT_TRUE(none);
+    const auto none = require(perception::judge_tables(640, 480, 1, 100, {}));
     EXPECT_FALSE(none->gaze);
     EXPECT_EQ(none->eccentricities, 1);
     for (const auto& band : none->bands) EXPECT_EQ(band.nodes.size(), static_cast<std::size_t>(none->luminances));
-    const auto aside = perception::judge_tables(640, 480, 1, 100, looking_aside(640));
-    ASSERT_TRUE(aside);
+    const auto aside = require(perception::judge_tables(640, 480, 1, 100, looking_aside(640)));
     EXPECT_TRUE(aside->gaze);
     EXPECT_GT(aside->eccentricities, 5);
     for (const auto& [low, high] :

@@ -1,18 +1,6 @@
 // Meshes made to be hard, under the oracle's eyes.
 #include <hard_mesh.h>
 
-#include <algorithm>
-#include <cmath>
-#include <memory>
-#include <optional>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/internal/cut_rings.h>
@@ -198,10 +186,8 @@ TEST(LitFolds, AreUnseenUnderLightsThatStandStill) {
                                    .distance = 3 * radius,
                                    .inner_cosine = std::cos(0.15),
                                    .outer_cosine = std::cos(0.25)});
-        const auto folds = perception::LitFolds::measure(tree);
-        ASSERT_TRUE(folds) << folds.error().message;
-        const auto lit = folds->under(tree, lighting);
-        ASSERT_TRUE(lit) << lit.error().message;
+        const auto folds = require(perception::LitFolds::measure(tree));
+        const auto lit = require(folds->under(tree, lighting));
         Seen seen(std::move(tree), lighting);
         const Direction directions[] = {{{0, 0, 1}, 0.5}, {{0.6, 0.5, 0.6}, 0.5}};
         seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {

@@ -2,16 +2,11 @@
 // nothing is left behind, and memory is bounded by what a file can justify.
 #include <sys/stat.h>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "run_command.h"
 
 namespace unseen::app::testing {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using Words = std::vector<std::string>;
 
 class HostileFilesTest : public CommandTest {

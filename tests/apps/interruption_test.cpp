@@ -1,16 +1,13 @@
 // What ends a program while it works.
 #include "interruption.h"
 
-#include <filesystem>
-#include <fstream>
-
-#include <gtest/gtest.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace interruption_test {
 
@@ -30,8 +27,7 @@ void read_what_was_cut(const std::filesystem::path& file, const std::filesystem:
 
 TEST(LostPagesDeathTest, AreSaidAndLeaveNothingBehind) {
     const support::TempFolder folder;
-    const auto tree = vdtree::build_tree(shapes::bumpy_sphere(4).view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(vdtree::build_tree(shapes::bumpy_sphere(4).view()));
     const std::filesystem::path file = folder / "gr\x1b.vdt";
     ASSERT_TRUE(vdtree::write_tree(file, *tree));
     GTEST_FLAG_SET(death_test_style, "threadsafe");

@@ -1,14 +1,11 @@
 // unseen levels: discrete levels of detail as a user asks for them.
 #include "run_command.h"
 
-#include <numeric>
-
 #include "temp_folder.h"
 
 namespace level_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
 
 constexpr int width = 80, height = 60; // pixels
 
@@ -61,8 +58,7 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
         EXPECT_EQ(test["decision"], "keep");
         EXPECT_GE(test["p_pass"], 0);
     }
-    const auto picture = unseen::perception::read_image(path("still.png"));
-    ASSERT_TRUE(picture);
+    const auto picture = require(unseen::perception::read_image(path("still.png")));
     EXPECT_EQ(picture->image.width, width);
     // Luminance for judging, and a summary for people.
     const Outcome judged = render({"--method", "perceptual", "--maps", "rpg99", "-o", "still.pfm"});
@@ -120,8 +116,7 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
         const char* shadows = show == "layers" ? "--shadows" : "--no-shadows"; // with a lamp's, seconds each
         const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, shadows});
         ASSERT_EQ(drawn.status, 0) << drawn.err;
-        const auto picture = unseen::perception::read_image(path(show + ".png"));
-        ASSERT_TRUE(picture);
+        const auto picture = require(unseen::perception::read_image(path(show + ".png")));
         const int panels = show == "levels" ? 1 : show == "layers" ? 6 : 5;
         EXPECT_GE(picture->image.width, panels * width + (panels - 1) * 4) << show;
     }
@@ -158,8 +153,7 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
         if (first.empty()) first = picture;
         EXPECT_EQ(picture, first) << method;
     }
-    const auto picture = unseen::perception::read_image(path("area.pfm"));
-    ASSERT_TRUE(picture);
+    const auto picture = require(unseen::perception::read_image(path("area.pfm")));
     const auto [least, most] = std::ranges::minmax(picture->image.values);
     EXPECT_GT(most, 2 * least) << "there are walls";
     for (const std::string show : {"layers", "combinations", "maps", "levels"})

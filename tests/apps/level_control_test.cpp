@@ -1,16 +1,6 @@
 // Levels of detail by what the rest of a picture masks: in scenes made for it. For museums see museum_test.cpp.
 #include <unseen/session_gpu/level_control.h>
 
-#include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include <unseen/calibration/light_rig.h>
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/layers.h>
@@ -27,8 +17,6 @@ namespace level_control_test {
 
 using namespace unseen;
 using namespace unseen::session;
-using ::testing::Each;
-using ::testing::HasSubstr;
 using LevelControlTest = render::testing::GlTest;
 
 const vdtree::VertexTree& body() {
@@ -65,13 +53,11 @@ perception::JudgeOptions judging(const Session& session) {
 // The loop of a program that shows frames and never waits: what the GPU counts decides all the same.
 TEST_F(LevelControlTest, ChangesLevelsWithoutBeingWaitedFor) {
     Session session = bodies(row);
-    auto control = LevelControl::create(context(), session, ahead(128));
-    ASSERT_TRUE(control) << control.error().message;
+    auto control = require(LevelControl::create(context(), session, ahead(128)));
     int changed = 0;
     const auto start = std::chrono::steady_clock::now();
     while (changed == 0 && std::chrono::steady_clock::now() - start < std::chrono::seconds(20)) {
-        const auto frame = control->draw(ahead(128));
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto frame = require(control->draw(ahead(128)));
         changed += frame->changed;
     }
     EXPECT_GT(changed, 0);
@@ -100,8 +86,7 @@ TEST_F(LevelControlTest, OutlivesItsSession) {
 
 TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
     Session session = bodies({{0, 0, -3}});
-    const auto chain = level_chain(session, ahead(256), {});
-    ASSERT_TRUE(chain) << chain.error().message;
+    const auto chain = require(level_chain(session, ahead(256), {}));
     ASSERT_EQ(chain->size(), 6);
     EXPECT_EQ(chain->triangles(0), body().triangle_count());
     EXPECT_EQ(chain->unseen_from(0), 0);
@@ -136,10 +121,8 @@ TEST_F(LevelControlTest, LevelsAreEven) {
     window.width = window.height = 400;
     window.fov_y_degrees = 15;
     ASSERT_TRUE(session.prepare(session.default_view(), {}));
-    const auto recipe = session.recipe(session.default_view(), {});
-    ASSERT_TRUE(recipe);
-    auto renderer = render::Renderer::create(context(), session.tree());
-    ASSERT_TRUE(renderer);
+    const auto recipe = require(session.recipe(session.default_view(), {}));
+    auto renderer = require(render::Renderer::create(context(), session.tree()));
     const auto spread = [&](const LevelChain& chain, glm::dvec3 direction) {
         std::vector<perception::Image> pictures;
         for (int level = 0; level < chain.size(); ++level) {
@@ -178,24 +161,21 @@ TEST_F(LevelControlTest, LevelsAreEven) {
 TEST_F(LevelControlTest, AStillPictureSettlesAndStays) {
     Session session = bodies(row);
     for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99}) {
-        auto control = LevelControl::create(context(), session, ahead(128), {.maps = maps});
-        ASSERT_TRUE(control) << control.error().message;
+        auto control = require(LevelControl::create(context(), session, ahead(128), {.maps = maps}));
         EXPECT_FALSE(control->is_settled());
         int frames = 0;
         for (; frames < 300 && !control->is_settled(); ++frames) ASSERT_TRUE(control->draw(ahead(128)));
         ASSERT_LT(frames, 300) << "it does not settle";
         const std::vector<int> levels = control->draw(ahead(128))->levels;
         for (int i = 0; i < 60; ++i) {
-            const auto frame = control->draw(ahead(128));
-            ASSERT_TRUE(frame);
+            const auto frame = require(control->draw(ahead(128)));
             ASSERT_EQ(frame->levels, levels) << i << " frames after it was settled in " << frames;
         }
         // Near ones are finer than far ones, and there are both.
         EXPECT_LT(levels.front(), levels.back());
         // Waiting or not, it settles alike.
         auto other = LevelControl::create(context(), session, ahead(128), {.maps = maps});
-        const auto settled = other->settle(ahead(128));
-        ASSERT_TRUE(settled) << settled.error().message;
+        const auto settled = require(other->settle(ahead(128)));
         EXPECT_TRUE(other->is_settled());
         for (std::size_t i = 0; i < levels.size(); ++i) EXPECT_LE(std::abs(settled->levels[i] - levels[i]), 1) << i;
         for (const LevelTest& test : settled->tests) EXPECT_NE(test.level, test.compared_with);
@@ -207,11 +187,9 @@ TEST_F(LevelControlTest, AStillPictureSettlesAndStays) {
 
 TEST_F(LevelControlTest, CountsDecideALaterFrame) {
     Session session = bodies({{0, 0, -4}, {3, 0, -9}});
-    auto control = LevelControl::create(context(), session, ahead(128));
-    ASSERT_TRUE(control);
+    auto control = require(LevelControl::create(context(), session, ahead(128)));
     const int worst = control->chain(0).size() - 1;
-    const auto first = control->draw(ahead(128));
-    ASSERT_TRUE(first) << first.error().message;
+    const auto first = require(control->draw(ahead(128)));
     EXPECT_THAT(first->levels, Each(worst)) << "it begins with the worst";
     EXPECT_THAT(first->tested_with, Each(0)) << "and asks for the best";
     EXPECT_TRUE(first->tests.empty());
@@ -265,8 +243,7 @@ TEST_F(LevelControlTest, FartherLayersAreTestedLessOftenAndAgainstLess) {
         for (const glm::dvec3& at : row) all.push_back(at);
         return all;
     }();
-    const auto split = render::split_into_layers(centres, ahead(128));
-    ASSERT_TRUE(split);
+    const auto split = require(render::split_into_layers(centres, ahead(128)));
     ASSERT_EQ(split->count, 5);
     std::vector<int> tested(row.size(), 0);
     constexpr int frames = 240; // of which 60, 30, 20, 15, 12 are a layer's
@@ -295,8 +272,7 @@ TEST_F(LevelControlTest, AChangeFades) {
         return std::uint64_t{control->chain(0).triangles(levels[0])} + control->chain(1).triangles(levels[1]);
     };
     for (int i = 0; i < 3; ++i) {
-        const auto frame = control->draw(ahead(128));
-        ASSERT_TRUE(frame);
+        const auto frame = require(control->draw(ahead(128)));
         EXPECT_EQ(frame->changed, i == 0 ? 2 : 0);
         EXPECT_GT(frame->triangles, sum(frame->levels)) << "both levels are drawn";
         EXPECT_THAT(frame->tested_with, Each(-1)) << "what fades is not tested";
@@ -315,11 +291,10 @@ TEST_F(LevelControlTest, MapsAreThoseOfTheCpu) {
     Session session = bodies(row);
     for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99})
         for (const int block : {1, 2}) {
-            auto control = LevelControl::create(context(), session, ahead(127), {.maps = maps, .map_block = block});
-            ASSERT_TRUE(control) << control.error().message;
+            auto control =
+                require(LevelControl::create(context(), session, ahead(127), {.maps = maps, .map_block = block}));
             ASSERT_TRUE(control->draw(ahead(127)));
-            const auto map = control->thresholds(1);
-            ASSERT_TRUE(map) << map.error().message;
+            const auto map = require(control->thresholds(1));
             ASSERT_EQ(control->map_width(), block == 1 ? 127 : 64);
             const auto relative = render::read_luminance(control->layers().combination());
             perception::Image picture{control->map_width(), control->map_height(), 1, *relative};
@@ -347,10 +322,9 @@ TEST_F(LevelControlTest, OtherMethodsGoByDistanceAndByArea) {
     for (const LevelMethod method : {LevelMethod::distance, LevelMethod::area}) {
         std::uint64_t before = ~0ull;
         for (const double bias : {1e6, 10.0, 0.3, 1e-2, 1e-6}) {
-            auto control = LevelControl::create(context(), session, ahead(128), {.method = method, .bias = bias});
-            ASSERT_TRUE(control) << control.error().message;
-            const auto frame = control->draw(ahead(128));
-            ASSERT_TRUE(frame) << frame.error().message;
+            auto control =
+                require(LevelControl::create(context(), session, ahead(128), {.method = method, .bias = bias}));
+            const auto frame = require(control->draw(ahead(128)));
             EXPECT_EQ(frame->surface_passes, 1);
             EXPECT_EQ(frame->full_screen_passes, 0);
             // Above 1 is finer: by distance the bias stretches how far a level is unseen from.
@@ -365,8 +339,7 @@ TEST_F(LevelControlTest, OtherMethodsGoByDistanceAndByArea) {
 TEST_F(LevelControlTest, TakesWhatComes) {
     Session session = bodies({{0, 0, -4}, {0, 0, 30}, {1, 1, -7}});
     auto control = LevelControl::create(context(), session, ahead(64));
-    const auto frame = control->draw(ahead(64));
-    ASSERT_TRUE(frame);
+    const auto frame = require(control->draw(ahead(64)));
     EXPECT_EQ(frame->levels[1], -1) << "behind the eye";
     // Another size, and a view of nothing.
     const auto wide = [] {
@@ -378,8 +351,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_EQ(control->picture().width(), 81);
     vdtree::View aside = ahead(64);
     aside.target = {0, 1, 0}, aside.up = {1, 0, 0};
-    const auto nothing = control->draw(aside);
-    ASSERT_TRUE(nothing) << nothing.error().message;
+    const auto nothing = require(control->draw(aside));
     EXPECT_THAT(nothing->levels, Each(-1));
     EXPECT_EQ(nothing->triangles, 0u);
     EXPECT_TRUE(control->is_settled());
@@ -417,8 +389,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
 TEST_F(LevelControlTest, OutlivesTheHandleOfItsContext) {
     Session session = bodies({{0, 0, -4}, {1, 1, -7}});
     auto own = std::optional(*render::Context::headless());
-    auto control = LevelControl::create(*own, session, ahead(64));
-    ASSERT_TRUE(control);
+    auto control = require(LevelControl::create(*own, session, ahead(64)));
     own.reset();
     EXPECT_TRUE(context().make_current());
     EXPECT_TRUE(control->settle(ahead(64)));
@@ -478,17 +449,15 @@ TEST_F(LevelControlTest, OnlyWhatOthersShadeHasMasks) {
 // What is out of the window casts shadows into it, and a picture has those of SceneRenderer.
 TEST_F(LevelControlTest, PicturesHaveTheScenesShadows) {
     Session session = sunlit({{0, 0, -6}, {4, 0, -2}}, {1, 0, 1}, true);
-    auto control = LevelControl::create(context(), session, ahead(96), {.method = LevelMethod::distance, .bias = 1e-6});
-    ASSERT_TRUE(control) << control.error().message;
-    const auto frame = control->draw(ahead(96));
-    ASSERT_TRUE(frame) << frame.error().message;
+    auto control =
+        require(LevelControl::create(context(), session, ahead(96), {.method = LevelMethod::distance, .bias = 1e-6}));
+    const auto frame = require(control->draw(ahead(96)));
     ASSERT_EQ(frame->levels[1], -1);
     std::vector<vdtree::Cut> cuts;
     for (std::size_t i = 0; i < 2; ++i)
         cuts.push_back(control->chain(i).cut(i == 0 ? frame->levels[0] : control->chain(1).size() - 1));
     auto renderer = SceneRenderer::create(context(), session);
-    const auto items = renderer->items(drawn_cuts(cuts), ahead(96));
-    ASSERT_TRUE(items) << items.error().message;
+    const auto items = require(renderer->items(drawn_cuts(cuts), ahead(96)));
     auto target = render::Target::create(context(), 96, 96);
     ASSERT_TRUE(
         render::draw(std::span(items->items).first(1),
@@ -503,11 +472,9 @@ TEST_F(LevelControlTest, PicturesHaveTheScenesShadows) {
 // A change of level fades under lights that cast shadows, and is tested again after it.
 TEST_F(LevelControlTest, LevelsFadeUnderShadows) {
     Session session = sunlit({{-1.5, 0, -6}, {2.5, 0, -10}}, {-4, 0, 4}, true);
-    auto control = LevelControl::create(context(), session, ahead(96), {.fade_frames = 2});
-    ASSERT_TRUE(control);
+    auto control = require(LevelControl::create(context(), session, ahead(96), {.fade_frames = 2}));
     for (int i = 0; i < 8; ++i) {
-        const auto frame = control->draw(ahead(96));
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto frame = require(control->draw(ahead(96)));
         ASSERT_TRUE(context().finish());
     }
 }

@@ -1,15 +1,6 @@
 // Pictures of objects alone, put together, against pictures of the whole scene; and selections for cameras of a scene.
 #include <unseen/session_gpu/precompute_selections.h>
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include <unseen/session/selection.h>
 
 #include "gl_test.h"
@@ -21,7 +12,6 @@ namespace level_pictures_test {
 
 using namespace unseen;
 using namespace unseen::session;
-using ::testing::HasSubstr;
 using LevelPicturesTest = render::testing::GlTest;
 using PrecomputeTest = render::testing::GlTest;
 
@@ -54,17 +44,14 @@ vdtree::View ahead() {
 
 TEST_F(LevelPicturesTest, PutTogetherAreThePictureOfAll) {
     Session session = bodies();
-    auto pictures = LevelPictures::create(context(), session);
-    ASSERT_TRUE(pictures) << pictures.error().message;
+    auto pictures = require(LevelPictures::create(context(), session));
     ASSERT_GE(pictures->chain(0).size(), 4);
-    const auto picture = pictures->draw(ahead(), SelectionQuality::ssim);
-    ASSERT_TRUE(picture) << picture.error().message;
+    const auto picture = require(pictures->draw(ahead(), SelectionQuality::ssim));
     ASSERT_EQ(picture->objects.size(), 3u) << "the others are behind";
     for (const std::vector<int>& levels : {std::vector<int>{0, 0, 0}, {3, 1, 2}, {0, 3, 3}, {2, 2, 2}}) {
         std::vector<int> of_all(5, -1);
         for (std::size_t i = 0; i < levels.size(); ++i) of_all[picture->objects[i].object] = levels[i];
-        const auto frame = pictures->draw_frame(ahead(), of_all);
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto frame = require(pictures->draw_frame(ahead(), of_all));
         const std::vector<float> together = put_together(*picture, levels);
         std::size_t different = 0, covered = 0;
         for (std::size_t i = 0; i < together.size(); ++i) {
@@ -85,8 +72,7 @@ TEST_F(PrecomputeTest, GoesOnWhereItWasStoppedAndEndsTheSame) {
     const support::TempFolder folder;
     Session session = bodies();
     PrecomputeOptions options{.budget = 40'000, .window_px = 48, .spacing = 4, .depth = 1};
-    const auto whole = precompute_selections(context(), session, folder / "whole.sel", options);
-    ASSERT_TRUE(whole) << whole.error().message;
+    const auto whole = require(precompute_selections(context(), session, folder / "whole.sel", options));
     EXPECT_GT(whole->cameras, 10u);
     EXPECT_EQ(whole->resumed, 0u);
     int calls = 0;
@@ -101,8 +87,7 @@ TEST_F(PrecomputeTest, GoesOnWhereItWasStoppedAndEndsTheSame) {
     EXPECT_FALSE(std::filesystem::exists(folder / "parts.sel"));
     options.progress = {};
     options.threads = 1;
-    const auto rest = precompute_selections(context(), session, folder / "parts.sel", options);
-    ASSERT_TRUE(rest) << rest.error().message;
+    const auto rest = require(precompute_selections(context(), session, folder / "parts.sel", options));
     EXPECT_EQ(rest->resumed, 4u);
     EXPECT_EQ(bytes_of(folder / "parts.sel"), bytes_of(folder / "whole.sel"));
     EXPECT_EQ(folder.file_count(), 2u) << "what was done until then is gone";
@@ -115,9 +100,8 @@ TEST_F(PrecomputeTest, PartsCellsWhereCornersDiffer) {
     ASSERT_TRUE(precompute_selections(context(), session, folder / "fine.sel", options));
     options.differ = 100;
     ASSERT_TRUE(precompute_selections(context(), session, folder / "coarse.sel", options));
-    const auto fine = read_selections(folder / "fine.sel"), coarse = read_selections(folder / "coarse.sel");
-    ASSERT_TRUE(fine) << fine.error().message;
-    ASSERT_TRUE(coarse) << coarse.error().message;
+    const auto fine = require(read_selections(folder / "fine.sel"));
+    const auto coarse = require(read_selections(folder / "coarse.sel"));
     EXPECT_GT(fine->corners.size(), coarse->corners.size());
     double area = 0, of_grid = 0;
     for (const SelectionCell& cell : fine->cells) area += std::pow(cell.size, 2);
@@ -130,18 +114,14 @@ TEST_F(PrecomputeTest, OfSpaceHasSixDirectionsAndCanBeFollowed) {
     Session session = bodies();
     const PrecomputeOptions options{.budget = 40'000, .window_px = 32, .spacing = 8, .depth = 0, .is_in_space = true};
     ASSERT_TRUE(precompute_selections(context(), session, folder / "space.sel", options));
-    const auto selections = read_selections(folder / "space.sel");
-    ASSERT_TRUE(selections) << selections.error().message;
+    const auto selections = require(read_selections(folder / "space.sel"));
     EXPECT_EQ(selections->directions(), 6);
-    auto pictures = LevelPictures::create(context(), session);
-    ASSERT_TRUE(pictures);
-    auto follower = SelectionFollower::create(*selections, session.scene(), pictures->triangles());
-    ASSERT_TRUE(follower) << follower.error().message;
+    auto pictures = require(LevelPictures::create(context(), session));
+    auto follower = require(SelectionFollower::create(*selections, session.scene(), pictures->triangles()));
     for (int i = 0; i < 40; ++i) {
         vdtree::View view = ahead();
         view.eye = {0, 0.1 * i, 0.2 * i}, view.target = view.eye + glm::dvec3(std::sin(0.2 * i), 0, -std::cos(0.2 * i));
-        const auto chosen = follower->choose(view);
-        ASSERT_TRUE(chosen);
+        const auto chosen = require(follower->choose(view));
         EXPECT_TRUE(chosen->holds);
         EXPECT_LE(chosen->triangles, 40'000u);
     }

@@ -1,13 +1,9 @@
 // unseen lod: the files that it writes.
 #include "run_command.h"
 
-#include <cstdint>
-#include <cstring>
-
 namespace lod_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
 
 class LodCommandTest : public DrawingCommandTest {
 protected:
@@ -140,8 +136,7 @@ TEST_F(LodCommandTest, ASheetShowsEachLevel) {
     const Outcome made = lod({"--sheet", "levels.png", "--json", "-"});
     ASSERT_EQ(made.status, 0) << made.err;
     const std::size_t levels = made.json()["objects"][0]["levels"].size();
-    const auto sheet = unseen::perception::read_image(path("levels.png"));
-    ASSERT_TRUE(sheet) << sheet.error().message;
+    const auto sheet = require(unseen::perception::read_image(path("levels.png")));
     EXPECT_GT(sheet->image.width, 280 * static_cast<int>(levels - 1));
     EXPECT_GT(sheet->image.height, 4 * 280);
     // Its cells are no empty ones.

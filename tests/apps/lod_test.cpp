@@ -1,13 +1,6 @@
 // Levels of detail: what is said of their distances, looked at once more from elsewhere.
 #include <unseen/session_gpu/lod.h>
 
-#include <cmath>
-#include <vector>
-
-#include <gmock/gmock.h>
-
-#include <glm/geometric.hpp>
-
 #include <unseen/session_gpu/picture_judge.h>
 
 #include "gl_test.h"
@@ -18,7 +11,6 @@ namespace lod_test {
 
 using namespace unseen;
 using namespace unseen::session;
-using ::testing::HasSubstr;
 using LodTest = render::testing::GlTest;
 
 Session bumpy() {
@@ -45,8 +37,7 @@ std::uint64_t seen(const render::Context& context, const Session& session, const
 
 TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {
     Session session = bumpy();
-    const auto lod = make_levels(session, context());
-    ASSERT_TRUE(lod) << lod.error().message;
+    const auto lod = require(make_levels(session, context()));
     ASSERT_EQ(lod->objects.size(), 1u);
     const LodObject& object = lod->objects[0];
     ASSERT_GE(object.levels.size(), 3u);
@@ -89,10 +80,8 @@ TEST_F(LodTest, TheSameSeedLooksFromTheSameSides) {
 TEST_F(LodTest, WhatHasNoUnseenLevelSaysSo) {
     Scene scene; // too few triangles for any level
     scene.objects.push_back(Object{support::measured(support::built(shapes::bumpy_sphere(1, 0.05)))});
-    auto session = Session::create(std::move(scene));
-    ASSERT_TRUE(session);
-    const auto lod = make_levels(*session, context());
-    ASSERT_TRUE(lod) << lod.error().message;
+    auto session = require(Session::create(std::move(scene)));
+    const auto lod = require(make_levels(*session, context()));
     EXPECT_EQ(lod->objects[0].levels.size(), 1u);
     ASSERT_FALSE(lod->objects[0].notes.empty());
     EXPECT_THAT(lod->objects[0].notes.back(), HasSubstr("no level below the full mesh"));
@@ -103,8 +92,7 @@ TEST_F(LodTest, LevelsThatCannotBeToldApartBecomeOne) {
     Session session = bumpy();
     LodOptions options{.chain = {.levels = most_levels}, .directions = 1, .samples = 4};
     options.chain.least_share = 0.3;
-    const auto lod = make_levels(session, context(), options);
-    ASSERT_TRUE(lod) << lod.error().message;
+    const auto lod = require(make_levels(session, context(), options));
     const LodObject& object = lod->objects[0];
     EXPECT_LT(object.levels.size(), static_cast<std::size_t>(object.chain.size()));
     EXPECT_THAT(object.notes, ::testing::Contains(HasSubstr("was merged with that of")));

@@ -2,14 +2,6 @@
 // bars before and behind a model.
 #include <unseen/session_gpu/as_seen.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
 #include <unseen/calibration/light_rig.h>
 #include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/judge.h>
@@ -29,8 +21,6 @@ namespace {
 using perception::Elevations;
 using perception::Image;
 using perception::MaskingPicture;
-using ::testing::Each;
-using ::testing::HasSubstr;
 using vdtree::Mesh;
 using vdtree::NodeId;
 
@@ -391,8 +381,7 @@ TEST_F(MaskedSceneTest, WhatIsBehindBarsFolds) {
 TEST_F(MaskedSceneTest, DoesNotCountForGazesThatAreUnsure) {
     Session session = session_of(grate(12, 1.5));
     session.set_gaze(Gaze{{20, 20}, 1});
-    const auto made = simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, masked);
-    ASSERT_TRUE(made);
+    const auto made = require(simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, masked));
     const auto effect = std::ranges::find(made->passes, "masking", &PassEffect::name);
     ASSERT_NE(effect, made->passes.end());
     EXPECT_FALSE(effect->on);

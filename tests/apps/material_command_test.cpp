@@ -314,8 +314,7 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
         const Outcome drawn = run(words);
         if (drawn.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
         ASSERT_EQ(drawn.status, 0) << drawn.err;
-        const auto picture = unseen::perception::read_image(path("p.pfm"));
-        ASSERT_TRUE(picture);
+        const auto picture = require(unseen::perception::read_image(path("p.pfm")));
         const double gold = 0.2126 * 1 + 0.7152 * 0.6038 + 0.0722 * 0.0100; // decoded from sRGB
         EXPECT_NEAR(picture->image.at(46, 16), 0.5 + 99.5 * gold, 1.5) << option.size();
     }

@@ -1,13 +1,6 @@
 // What bars mask: a statue in a museum, behind a gate of bars or in the shadow of bars in a window. Levels by the pipeline
 // of Drettakis and others (their figure 1), and cuts of the vertex tree.
-#include <cstdint>
 #include <initializer_list>
-#include <map>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include <make_scene.h>
 #include <unseen/perception/judge.h>

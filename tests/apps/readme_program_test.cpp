@@ -1,8 +1,6 @@
 // The program in README.md gives what the command gives: the same numbers and the same mesh.
 #include "run_command.h"
 
-#include <cstdio>
-
 namespace {
 
 using namespace unseen::app::testing;

@@ -1,15 +1,11 @@
 // unseen render and sheet, where there is an OpenGL; and what they say where there is none.
 #include "run_command.h"
 
-#include <numeric>
-
 #include <unseen/perception/image.h>
 
 namespace render_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using unseen::perception::read_image;
 
 class RenderCommandTest : public DrawingCommandTest {
@@ -28,8 +24,7 @@ protected:
 
 TEST_F(RenderCommandTest, DrawsForPeopleAndForJudging) {
     render({}, "ball.png");
-    const auto picture = read_image(path("ball.png"));
-    ASSERT_TRUE(picture) << picture.error().message;
+    const auto picture = require(read_image(path("ball.png")));
     EXPECT_EQ(picture->image.width, 200);
     EXPECT_EQ(picture->image.height, 160);
     EXPECT_EQ(picture->image.channels, 3);
@@ -39,8 +34,7 @@ TEST_F(RenderCommandTest, DrawsForPeopleAndForJudging) {
 
     for (const std::string name : {"ball.pfm", "ball.exr"}) {
         render({}, name);
-        const auto luminance = read_image(path(name));
-        ASSERT_TRUE(luminance) << luminance.error().message;
+        const auto luminance = require(read_image(path(name)));
         EXPECT_EQ(luminance->image.channels, 1);
         EXPECT_TRUE(luminance->is_absolute);
         EXPECT_NEAR(luminance->image.at(0, 0), 20, 1e-4) << "the background";
@@ -151,8 +145,7 @@ TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
     EXPECT_EQ(read_image(path("orbit.png"))->image.width, 1200);
     EXPECT_EQ(std::distance(fs::directory_iterator(path("frames")), fs::directory_iterator()), 24);
     // A frame is the picture that is drawn of the same view alone, but for the cut, which is a little finer.
-    const auto last = read_image(path("frames/023.png"));
-    ASSERT_TRUE(last) << last.error().message;
+    const auto last = require(read_image(path("frames/023.png")));
     EXPECT_EQ(last->image.height, 80);
 }
 
@@ -429,8 +422,7 @@ TEST_F(RenderCommandTest, OptionsChangeThePicture) {
 
 TEST_F(RenderCommandTest, FillIsTheShareOfTheHeight) {
     render({"--fill", "0.5", "--full"}, "half.pfm");
-    const auto image = read_image(path("half.pfm"));
-    ASSERT_TRUE(image);
+    const auto image = require(read_image(path("half.pfm")));
     int top = 160, bottom = 0;
     for (int y = 0; y < 160; ++y)
         for (int x = 0; x < 200; ++x)
@@ -494,8 +486,7 @@ TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
                                  "--cell", "64", "--json", "sheet.json"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("gaze-directed"));
-    const auto sheet = read_image(path("sheet.png"));
-    ASSERT_TRUE(sheet) << sheet.error().message;
+    const auto sheet = require(read_image(path("sheet.png")));
     EXPECT_GT(sheet->image.width, 4 * 64);
     EXPECT_GT(sheet->image.height, 2 * 64);
     const Json report = Json::parse(read_text(path("sheet.json")));
@@ -578,8 +569,7 @@ TEST_F(RenderCommandTest, MapsComeOnASheetOfTheirOwn) {
     EXPECT_EQ(both.size(), 4u);
     EXPECT_TRUE(read_text(path("maps.png")) == read_text(path("both_maps.png")));
     EXPECT_TRUE(read_text(path("sheet.png")) == read_text(path("both.png")));
-    const auto maps = read_image(path("maps.png"));
-    ASSERT_TRUE(maps) << maps.error().message;
+    const auto maps = require(read_image(path("maps.png")));
     EXPECT_GT(maps->image.height, 6 * 64);
     EXPECT_EQ(run({"sheet", "ball.vdt"}).status, 2);
     EXPECT_EQ(run({"sheet", "ball.vdt", "--maps", "same.png", "-o", "same.png"}).status, 1);

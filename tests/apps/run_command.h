@@ -1,29 +1,17 @@
 // Runs the command `unseen` as a user does, in a folder of the test's own.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <numbers>
-#include <set>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <unseen/perception/image.h>
 
 #include "temp_folder.h"
+#include "testing.h"
 
 extern char** environ;
 

@@ -1,13 +1,6 @@
 // Scenes of glTF files: what the session makes of them, and what the command draws and writes.
 #include "run_command.h"
 
-#include <cmath>
-#include <cstring>
-#include <set>
-
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/session/session.h>
 
@@ -20,9 +13,6 @@ using namespace unseen;
 using namespace unseen::app::testing;
 using session::Goal;
 using session::LoadAs;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::HasSubstr;
 
 // A bumpy body that looks different from all sides, and whose mirror image is another one.
 vdtree::Mesh body(double length = 1) {
@@ -134,10 +124,8 @@ protected:
 };
 
 TEST_F(SceneTest, PartsTransformsIntoSimilaritiesAndStretches) {
-    const auto scene = load(File(all_kinds).add(body()).glb());
-    ASSERT_TRUE(scene) << scene.error().message;
-    const auto model = load(File(all_kinds).add(body()).glb(), LoadAs::model);
-    ASSERT_TRUE(model);
+    const auto scene = require(load(File(all_kinds).add(body()).glb()));
+    const auto model = require(load(File(all_kinds).add(body()).glb(), LoadAs::model));
     ASSERT_EQ(scene->objects.size(), 6u);
     ASSERT_EQ(model->objects.size(), 1u);
     EXPECT_TRUE(scene->is_of_file());
@@ -169,8 +157,7 @@ TEST_F(SceneTest, PartsTransformsIntoSimilaritiesAndStretches) {
 }
 
 TEST_F(SceneTest, InstancesShareOneTree) {
-    const auto scene = load(File(all_kinds).add(body()).glb());
-    ASSERT_TRUE(scene);
+    const auto scene = require(load(File(all_kinds).add(body()).glb()));
     const auto tree = [&](const std::string& name) {
         for (const session::Object& object : scene->objects)
             if (object.name == name) return &object.tree.data();
@@ -187,14 +174,12 @@ TEST_F(SceneTest, InstancesShareOneTree) {
 }
 
 TEST_F(SceneTest, MeasuresEachTreeOnceForAllItsObjects) {
-    auto scene = load(File(R"({"nodes": [{"mesh": 0}, {"mesh": 0, "translation": [3, 0, 0]}]})").add(body()).glb());
-    ASSERT_TRUE(scene);
+    auto scene =
+        require(load(File(R"({"nodes": [{"mesh": 0}, {"mesh": 0, "translation": [3, 0, 0]}]})").add(body()).glb()));
     EXPECT_FALSE(scene->lights) << "nothing is turned, so the trees' own light will do";
-    auto session = session::Session::create(std::move(*scene));
-    ASSERT_TRUE(session);
+    auto session = require(session::Session::create(std::move(*scene)));
     constexpr double small = 0.05; // of the window
-    const auto simplified = session->simplify(session->frame({0, 0, 1}, small, session->default_view()));
-    ASSERT_TRUE(simplified) << simplified.error().message;
+    const auto simplified = require(session->simplify(session->frame({0, 0, 1}, small, session->default_view())));
     EXPECT_TRUE(perception::has_fold_measurement(session->tree(0)));
     EXPECT_EQ(&session->tree(0).data(), &session->tree(1).data());
     EXPECT_EQ(simplified->source_triangles, session->triangle_count());
@@ -202,7 +187,7 @@ TEST_F(SceneTest, MeasuresEachTreeOnceForAllItsObjects) {
 }
 
 TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
-    auto scene = load(File(R"({"nodes": [
+    auto scene = require(load(File(R"({"nodes": [
         {"mesh": 0, "name": "statue"}, {"mesh": 0, "name": "background", "scale": [9, 9, 9]},
         {"camera": 0, "translation": [0, 0, 4]},
         {"extensions": {"KHR_lights_punctual": {"light": 0}}},
@@ -211,9 +196,8 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
         "extensions": {"KHR_lights_punctual": {"lights": [
             {"type": "directional", "intensity": 1000, "extras": {"casts_shadow": true}},
             {"type": "point", "intensity": 10}]}}})")
-                          .add(body())
-                          .glb());
-    ASSERT_TRUE(scene) << scene.error().message;
+                                  .add(body())
+                                  .glb()));
     EXPECT_EQ(scene->objects.size(), 1u);
     ASSERT_EQ(scene->backdrop.size(), 1u);
     EXPECT_EQ(&scene->backdrop[0].tree.data(), &scene->objects[0].tree.data());
@@ -223,13 +207,11 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
     auto lighting = scene->lights->at(0, scene->objects[0].tree, {}, {});
     ASSERT_EQ(lighting.lights.size(), 2u);
     EXPECT_NEAR(lighting.lights[0].intensity, 0.85, 0.01) << "white that faces the light is as bright as can be";
-    auto session = session::Session::create(std::move(*scene));
-    ASSERT_TRUE(session);
+    auto session = require(session::Session::create(std::move(*scene)));
     const vdtree::View view = session->default_view();
     EXPECT_EQ(view.eye, glm::dvec3(0, 0, 4));
     EXPECT_NEAR(view.fov_y_degrees, 57.29577951, 1e-6);
-    const auto plan = session->plan(view, {});
-    ASSERT_TRUE(plan) << plan.error().message;
+    const auto plan = require(session->plan(view, {}));
     EXPECT_EQ(plan->fold_test, session::FoldTest::error);
 }
 
@@ -238,10 +220,8 @@ TEST_F(SceneTest, FollowsAsItSimplifiesFromScratch) {
     std::string nodes;
     for (int i = 0; i < 12; ++i)
         nodes += (i ? "," : "") + std::string(R"({"mesh": 0, "translation": [)") + std::to_string(3 * i) + ", 0, 0]}";
-    auto scene = load(File("{\"nodes\": [" + nodes + "]}").add(body()).glb());
-    ASSERT_TRUE(scene);
-    auto session = session::Session::create(std::move(*scene));
-    ASSERT_TRUE(session);
+    auto scene = require(load(File("{\"nodes\": [" + nodes + "]}").add(body()).glb()));
+    auto session = require(session::Session::create(std::move(*scene)));
     session::Follower follower(*session);
     session::Request request;
     request.fold_test = session::FoldTest::luebke_hallen;
@@ -253,11 +233,9 @@ TEST_F(SceneTest, FollowsAsItSimplifiesFromScratch) {
     for (int frame = 0; frame < 60; ++frame) {
         const double x = 0.7 * (frame < 30 ? frame : 60 - frame);
         view.eye = {x, 1, 6}, view.target = {x, 0, 0};
-        const auto followed = follower.follow(view, request);
-        ASSERT_TRUE(followed) << followed.error().message;
+        const auto followed = require(follower.follow(view, request));
         EXPECT_TRUE(followed->effects.empty());
-        const auto fresh = session->simplify(view, request);
-        ASSERT_TRUE(fresh);
+        const auto fresh = require(session->simplify(view, request));
         EXPECT_EQ(followed->stats.triangles, fresh->stats.triangles) << frame;
         for (std::size_t i = 0; i < 12; ++i) {
             EXPECT_EQ(follower.cut(i).triangle_count(), fresh->cuts[i].triangle_count()) << frame << " " << i;
@@ -282,8 +260,7 @@ TEST_F(SceneTest, NamesNodesThatCannotBePlaced) {
         load(File(R"({"nodes": [{"mesh": 0, "scale": [1e-12, 1e-12, 1e-12]}, {"mesh": 0}]})").add(body()).glb()))
         << "what is tiny is none the less there";
     ASSERT_TRUE(load(File(all_kinds).add(body()).glb(), LoadAs::automatic));
-    const auto by_content = session::Scene::load(path("s.glb"));
-    ASSERT_TRUE(by_content);
+    const auto by_content = require(session::Scene::load(path("s.glb")));
     EXPECT_TRUE(by_content->is_of_file()) << "by default the content decides";
     for (const char* scale : {"1e-300", "1e200"})
         EXPECT_THAT(complaint(File(std::string(R"({"nodes": [{"mesh": 0}, {"mesh": 0, "name": "leaf", "scale": [)") +
@@ -301,8 +278,7 @@ TEST_F(SceneTest, ThousandsOfNodesAreQuicklyRead) {
     std::string nodes;
     for (int i = 0; i < 5000; ++i)
         nodes += (i ? "," : "") + std::string(R"({"mesh": 0, "translation": [)") + std::to_string(i) + ", 0, 0]}";
-    const auto scene = load(File("{\"nodes\": [" + nodes + "]}").add(shapes::cube(2)).glb());
-    ASSERT_TRUE(scene) << scene.error().message;
+    const auto scene = require(load(File("{\"nodes\": [" + nodes + "]}").add(shapes::cube(2)).glb()));
     EXPECT_EQ(scene->objects.size(), 5000u);
 }
 
@@ -347,8 +323,7 @@ TEST_F(SceneTest, WritesScenesThatLookTheSame) {
     for (const Json& object : report["objects"]) sum += object["triangles"].get<std::uint64_t>();
     EXPECT_EQ(sum, report["triangles"]);
 
-    const auto read = meshio::SceneFile::read(path("small.glb"));
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(meshio::SceneFile::read(path("small.glb")));
     ASSERT_EQ(read->contents().nodes.size(), 6u);
     std::vector<std::string> names;
     for (const meshio::SceneNode& node : read->contents().nodes) names.push_back(node.name);
@@ -378,8 +353,7 @@ TEST_F(SceneTest, WritesEqualCutsOnce) {
         path("s.glb"),
         File(R"({"nodes": [{"mesh": 0}, {"mesh": 0}, {"mesh": 0, "translation": [0, 0, -9]}]})").add(body()).glb());
     ASSERT_EQ(run({"simplify", "s.glb", "-o", "cut.glb", "--pixels", "4", "--size", "256x256"}).status, 0);
-    const auto out = meshio::SceneFile::read(path("cut.glb"));
-    ASSERT_TRUE(out) << out.error().message;
+    const auto out = require(meshio::SceneFile::read(path("cut.glb")));
     ASSERT_EQ(out->contents().nodes.size(), 3u);
     EXPECT_EQ(out->contents().nodes[1].mesh, out->contents().nodes[0].mesh);
     EXPECT_NE(out->contents().nodes[2].mesh, out->contents().nodes[0].mesh) << "it is farther away";

@@ -2,14 +2,9 @@
 // processes.
 #include "run_command.h"
 
-#include <chrono>
-#include <thread>
-
 namespace select_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
-using ::testing::UnorderedElementsAre;
 
 class SelectCommandTest : public CommandTest {
 protected:

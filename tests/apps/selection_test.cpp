@@ -1,26 +1,17 @@
 // Levels selected within a budget: the search against all choices and against whole pictures, its file, and following.
 #include <unseen/session/selection.h>
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <random>
-
-#include <gmock/gmock.h>
-
 #include <unseen/perception/judge.h>
 
 #include "built.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace selection_test {
 
 using namespace unseen;
 using namespace unseen::session;
-using ::testing::HasSubstr;
 
 constexpr double rounding = 1e-9; // of sums over some thousand windows, each to some 1e-15
 
@@ -79,13 +70,11 @@ std::uint64_t triangles_of(const LayeredPicture& picture, const std::vector<int>
 TEST(PictureLoss, IsSsimOfTheWholePicture) {
     const LayeredPicture picture = discs(6, 4, 1);
     const auto full = put_together(picture, at_level(picture, 0));
-    const auto loss = PictureLoss::create(SelectionQuality::ssim, picture.width, picture.height, full);
-    ASSERT_TRUE(loss) << loss.error().message;
+    const auto loss = require(PictureLoss::create(SelectionQuality::ssim, picture.width, picture.height, full));
     EXPECT_EQ(loss->total(), 0);
     for (int level = 1; level < 4; ++level) {
         const auto coarse = put_together(picture, at_level(picture, level));
-        const auto ssim = perception::ssim(image_of(picture, full), image_of(picture, coarse));
-        ASSERT_TRUE(ssim);
+        const auto ssim = require(perception::ssim(image_of(picture, full), image_of(picture, coarse)));
         EXPECT_NEAR(loss->of(coarse) / loss->places(), 1 - *ssim, rounding);
         EXPECT_GT(loss->of(coarse), 0.1) << "there is something to see";
     }
@@ -95,10 +84,8 @@ TEST(PictureLoss, CountsPixelsBeyondTheThresholdsOfTheJudge) {
     for (const auto quality : {SelectionQuality::pixels, SelectionQuality::contrast}) {
         const LayeredPicture picture = discs(6, 4, 1, quality);
         const auto full = put_together(picture, at_level(picture, 0));
-        const auto loss = PictureLoss::create(quality, picture.width, picture.height, full);
-        ASSERT_TRUE(loss) << loss.error().message;
-        const auto thresholds = perception::threshold_map_modern({picture.width, picture.height, 1, full}, {});
-        ASSERT_TRUE(thresholds);
+        const auto loss = require(PictureLoss::create(quality, picture.width, picture.height, full));
+        const auto thresholds = require(perception::threshold_map_modern({picture.width, picture.height, 1, full}, {}));
         const auto coarse = put_together(picture, at_level(picture, 3));
         double expected = 0;
         for (std::size_t i = 0; i < full.size(); ++i) {
@@ -115,8 +102,7 @@ TEST(PictureLoss, OfARectangleIsThatOfTheWholePicture) {
     for (const auto quality : {SelectionQuality::ssim, SelectionQuality::pixels, SelectionQuality::contrast}) {
         const LayeredPicture picture = discs(9, 4, 2, quality);
         std::vector<int> levels = at_level(picture, 0);
-        auto loss = PictureLoss::create(quality, picture.width, picture.height, put_together(picture, levels));
-        ASSERT_TRUE(loss);
+        auto loss = require(PictureLoss::create(quality, picture.width, picture.height, put_together(picture, levels)));
         std::mt19937 random(3);
         for (int step = 0; step < 60; ++step) {
             const std::size_t i = random() % levels.size();
@@ -172,8 +158,8 @@ TEST(GreedySelection, LowersWhatCostsLeastForATriangle) {
         const LayeredPicture picture = discs(8, 4, seed);
         const std::uint64_t budget = triangles_of(picture, at_level(picture, 0)) / 3;
         const std::vector<int> expected = plain_greedy(picture, budget);
-        const auto found = select_greedily(picture, SelectionQuality::ssim, {}, {.budget = budget, .is_lazy = false});
-        ASSERT_TRUE(found) << found.error().message;
+        const auto found =
+            require(select_greedily(picture, SelectionQuality::ssim, {}, {.budget = budget, .is_lazy = false}));
         EXPECT_TRUE(found->holds);
         EXPECT_LE(found->triangles, budget);
         EXPECT_EQ(found->triangles, triangles_of(picture, found->levels));
@@ -223,8 +209,7 @@ TEST(GreedySelection, TakesHiddenObjectsFirst) {
         std::fill(image.depth.begin(), image.depth.end(), 0.0F);
     const auto& counts = picture.objects[1].triangles;
     const std::uint64_t budget = triangles_of(picture, at_level(picture, 0)) - (counts[0] - counts[3]);
-    const auto found = select_greedily(picture, SelectionQuality::ssim, {}, {.budget = budget}, true);
-    ASSERT_TRUE(found);
+    const auto found = require(select_greedily(picture, SelectionQuality::ssim, {}, {.budget = budget}, true));
     EXPECT_EQ(found->levels, (std::vector<int>{0, 3, 0}));
     EXPECT_EQ(found->loss, 0);
     EXPECT_THAT(found->alone[1], testing::Each(0.0));
@@ -346,8 +331,7 @@ TEST(SelectionFile, ComesBackAsItWas) {
     const Scene scene = row();
     const Selections s = before(scene);
     ASSERT_TRUE(write_selections(folder / "a.sel", s));
-    const auto back = read_selections(folder / "a.sel");
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(read_selections(folder / "a.sel"));
     ASSERT_TRUE(write_selections(folder / "b.sel", *back));
     const auto bytes = [&](const char* name) {
         std::ifstream in(folder / name, std::ios::binary);
@@ -413,14 +397,12 @@ TEST(SelectionJournal, GoesOnBehindWhatIsWhole) {
     const support::TempFolder folder;
     const Selections s = before(row());
     {
-        auto journal = SelectionJournal::open(folder / "a.part", 7);
-        ASSERT_TRUE(journal);
+        auto journal = require(SelectionJournal::open(folder / "a.part", 7));
         for (int i = 0; i < 3; ++i) ASSERT_TRUE(journal->add(s.corners[static_cast<std::size_t>(i)]));
     }
     const auto size = std::filesystem::file_size(folder / "a.part");
     std::filesystem::resize_file(folder / "a.part", size - 5); // killed in the middle of the third
-    auto again = SelectionJournal::open(folder / "a.part", 7);
-    ASSERT_TRUE(again);
+    auto again = require(SelectionJournal::open(folder / "a.part", 7));
     ASSERT_EQ(again->done().size(), 2u);
     EXPECT_EQ(again->done()[1].at, s.corners[1].at);
     ASSERT_TRUE(again->add(s.corners[2]));
@@ -440,15 +422,12 @@ TEST(SelectionGrid, HasCellsWithCorners) {
 TEST(SelectionFollower, KeepsTheBudgetAndGivesTrianglesToWhatIsNear) {
     const Scene scene = row();
     const Selections s = before(scene);
-    auto follower = SelectionFollower::create(s, scene, s.triangles);
-    ASSERT_TRUE(follower) << follower.error().message;
-    const auto chosen = follower->choose(looking({0, 0, 6}));
-    ASSERT_TRUE(chosen);
+    auto follower = require(SelectionFollower::create(s, scene, s.triangles));
+    const auto chosen = require(follower->choose(looking({0, 0, 6})));
     EXPECT_TRUE(chosen->holds);
     EXPECT_LE(chosen->triangles, s.budget);
     EXPECT_LT(chosen->levels[3], chosen->levels[1]);
-    const auto away = follower->choose({.eye = {0, 0, 6}, .target = {0, 0, 7}});
-    ASSERT_TRUE(away);
+    const auto away = require(follower->choose({.eye = {0, 0, 6}, .target = {0, 0, 7}}));
     EXPECT_THAT(away->levels, testing::Each(-1));
     EXPECT_EQ(away->triangles, 0u);
 }
@@ -456,12 +435,10 @@ TEST(SelectionFollower, KeepsTheBudgetAndGivesTrianglesToWhatIsNear) {
 TEST(SelectionFollower, ComesToRestAndDoesNotChangeManyAtOnce) {
     const Scene scene = row();
     const Selections s = before(scene);
-    auto follower = SelectionFollower::create(s, scene, s.triangles, {.most_changes = 2});
-    ASSERT_TRUE(follower);
+    auto follower = require(SelectionFollower::create(s, scene, s.triangles, {.most_changes = 2}));
     int changes = 0;
     for (int i = 0; i <= 200; ++i) {
-        const auto chosen = follower->choose(looking({-10 + 0.1 * i, 0, 6}));
-        ASSERT_TRUE(chosen);
+        const auto chosen = require(follower->choose(looking({-10 + 0.1 * i, 0, 6})));
         EXPECT_LE(chosen->triangles, s.budget);
         EXPECT_LE(chosen->changes, 4) << "two that are worth it, and what a new object in the frame asks for";
         changes += chosen->changes;
@@ -471,8 +448,7 @@ TEST(SelectionFollower, ComesToRestAndDoesNotChangeManyAtOnce) {
     // A trembling eye changes nothing once it has come to rest.
     changes = 0;
     for (int i = 0; i < 60; ++i) {
-        const auto chosen = follower->choose(looking({1 + 0.05 * (i % 2), 0, 6}));
-        ASSERT_TRUE(chosen);
+        const auto chosen = require(follower->choose(looking({1 + 0.05 * (i % 2), 0, 6})));
         if (i >= 20) changes += chosen->changes;
     }
     EXPECT_EQ(changes, 0);

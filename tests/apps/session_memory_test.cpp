@@ -1,14 +1,6 @@
 // A session remembers criteria, tables, trees, spheres and shadows from one request to the next. What it was asked before
 // never decides: every field of what can be asked is varied, two at a time, in one session, and each answer is that of a
 // session that has never been asked anything.
-#include <cmath>
-#include <fstream>
-#include <functional>
-#include <limits>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include <unseen/session/session.h>
 
@@ -16,6 +8,7 @@
 #include "measured.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace session_memory_test {
 

@@ -1,12 +1,4 @@
 // The session library: requests that contradict themselves, plans, several objects.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/session/follower.h>
@@ -14,6 +6,7 @@
 #include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace session_test {
 
@@ -22,9 +15,6 @@ using session::FoldTest;
 using session::Goal;
 using session::Request;
 using session::Session;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 vdtree::VertexTree tree_of(const vdtree::Mesh& mesh, const vdtree::BuildOptions& options = {}) {
     return *vdtree::build_tree(mesh.view(), options);
@@ -75,19 +65,16 @@ TEST(Session, RefusesWhatCannotBeSeen) {
 TEST(Session, PlansBeforeItMeasures) {
     auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
     const vdtree::View view = session->default_view();
-    const auto first = session->plan(view, {});
-    ASSERT_TRUE(first);
+    const auto first = require(session->plan(view, {}));
     EXPECT_EQ(first->fold_test, FoldTest::error);
     EXPECT_TRUE(first->measures);
     EXPECT_FALSE(perception::has_fold_measurement(session->tree())) << "a plan changes nothing";
-    const auto hurried = session->plan(view, {.may_measure = false});
-    ASSERT_TRUE(hurried);
+    const auto hurried = require(session->plan(view, {.may_measure = false}));
     EXPECT_EQ(hurried->fold_test, FoldTest::luebke_hallen_safe);
     EXPECT_THAT(hurried->why, HasSubstr("takes long"));
     EXPECT_FALSE(session->plan(view, {.fold_test = FoldTest::error, .may_measure = false}));
 
-    const auto ready = session->prepare(view, {});
-    ASSERT_TRUE(ready);
+    const auto ready = require(session->prepare(view, {}));
     EXPECT_FALSE(ready->front().measures);
     EXPECT_TRUE(perception::has_fold_measurement(session->tree()));
     EXPECT_EQ(session->plan(view, {.may_measure = false})->fold_test, FoldTest::error);
@@ -95,10 +82,8 @@ TEST(Session, PlansBeforeItMeasures) {
 
 TEST(Session, SaysOfEachEffectWhyItIsOnOrOff) {
     auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
-    const auto simplified = session->simplify({.fold_test = FoldTest::luebke_hallen});
-    ASSERT_TRUE(simplified);
-    const auto plan = session->plan(session->default_view(), {.fold_test = FoldTest::luebke_hallen});
-    ASSERT_TRUE(plan);
+    const auto simplified = require(session->simplify({.fold_test = FoldTest::luebke_hallen}));
+    const auto plan = require(session->plan(session->default_view(), {.fold_test = FoldTest::luebke_hallen}));
     ASSERT_EQ(plan->effects.size() + 1, simplified->effects.size()) << "the cut adds geomorphs";
     for (std::size_t i = 0; i < plan->effects.size(); ++i) {
         EXPECT_EQ(plan->effects[i].name, simplified->effects[i].name);
@@ -126,8 +111,7 @@ TEST(Session, ChromaAsksNothingOfWhatIsGrey) {
 
 TEST(Session, SharesABudgetAmongItsObjects) {
     Session session = two_balls();
-    const auto shared = session.simplify({.goal = Goal::budget(1500), .fold_test = FoldTest::luebke_hallen});
-    ASSERT_TRUE(shared) << shared.error().message;
+    const auto shared = require(session.simplify({.goal = Goal::budget(1500), .fold_test = FoldTest::luebke_hallen}));
     ASSERT_EQ(shared->cuts.size(), 2u);
     const vdtree::Index whole = shared->cuts[0].triangle_count(), half = shared->cuts[1].triangle_count();
     EXPECT_EQ(shared->stats.triangles, whole + half);
@@ -195,8 +179,8 @@ TEST(Session, OrthographicViewsKeepWhatTheWindowShows) {
 
     auto follower = session::Follower(session);
     view.eye = {0, 0, 5}, view.target = {0, 0, 0};
-    const auto followed = follower.follow(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture});
-    ASSERT_TRUE(followed) << followed.error().message;
+    const auto followed =
+        require(follower.follow(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture}));
     EXPECT_EQ(followed->stats.triangles, at_first.first);
 }
 
@@ -207,10 +191,8 @@ TEST(Follower, ComesWhereACutFromScratchIs) {
     vdtree::View view = session.default_view();
     for (int frame = 0; frame < 5; ++frame) {
         view.eye.x += 0.2;
-        const auto followed = follower.follow(view, request);
-        ASSERT_TRUE(followed);
-        const auto anew = session.simplify(view, request);
-        ASSERT_TRUE(anew);
+        const auto followed = require(follower.follow(view, request));
+        const auto anew = require(session.simplify(view, request));
         for (std::size_t object = 0; object < 2; ++object)
             EXPECT_EQ(follower.cut(object).triangle_count(), anew->cuts[object].triangle_count()) << "frame " << frame;
     }
@@ -297,8 +279,7 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
         view.eye = view.target + 100.0 * (view.eye - view.target);
         follower.emplace(*session);
     }
-    const auto whole = follower->follow(view, {.goal = Goal::full()});
-    ASSERT_TRUE(whole);
+    const auto whole = require(follower->follow(view, {.goal = Goal::full()}));
     EXPECT_EQ(whole->stats.triangles, whole->source_triangles);
     const auto folded = follower->follow(view, {}); // by errors that are measured now: of another tree
     ASSERT_TRUE(folded);

@@ -1,13 +1,5 @@
 // Cuts of scenes whose lights cast shadows: nobody tells their pictures from those of the full scene, with the shadows in
 // both.
-#include <cmath>
-#include <map>
-#include <stdexcept>
-#include <string>
-#include <utility>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/judge.h>
 #include <unseen/session/load.h>
@@ -177,17 +169,13 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     const Setting setting = settings()[GetParam()];
     const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
     const vdtree::View view = view_of(setting);
-    auto session = session::Session::create(scene_of(setting, ball, ground, true));
-    ASSERT_TRUE(session) << session.error().message;
+    auto session = require(session::Session::create(scene_of(setting, ball, ground, true)));
     session::Request request;
     request.purpose = session::Purpose::picture;
-    const auto cut = session->simplify(view, request);
-    ASSERT_TRUE(cut) << cut.error().message;
+    const auto cut = require(session->simplify(view, request));
     request.goal = session::Goal::full();
-    const auto full = session->simplify(view, request);
-    ASSERT_TRUE(full);
-    auto renderer = session::SceneRenderer::create(context(), *session);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    const auto full = require(session->simplify(view, request));
+    auto renderer = require(session::SceneRenderer::create(context(), *session));
     const auto judged = [&](const std::vector<vdtree::Cut>& cuts) {
         const auto difference =
             perception::judge_modern(image_of(*renderer, full->cuts, view, session->background()),
@@ -232,10 +220,8 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
 
     // The cut for the eye alone does not do.
     if (std::string(setting.name) != "NearShadow") return;
-    auto unaware = session::Session::create(scene_of(setting, ball, ground, false));
-    ASSERT_TRUE(unaware);
-    const auto for_eye = unaware->simplify(view, {.purpose = session::Purpose::picture});
-    ASSERT_TRUE(for_eye);
+    auto unaware = require(session::Session::create(scene_of(setting, ball, ground, false)));
+    const auto for_eye = require(unaware->simplify(view, {.purpose = session::Purpose::picture}));
     EXPECT_LT(for_eye->stats.triangles, cut->stats.triangles);
     const perception::Judgement seen = judged(for_eye->cuts);
     RecordProperty("eye", static_cast<int>(for_eye->stats.triangles));
@@ -248,10 +234,8 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
     Setting setting = settings()[6];
     ASSERT_STREQ(setting.name, "EdgeOfUnseen");
     const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
-    auto session = session::Session::create(scene_of(setting, ball, ground, true));
-    ASSERT_TRUE(session) << session.error().message;
-    auto renderer = session::SceneRenderer::create(context(), *session);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto session = require(session::Session::create(scene_of(setting, ball, ground, true)));
+    auto renderer = require(session::SceneRenderer::create(context(), *session));
     session::Follower follower(*session);
     session::Request request;
     request.purpose = session::Purpose::picture;
@@ -262,8 +246,7 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
         const double x = -4 + 3.0 * frame / frames;
         setting.eye.x = setting.target.x = x;
         const vdtree::View view = view_of(setting);
-        const auto report = follower.follow(view, request);
-        ASSERT_TRUE(report) << report.error().message;
+        const auto report = require(follower.follow(view, request));
         if (frame == 0) {
             EXPECT_LE(report->stats.triangles, of_largest_nodes);
         }
@@ -290,13 +273,11 @@ TEST_P(ShadowCut, FromScratchDependsOnNoViewBefore) {
         const auto indices = made ? made->cuts[0].indices() : std::span<const vdtree::NodeId>();
         return std::vector<vdtree::NodeId>(indices.begin(), indices.end());
     };
-    auto unused = session::Session::create(scene_of(setting, ball, ground, true));
-    ASSERT_TRUE(unused);
+    auto unused = require(session::Session::create(scene_of(setting, ball, ground, true)));
     const auto first = triangles_of(*unused);
     EXPECT_EQ(triangles_of(*unused), first);
 
-    auto used = session::Session::create(scene_of(setting, ball, ground, true));
-    ASSERT_TRUE(used);
+    auto used = require(session::Session::create(scene_of(setting, ball, ground, true)));
     session::Follower follower(*used);
     for (const double degrees : {0.0, 0.5, 1.0, 20.0}) {
         ASSERT_TRUE(follower.follow(vdtree::orbited(view, degrees), request));
@@ -316,8 +297,7 @@ TEST_F(ShadowCut, FindsItsReachOnceForAllObjects) {
     session::Scene scene = scene_of(setting, ball, ground, true);
     scene.objects.push_back({ball.share(), scene.objects[0].placement});
     scene.objects[1].placement.translation.x += 1.2;
-    auto session = session::Session::create(std::move(scene));
-    ASSERT_TRUE(session);
+    auto session = require(session::Session::create(std::move(scene)));
     const session::Request request{.purpose = session::Purpose::picture};
     const vdtree::View view = view_of(setting);
     session::Follower follower(*session);

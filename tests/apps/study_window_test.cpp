@@ -53,8 +53,7 @@ TEST_F(StudyWindowTest, IsAnsweredWithKeysAndTakenUpAgain) {
     ASSERT_LT(first, 5u);
     EXPECT_THAT(read_text(path("out.txt")), HasSubstr("of 5 trials are answered; the same command continues"));
     // Both pictures as they are, on grey.
-    const auto shot = unseen::perception::read_image(path("shot.png"));
-    ASSERT_TRUE(shot) << shot.error().message;
+    const auto shot = require(unseen::perception::read_image(path("shot.png")));
     const auto& image = shot->image;
     const int middle = image.width / 2, row = (image.height - 80 - 48) / 2 + 24;
     const float left = image.at(middle - 40, row, 1), right = image.at(middle + 40, row, 1);

@@ -1,15 +1,9 @@
 // Subdivision: no crack anywhere, counts as asked for, attributes and ranges where they belong.
-#include <cmath>
-#include <limits>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <glm/geometric.hpp>
 
 #include "build/surface.h"
 #include "shapes.h"
 #include "subdivide.h"
+#include "testing.h"
 
 namespace subdivide_test {
 

@@ -1,17 +1,4 @@
 // Numbers, drawings, plots and scales: ink where it belongs, and none outside.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <limits>
-#include <set>
-#include <string>
-#include <vector>
-
-#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/number_format.h>
 
@@ -21,13 +8,13 @@
 #include "panel_plot.h"
 #include "screen_text.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "visibility_map.h"
 
 namespace support_test {
 
 using namespace unseen;
 using namespace unseen::app;
-using ::testing::HasSubstr;
 using unseen::perception::Image;
 
 constexpr glm::vec3 black{0.0f}, white{1.0f};
@@ -167,8 +154,7 @@ TEST(Drawing, CopiesPictures) {
 }
 
 TEST(Drawing, LayersAreTransparentWhereNothingIsDrawn) {
-    auto layer = Drawing::layer(20, 10);
-    ASSERT_TRUE(layer);
+    auto layer = require(Drawing::layer(20, 10));
     layer->round_fill({2, 2}, {10, 6}, 2, {0.2f, 0.4f, 1.0f, 0.5f});
     layer->fill({14, 4}, {3, 3}, white);
     const auto pixels = *layer->layer_pixels();
@@ -349,8 +335,7 @@ TEST(Plot, IsWrittenAsItsNameEnds) {
     plot.title = "sensitivity";
     plot.curves = {{"flat", {1, 0, 0}, false, {{0.1, 30}, {100, 30}}}};
     ASSERT_TRUE(write_plot(folder / "plot.png", plot));
-    const auto png = unseen::perception::read_image(folder / "plot.png");
-    ASSERT_TRUE(png) << png.error().message;
+    const auto png = require(unseen::perception::read_image(folder / "plot.png"));
     EXPECT_EQ(png->image.width, plot.width);
     ASSERT_TRUE(write_plot(folder / "plot.SVG", plot));
     std::ifstream stream(folder / "plot.SVG");
@@ -411,8 +396,7 @@ TEST(ColourBar, LiesBelowTheMapWithAllOfItsText) {
     for (const int width : {4, 128, 1024}) {
         Image map{width, 8, 3, {}};
         map.values.assign(map.index(0, map.height, 0), 0.5f);
-        const auto whole = with_colour_bar(map, bar);
-        ASSERT_TRUE(whole) << whole.error().message;
+        const auto whole = require(with_colour_bar(map, bar));
         EXPECT_GE(whole->width, std::max(width, 100));
         for (int y = 0; y < map.height; ++y)
             for (int x = 0; x < map.width; ++x) ASSERT_EQ(whole->at(x, y, 2), 0.5f) << "pixels keep their places";

@@ -2,8 +2,6 @@
 // of bad ones.
 #include "run_command.h"
 
-#include <functional>
-
 #include <unseen/perception/image.h>
 
 #include "jpeg_file.h"
@@ -12,10 +10,6 @@
 namespace texture_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::AllOf;
-using ::testing::AnyOf;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
 using unseen::perception::Image;
 using unseen::perception::read_image;
 using unseen::support::jpeg;
@@ -51,8 +45,7 @@ protected:
         return image;
     }
     void write_png(const std::string& name, const Image& image) const {
-        const auto written = unseen::perception::write_image(path(name), image);
-        ASSERT_TRUE(written) << written.error().message;
+        const auto written = require(unseen::perception::write_image(path(name), image));
     }
     // Pictures are drawn as they are, without light.
     Json build(const std::string& mesh, std::vector<std::string> more = {}) const {

@@ -4,16 +4,12 @@
 #include "run_command.h"
 
 #include <bit>
-#include <cstdint>
-#include <cstring>
-#include <optional>
 
 #include "gltf_scene.h"
 
 namespace textured_scene_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
 using unseen::support::GltfContents;
 using unseen::support::read_gltf;
 

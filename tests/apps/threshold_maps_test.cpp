@@ -1,13 +1,7 @@
 // Maps of thresholds on the GPU say what those on the CPU say, of one reference after another.
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <string>
-#include <vector>
 
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/internal/elevation.h>
@@ -25,7 +19,6 @@ using perception::Image;
 using render::LuminanceImage;
 using support::flat;
 using support::noise;
-using ::testing::HasSubstr;
 using ThresholdMapsTest = render::testing::GlTest;
 
 // Relative, of all pixels but one in a thousand; pictures in half floats have 11 bits.
@@ -107,11 +100,9 @@ std::vector<std::pair<std::string, Image>> pictures(int width, int height) {
 TEST_F(ThresholdMapsTest, OneReferenceAfterAnotherAsTheCpu) {
     for (const auto& [width, height] : shapes_of_all_kinds) {
         // One set of tables, of all that a display shows.
-        const auto tables = perception::judge_tables(width, height, 0, 100, {});
-        ASSERT_TRUE(tables);
+        const auto tables = require(perception::judge_tables(width, height, 0, 100, {}));
         const auto first = LuminanceImage::create(context(), width, height, flat(width, height, 1).values);
-        auto passes = render::VisibilityPasses::create(context(), *tables, first->texture());
-        ASSERT_TRUE(passes) << passes.error().message;
+        auto passes = require(render::VisibilityPasses::create(context(), *tables, first->texture()));
         const auto all = pictures(width, height);
         for (const bool is_half : {false, true}) {
             for (std::size_t i = 0; i < all.size(); ++i) {
@@ -190,10 +181,8 @@ perception::Rpg99Options of_reference(double field_degrees) {
 TEST_F(ThresholdMapsTest, Rpg99IsTheCpus) {
     for (const double field : {14.9, 45.0})
         for (const auto& [width, height] : shapes_of_all_kinds) {
-            const auto tables = perception::rpg99_tables(width, of_reference(field));
-            ASSERT_TRUE(tables);
-            auto passes = render::ElevationPasses::create(context(), width, height, *tables);
-            ASSERT_TRUE(passes) << passes.error().message;
+            const auto tables = require(perception::rpg99_tables(width, of_reference(field)));
+            auto passes = require(render::ElevationPasses::create(context(), width, height, *tables));
             const auto all = pictures(width, height);
             for (const bool is_half : {false, true})
                 for (std::size_t i = 0; i < all.size(); ++i) {
@@ -239,8 +228,7 @@ TEST_F(ThresholdMapsTest, StayFiniteInTheDarkAndInTheSun) {
                 EXPECT_LE(error_of(*map, wanted->threshold.values), step_of_tvi) << dots << " on " << ground;
                 ASSERT_TRUE(modern->set_reference(up->texture()));
                 ASSERT_TRUE(modern->map_thresholds());
-                const auto by_bands = perception::threshold_map_modern(image, {});
-                ASSERT_TRUE(by_bands);
+                const auto by_bands = require(perception::threshold_map_modern(image, {}));
                 EXPECT_LE(error_of(*modern->read_thresholds(), by_bands->values), full_tolerance)
                     << dots << " on " << ground;
             }
@@ -255,8 +243,7 @@ TEST_F(ThresholdMapsTest, RefuseWhatIsNone) {
     EXPECT_FALSE(render::ElevationPasses::create(context(), 0, 8, good));
     EXPECT_THAT(render::ElevationPasses::create(context(), render::largest_target_side() + 1, 8, good).error().message,
                 HasSubstr("textures"));
-    auto passes = render::ElevationPasses::create(context(), 8, 8, good);
-    ASSERT_TRUE(passes);
+    auto passes = require(render::ElevationPasses::create(context(), 8, 8, good));
     EXPECT_FALSE(passes->read_thresholds());
     const auto other = LuminanceImage::create(context(), 9, 8, flat(9, 8, 1).values);
     EXPECT_THAT(passes->map_thresholds(other->texture()).error().message, HasSubstr("8x8, not 9x8"));

@@ -1,12 +1,9 @@
 // unseen tradeoff: its points are what the options that it names make.
 #include "run_command.h"
 
-#include <algorithm>
-
 namespace tradeoff_command_test {
 
 using namespace unseen::app::testing;
-using ::testing::HasSubstr;
 
 class TradeoffCommandTest : public DrawingCommandTest {
 protected:

@@ -1,22 +1,13 @@
 // unseen view under X, driven by synthetic events: what the window's title says follows the keys and the mouse.
 #include "window_test.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <unseen/perception/image.h>
 
 namespace view_test {
 
 using namespace unseen::app::testing;
-using ::testing::AllOf;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::Not;
-using ::testing::StartsWith;
 using unseen::perception::Image;
 
 class ViewCommandTest : public WindowTest {
@@ -89,8 +80,7 @@ TEST_F(ViewCommandTest, FollowsKeysAndMouse) {
     EXPECT_EQ(read_text(path("out.txt")), "");
     EXPECT_THAT(errors(), StartsWith("unseen: note: press h in the window to see its keys.\n"));
     EXPECT_THAT(errors(), HasSubstr("wrote 'unseen-"));
-    const auto last = unseen::perception::read_image(path("last.png"));
-    ASSERT_TRUE(last) << last.error().message;
+    const auto last = require(unseen::perception::read_image(path("last.png")));
     EXPECT_EQ(last->image.width, 200);
     int pictures = 0;
     for (const std::string& name : files()) pictures += name.ends_with(".png");

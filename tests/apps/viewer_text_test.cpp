@@ -1,13 +1,6 @@
 // What the viewer says of a frame: in its title, over its picture, and of its keys.
-#include <cmath>
-#include <limits>
-#include <set>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
+#include "testing.h"
 #include "viewer_text.h"
 
 namespace {
@@ -17,11 +10,6 @@ using namespace unseen::app;
 using session::FoldTest;
 using session::GazeSource;
 using session::Goal;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::EndsWith;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 // The bunny as the viewer first shows it.
 ViewerState bunny() {

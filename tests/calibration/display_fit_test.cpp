@@ -1,17 +1,10 @@
 // Fits of displays: matches by eye, and photometers' tables.
 #include <unseen/calibration/display_profile.h>
 
-#include <cmath>
-
-#include <gmock/gmock.h>
-
 #include "profile_files.h"
 
 namespace unseen::calibration::display_fit_test {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
 
 class DisplayFit : public ProfileFiles {};
 
@@ -20,8 +13,7 @@ TEST_F(DisplayFit, MatchesGiveTheGamma) {
         std::vector<BrightnessMatch> matches;
         for (const double white : {0.25, 0.5, 0.75})
             matches.push_back({white, std::round(255 * std::pow(white, 1 / gamma)) / 255});
-        const auto fitted = fit_gamma(matches);
-        ASSERT_TRUE(fitted) << fitted.error().message;
+        const auto fitted = require(fit_gamma(matches));
         EXPECT_NEAR(*fitted, gamma, 0.02); // codes are whole
     }
     EXPECT_FALSE(fit_gamma({}));
@@ -35,15 +27,12 @@ TEST_F(DisplayFit, APhotometersTableBecomesTheDisplay) {
     const auto luminance = [](double code) { return 0.3 + 179.7 * std::pow(code, 2.3); };
     for (int code = 0; code <= 255; code += 15)
         text += std::to_string(code) + "," + std::to_string(luminance(code / 255.0)) + "\n";
-    const auto table = read_photometer(write(text, "p.csv"));
-    ASSERT_TRUE(table) << table.error().message;
-    const auto from_spreadsheet = read_photometer(write("\xef\xbb\xbf"
-                                                        "code,cdm2\r\n0,0.5\r\n128,20\r\n255,80\r\n",
-                                                        "bom.csv"));
-    ASSERT_TRUE(from_spreadsheet) << from_spreadsheet.error().message;
+    const auto table = require(read_photometer(write(text, "p.csv")));
+    const auto from_spreadsheet = require(read_photometer(write("\xef\xbb\xbf"
+                                                                "code,cdm2\r\n0,0.5\r\n128,20\r\n255,80\r\n",
+                                                                "bom.csv")));
     EXPECT_EQ(from_spreadsheet->luminance, std::vector<double>({0.5, 20, 80}));
-    const auto display = with_photometer(perception::Display(), *table);
-    ASSERT_TRUE(display) << display.error().message;
+    const auto display = require(with_photometer(perception::Display(), *table));
     EXPECT_NEAR(display->peak.value(), 180, 1e-4);
     EXPECT_NEAR(display->black.value(), 0.3, 1e-4);
     const auto levels = code_luminances(*display);
@@ -53,8 +42,7 @@ TEST_F(DisplayFit, APhotometersTableBecomesTheDisplay) {
     // Ambient light is in the photometer's figures already.
     perception::Display lit;
     lit.ambient = perception::Lux(100);
-    const auto less = with_photometer(lit, *table);
-    ASSERT_TRUE(less);
+    const auto less = require(with_photometer(lit, *table));
     EXPECT_NEAR(perception::black_level(*less).value(), 0.3, 1e-4);
 }
 
@@ -79,8 +67,7 @@ TEST_F(DisplayFit, BadTablesNameTheFileAndTheLine) {
         EXPECT_THAT(table.error().message, AllOf(HasSubstr("bad.csv"), HasSubstr(expected)));
     }
     EXPECT_FALSE(read_photometer(folder() / "missing.csv"));
-    const auto black = read_photometer(write("code,cdm2\n0,0\n128,20\n255,100\n"));
-    ASSERT_TRUE(black);
+    const auto black = require(read_photometer(write("code,cdm2\n0,0\n128,20\n255,100\n")));
     EXPECT_FALSE(with_photometer(perception::Display(), *black)) << "a display needs some black";
 }
 

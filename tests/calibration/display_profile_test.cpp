@@ -1,10 +1,6 @@
 // Display profiles: what is read and written, and that bad files get one clear sentence.
 #include <unseen/calibration/display_profile.h>
 
-#include <limits>
-
-#include <gmock/gmock.h>
-
 #include "profile_files.h"
 
 namespace unseen::calibration::display_profile_test {
@@ -12,8 +8,6 @@ namespace {
 
 using perception::Display;
 using perception::TransferFunction;
-using testing::AllOf;
-using testing::HasSubstr;
 
 class DisplayProfile : public ProfileFiles {};
 
@@ -43,8 +37,7 @@ void expect_same(const Display& a, const Display& b) {
 }
 
 TEST_F(DisplayProfile, MissingOptionalKeysTakeTheDefaults) {
-    const auto display = read_display(write(minimal, "desk.json"));
-    ASSERT_TRUE(display) << display.error().message;
+    const auto display = require(read_display(write(minimal, "desk.json")));
     EXPECT_EQ(display->name, "desk");
     EXPECT_EQ(display->width_px, 1920);
     EXPECT_EQ(display->height_px, 1200);
@@ -65,8 +58,7 @@ TEST_F(DisplayProfile, TablesAndLensesGoThereAndBack) {
     display.field_deg = 98.5;
     const auto file = folder() / "headset.json";
     ASSERT_TRUE(write_display(file, display));
-    const auto back = read_display(file);
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(read_display(file));
     expect_same(*back, display);
     EXPECT_EQ(back->table, display.table);
     ASSERT_EQ(back->lens.size(), 2u);
@@ -95,8 +87,7 @@ TEST_F(DisplayProfile, TablesAndLensesGoThereAndBack) {
 
 TEST_F(DisplayProfile, TheDiagonalGivesThePitch) {
     const std::string text = replaced(minimal, "\"pixel_pitch_m\": 0.00027", "\"diagonal_m\": 0.508");
-    const auto display = read_display(write(replaced(text, "1920", "1600")));
-    ASSERT_TRUE(display) << display.error().message;
+    const auto display = require(read_display(write(replaced(text, "1920", "1600"))));
     EXPECT_DOUBLE_EQ(display->pixel_pitch.value(), 0.000254); // a 20-inch screen of 1600x1200
 }
 
@@ -131,10 +122,8 @@ TEST_F(DisplayProfile, RoundTripIsExact) {
     for (const auto transfer : {TransferFunction::srgb, TransferFunction::gamma, TransferFunction::linear}) {
         display.transfer = transfer;
         const auto file = folder() / "round.json";
-        const auto written = write_display(file, display);
-        ASSERT_TRUE(written) << written.error().message;
-        const auto back = read_display(file);
-        ASSERT_TRUE(back) << back.error().message;
+        const auto written = require(write_display(file, display));
+        const auto back = require(read_display(file));
         expect_same(*back, display);
     }
     EXPECT_EQ(files_in_folder(), 1) << "no temporary file stays behind";
@@ -143,14 +132,12 @@ TEST_F(DisplayProfile, RoundTripIsExact) {
 TEST_F(DisplayProfile, TheDisplaysThatComeWithUnseenAreValid) {
     int count = 0;
     for (const auto& entry : std::filesystem::directory_iterator("data/displays")) {
-        const auto display = read_display(entry.path());
-        ASSERT_TRUE(display) << display.error().message;
+        const auto display = require(read_display(entry.path()));
         EXPECT_THAT(read(entry.path()), HasSubstr("\"source\""));
         ++count;
     }
     EXPECT_GE(count, 4);
-    const auto standard = read_display("data/displays/monitor-20in-1600x1200.json");
-    ASSERT_TRUE(standard);
+    const auto standard = require(read_display("data/displays/monitor-20in-1600x1200.json"));
     expect_same(*standard, Display());
 }
 

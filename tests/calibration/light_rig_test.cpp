@@ -1,10 +1,6 @@
 // Files of lights: what they say, where the lights are in time, and what is wrong with bad ones.
 #include <unseen/calibration/light_rig.h>
 
-#include <cmath>
-
-#include <glm/geometric.hpp>
-
 #include <unseen/vdtree/builder.h>
 
 #include "profile_files.h"
@@ -43,8 +39,7 @@ protected:
 };
 
 TEST_F(LightRigTest, PutsLightsWhereTheyAreAtATime) {
-    const auto rig = LightRig::read(write(good));
-    ASSERT_TRUE(rig) << rig.error().message;
+    const auto rig = require(LightRig::read(write(good)));
     EXPECT_TRUE(rig->moves());
     EXPECT_EQ(rig->description(), "1 directional, 1 headlight, 1 point, 1 spot, ambient 0.1, highlights of 0.05");
     const vdtree::Lighting first = at(*rig, 0), second = at(*rig, 1), last = at(*rig, 100);
@@ -67,8 +62,7 @@ TEST_F(LightRigTest, PutsLightsWhereTheyAreAtATime) {
 }
 
 TEST_F(LightRigTest, TurnsAndScalesWithThePlacement) {
-    const auto rig = LightRig::read(write(good));
-    ASSERT_TRUE(rig);
+    const auto rig = require(LightRig::read(write(good)));
     vdtree::Similarity placement;
     placement.scale = 2;
     const vdtree::Lighting lighting = rig->at(0, tree_, view_, placement);
@@ -136,8 +130,7 @@ TEST_F(LightRigTest, LightsCastShadowsWhereTheySaySo) {
     };
     const auto of = [](const std::string& lights) { return "{\"lights\": [" + lights + "]}"; };
     const std::string casts = light(R"(, "shadow": true)"), head = R"({"type": "headlight", "intensity": 0.3})";
-    auto rig = LightRig::read(write(of(light("") + "," + casts + "," + head)));
-    ASSERT_TRUE(rig) << rig.error().message;
+    auto rig = require(LightRig::read(write(of(light("") + "," + casts + "," + head))));
     EXPECT_EQ(rig->light_count(), 3u);
     EXPECT_EQ(rig->casting(), std::vector<std::size_t>{1});
     EXPECT_FALSE(at(*rig, 0).lights[0].casts_shadow);
@@ -155,8 +148,7 @@ TEST_F(LightRigTest, LightsCastShadowsWhereTheySaySo) {
               std::string::npos);
     std::string five = light("");
     for (int i = 0; i < 4; ++i) five += "," + light("");
-    auto full = LightRig::read(write(of(five)));
-    ASSERT_TRUE(full);
+    auto full = require(LightRig::read(write(of(five))));
     EXPECT_FALSE(full->set_shadows(true));
     EXPECT_TRUE(full->casting().empty());
 }

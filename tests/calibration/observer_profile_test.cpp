@@ -1,10 +1,6 @@
 // Sensitivity tables as JSON: exact round trips, and that bad files get one clear sentence.
 #include <unseen/calibration/observer_profile.h>
 
-#include <limits>
-
-#include <gmock/gmock.h>
-
 #include "profile_files.h"
 
 namespace unseen::calibration::observer_profile_test {
@@ -13,8 +9,6 @@ namespace {
 using perception::CsfModel;
 using perception::CsfSamples;
 using perception::CsfTable;
-using testing::AllOf;
-using testing::HasSubstr;
 
 class ObserverProfileTest : public ProfileFiles {};
 
@@ -38,8 +32,7 @@ void expect_same(const CsfSamples& a, const CsfSamples& b) {
 }
 
 TEST_F(ObserverProfileTest, ReadsASmallTable) {
-    const auto table = read_csf(write(small));
-    ASSERT_TRUE(table) << table.error().message;
+    const auto table = require(read_csf(write(small)));
     const CsfSamples& s = table->samples();
     EXPECT_EQ(s.source, "measured by hand");
     EXPECT_EQ(s.frequency_cpd, (std::vector<double>{1, 4, 16}));
@@ -49,8 +42,7 @@ TEST_F(ObserverProfileTest, ReadsASmallTable) {
 }
 
 TEST_F(ObserverProfileTest, TheSourceIsOptional) {
-    const auto table = read_csf(write(replaced(small, ", \"source\": \"measured by hand\"", "")));
-    ASSERT_TRUE(table) << table.error().message;
+    const auto table = require(read_csf(write(replaced(small, ", \"source\": \"measured by hand\"", ""))));
     EXPECT_EQ(table->samples().source, "");
 }
 
@@ -58,10 +50,8 @@ TEST_F(ObserverProfileTest, RoundTripOfTheModelsIsExact) {
     for (const CsfModel model : {CsfModel::castle, CsfModel::stela}) {
         const CsfTable table = CsfTable::from_model(model);
         const auto file = folder() / "model.json";
-        const auto written = write_csf(file, table);
-        ASSERT_TRUE(written) << written.error().message;
-        const auto back = read_csf(file);
-        ASSERT_TRUE(back) << back.error().message;
+        const auto written = require(write_csf(file, table));
+        const auto back = require(read_csf(file));
         expect_same(back->samples(), table.samples());
         using perception::Degrees, perception::Luminance;
         EXPECT_EQ(back->highest_visible_frequency(0.1, Degrees(7), Luminance(33)),
@@ -77,12 +67,10 @@ TEST_F(ObserverProfileTest, RoundTripOfOddNumbersIsExact) {
     samples.eccentricity_deg = {0, 0.1 + 0.2};
     samples.luminance_cdm2 = {std::numeric_limits<double>::denorm_min(), 0.1};
     samples.sensitivity = {1e6 / 3, 2.0 / 3, 1e-308, 5e-324, 1e-300, 4, 2, 3, 4, 1.5, 0.1, 7};
-    const auto table = CsfTable::create(samples);
-    ASSERT_TRUE(table) << table.error().message;
+    const auto table = require(CsfTable::create(samples));
     const auto file = folder() / "odd.json";
     ASSERT_TRUE(write_csf(file, *table));
-    const auto back = read_csf(file);
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(read_csf(file));
     expect_same(back->samples(), samples);
 }
 
@@ -199,8 +187,7 @@ TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
     profile.measured = {{{0.5, 0}, 60.1, 50, 70, 12}, {{8, 10}, 1.0 / 3, 0.25, 0.5, 0}};
     const auto file = folder() / "anna.json";
     ASSERT_TRUE(write_observer(file, profile));
-    const auto back = read_observer(file);
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(read_observer(file));
     EXPECT_EQ(back->observer, profile.observer);
     EXPECT_EQ(back->date, profile.date);
     EXPECT_EQ(back->method, profile.method);
@@ -216,11 +203,9 @@ TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
     EXPECT_EQ(back->measured[0].high, 70);
     EXPECT_EQ(back->measured[0].answers, 12);
     expect_same(back->table.samples(), profile.table.samples());
-    const auto table = read_csf(file);
-    ASSERT_TRUE(table) << table.error().message;
+    const auto table = require(read_csf(file));
     expect_same(table->samples(), profile.table.samples());
-    const auto old = read_observer(write(small));
-    ASSERT_TRUE(old) << old.error().message;
+    const auto old = require(read_observer(write(small)));
     EXPECT_TRUE(old->measured.empty());
 }
 
@@ -231,16 +216,13 @@ TEST_F(ObserverProfileTest, SummationGoesThereAndBack) {
     profile.summation = {1.25, 1.0 / 3, 2};
     const auto file = folder() / "wide.json";
     ASSERT_TRUE(write_observer(file, profile));
-    const auto back = read_observer(file);
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(read_observer(file));
     EXPECT_EQ(back->summation, profile.summation);
     EXPECT_TRUE(back->has_summation());
-    const auto table = read_csf(file);
-    ASSERT_TRUE(table);
+    const auto table = require(read_csf(file));
     EXPECT_EQ(table->samples().summation, 1.25);
     ASSERT_TRUE(write_csf(folder() / "table.json", *table));
-    const auto again = read_csf(folder() / "table.json");
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(read_csf(folder() / "table.json"));
     EXPECT_EQ(again->samples().summation, 1.25);
     ASSERT_EQ(back->measured.size(), 2u);
     EXPECT_EQ(back->measured[0].place, profile.measured[0].place);

@@ -1,27 +1,18 @@
 // The observers of <unseen/perception/csf.h> against what people were measured to see.
 #include <unseen/calibration/internal/people.h>
 
-#include <algorithm>
-#include <cmath>
-#include <map>
-#include <numbers>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/perception/csf.h>
 #include <unseen/perception/internal/change.h>
 #include <unseen/perception/judge.h>
 
 #include "judge/band_weights.h"
+#include "testing.h"
 
 namespace unseen::calibration::people_test {
 namespace {
 
 using perception::CsfModel;
 using perception::Stimulus;
-using ::testing::HasSubstr;
 
 const std::vector<MeasuredSensitivity>& people() {
     static const auto all = within_domain(*read_sensitivities("data/people/achromatic_thresholds.csv"));

@@ -3,13 +3,6 @@
 #include <unseen/calibration/internal/simulated_observer.h>
 #include <unseen/calibration/procedure.h>
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <span>
-
-#include <gmock/gmock.h>
-
 #include "profile_files.h"
 
 namespace unseen::calibration::procedure_test {
@@ -20,8 +13,6 @@ using perception::CsfTable;
 using perception::CyclesPerDegree;
 using perception::Degrees;
 using perception::Luminance;
-using testing::AllOf;
-using testing::HasSubstr;
 
 class ProcedureTest : public ProfileFiles {};
 
@@ -215,8 +206,7 @@ TEST_F(ProcedureTest, ABeliefIsAtLeastAsWideAsTheGrid) {
         EXPECT_GT(e.log10_sensitivity.deviation, half_a_step / 2) << setting;
         EXPECT_LE(procedure.answers().back().log10_contrast, std::log10(plan.highest_contrast));
         EXPECT_GE(procedure.answers().back().log10_contrast, lowest_log10_contrast);
-        const auto table = procedure.table("agreed");
-        ASSERT_TRUE(table) << table.error().message;
+        const auto table = require(procedure.table("agreed"));
         EXPECT_NEAR(std::log10(table->sensitivity(CyclesPerDegree(2), Degrees(0), plan.luminance)),
                     e.log10_sensitivity.mean, half_a_step);
     }
@@ -259,8 +249,7 @@ TEST_F(ProcedureTest, WhatCannotBeMeasuredIsRefused) {
     samples = CsfTable::standard().samples();
     for (std::size_t i = 0; i < samples.sensitivity.size(); ++i)
         if (i % samples.frequency_cpd.size() == 0) samples.sensitivity[i] = 1e6;
-    auto steep = Procedure::create(one_place(Method::adjustment), *CsfTable::create(samples));
-    ASSERT_TRUE(steep);
+    auto steep = require(Procedure::create(one_place(Method::adjustment), *CsfTable::create(samples)));
     while (!steep->is_done()) steep->set(1e-3);
     EXPECT_FALSE(steep->table("beyond"));
 }
@@ -384,8 +373,7 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
     Procedure procedure = begin(default_plan());
     const SimulatedObserver observer = observer_of("castle:gain=0.5", 1);
     while (!procedure.is_done()) answer(procedure, observer);
-    const auto made = procedure.table("me");
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(procedure.table("me"));
     const CsfTable& table = *made;
     EXPECT_EQ(table.samples().source, "me");
     constexpr double between_samples = 0.01; // of a quarter octave, a few degrees, a quarter of a decade
@@ -416,8 +404,7 @@ TEST_F(ProcedureTest, RunsRepeatAndResume) {
         for (int i = 0; i < 25; ++i) answer(first, observer);
         const auto file = folder() / "state.json";
         ASSERT_TRUE(first.save(file));
-        auto second = Procedure::resume(file, CsfTable::standard());
-        ASSERT_TRUE(second) << second.error().message;
+        auto second = require(Procedure::resume(file, CsfTable::standard()));
         EXPECT_EQ(second->answers().size(), 25u);
         while (!second->is_done()) answer(*second, observer);
         ASSERT_EQ(second->answers().size(), whole.answers().size());
@@ -455,8 +442,7 @@ TEST_F(ProcedureTest, OlderStatesGoOn) {
     const auto file = folder() / "old.json";
     ASSERT_TRUE(procedure.save(file));
     EXPECT_THAT(read(file), AllOf(HasSubstr("\"version\": 1"), HasSubstr("\"places\": [[0.5, 0], [1, 0],")));
-    const auto resumed = Procedure::resume(file, CsfTable::standard());
-    ASSERT_TRUE(resumed) << resumed.error().message;
+    const auto resumed = require(Procedure::resume(file, CsfTable::standard()));
     EXPECT_EQ(resumed->plan().places, plan.places);
     EXPECT_EQ(resumed->answers().size(), 5u);
 }

@@ -3,14 +3,7 @@
 
 #include <unistd.h>
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <random>
-#include <string>
-#include <string_view>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::calibration {
 

@@ -2,9 +2,7 @@
 // definition.
 #include <unseen/calibration/internal/quest.h>
 
-#include <cmath>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::calibration::quest_test {
 namespace {

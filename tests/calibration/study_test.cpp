@@ -1,25 +1,15 @@
 // Studies: orders and sides, files, what answers come to, and an observer who answers as a known probability says.
 #include <unseen/calibration/study.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <sstream>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/calibration/internal/picture_observer.h>
 #include <unseen/perception/judge.h>
 
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::calibration::study_test {
 namespace {
 
-using ::testing::HasSubstr;
 namespace fs = std::filesystem;
 
 Study study_of(StudyTask task, const fs::path& folder, int repeats = 10) {
@@ -67,8 +57,7 @@ TEST(Study, IsTheSameFromItsFile) {
     const fs::path file = folder.path() / "study.json";
     ASSERT_TRUE(write_study(file, study));
     EXPECT_THAT(text_of(file), HasSubstr("\"other\": \"c.png\"")); // folders may move
-    const auto read = read_study(file);
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(read_study(file));
     ASSERT_EQ(read->pairs.size(), study.pairs.size());
     for (std::size_t i = 0; i < study.pairs.size(); ++i) {
         EXPECT_EQ(read->pairs[i].condition, study.pairs[i].condition);
@@ -119,8 +108,7 @@ TEST(StudyAnswers, AreTakenUpWhereTheyWereLeft) {
     for (std::size_t i = 0; i < 7; ++i)
         answers.push_back({trials[i], i % 2 ? StudyChoice::left : StudyChoice::right, 0.5 * static_cast<double>(i)});
     ASSERT_TRUE(write_answers(file, study, "ann", answers));
-    const auto read = read_answers(file, study, "ann");
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(read_answers(file, study, "ann"));
     ASSERT_EQ(read->size(), answers.size());
     for (std::size_t i = 0; i < answers.size(); ++i) {
         EXPECT_EQ((*read)[i].choice, answers[i].choice);
@@ -182,8 +170,7 @@ TEST(StudyAnalysis, CountsByConditionAndLeavesTrainingOut) {
         answers.push_back({trial, seen ? StudyChoice::different : StudyChoice::same, 2});
     }
     ASSERT_TRUE(write_answers(file, study, "ann", answers));
-    const auto analysis = analyse_answers(std::span(&file, 1));
-    ASSERT_TRUE(analysis) << analysis.error().message;
+    const auto analysis = require(analyse_answers(std::span(&file, 1)));
     ASSERT_EQ(analysis->conditions.size(), 3u);
     for (const ConditionResult& result : analysis->conditions) {
         EXPECT_EQ(result.seen.of, 10u);
@@ -229,8 +216,7 @@ TEST(StudyAnalysis, SetsStepsOfLevelsBesideThoseOf2007) {
     }
     const fs::path file = folder.path() / "ann.csv";
     ASSERT_TRUE(write_answers(file, study, "ann", answers));
-    const auto analysis = analyse_answers(std::span(&file, 1));
-    ASSERT_TRUE(analysis) << analysis.error().message;
+    const auto analysis = require(analyse_answers(std::span(&file, 1)));
     ASSERT_EQ(analysis->steps.size(), 3u);
     EXPECT_EQ(analysis->steps[0].kept, 2);
     EXPECT_EQ(analysis->steps[0].step, LevelStep::decrease);

@@ -1,18 +1,10 @@
 // Changes over time: elaTCSF against its published program, and the judge of changes against closed forms.
 #include <unseen/perception/internal/change.h>
 
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::change_test {
 namespace {
-
-using testing::HasSubstr;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
@@ -144,8 +136,7 @@ TEST(ChangeJudge, ADiscThatPopsIsSeenByTheLawOfFlicker) {
     });
     // In the middle of the window, without a gaze, everything is looked at: give one.
     JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5), .gain = 1};
-    const auto popped = judge_change(grey(side), disc, 0, options);
-    ASSERT_TRUE(popped) << popped.error().message;
+    const auto popped = require(judge_change(grey(side), disc, 0, options));
     EXPECT_NEAR(decibels(popped->flicker / (contrast * 0.753 * best)), 0, 1);
     EXPECT_GT(popped->visibility, popped->flicker);
     EXPECT_GT(popped->visibility, popped->lasting);
@@ -232,8 +223,7 @@ TEST(ChangeWatch, FramesOfAGlideAddUp) {
         EXPECT_NEAR(lasting / ramp.lasting, 1, 0.03) << frames;
         // What was long ago is forgotten.
         watch.pass(remembered_s);
-        const auto later = watch.next(grey(side), blob(side, ppd, 2, 0.001), 0);
-        ASSERT_TRUE(later);
+        const auto later = require(watch.next(grey(side), blob(side, ppd, 2, 0.001), 0));
         EXPECT_NEAR(later->flicker / judged(grey(side), blob(side, ppd, 2, 0.001), 0, ppd).flicker, 1, 1e-3);
         EXPECT_EQ(watch.next(grey(side), grey(side), frame_s)->visibility, 0);
     }
@@ -242,8 +232,7 @@ TEST(ChangeWatch, FramesOfAGlideAddUp) {
 TEST(ChangeWatch, AnotherWindowBeginsAnew) {
     ChangeWatch watch({.display = display_of(8), .gain = 1});
     ASSERT_TRUE(watch.next(grey(64), blob(64, 8, 1, 0.02), 0));
-    const auto other = watch.next(grey(80), blob(80, 8, 1, 0.02), 0);
-    ASSERT_TRUE(other);
+    const auto other = require(watch.next(grey(80), blob(80, 8, 1, 0.02), 0));
     EXPECT_NEAR(other->flicker, judged(grey(80), blob(80, 8, 1, 0.02), 0, 8).flicker, 1e-4);
 }
 

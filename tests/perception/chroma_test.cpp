@@ -3,17 +3,14 @@
 #include <unseen/perception/internal/chroma.h>
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <cmath>
-
-#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "cone_contrast.h"
+#include "testing.h"
 
 namespace unseen::perception::chroma_test {
 namespace {
@@ -153,8 +150,7 @@ TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
 TEST(Chroma, IsRefusedOfRingsBoundedWithoutIt) {
     const VertexTree tree = red_green_checkerboard(0.2);
     FoldTestOptions options;
-    const auto rings = bound_cut_rings(tree, false);
-    ASSERT_TRUE(rings);
+    const auto rings = require(bound_cut_rings(tree, false));
     EXPECT_TRUE(rings->chroma.empty());
     EXPECT_TRUE(luebke_hallen_safe_distances(tree, *rings, view_from(near), options));
     options.chroma = true;
@@ -165,10 +161,8 @@ TEST(Chroma, IsRefusedOfRingsBoundedWithoutIt) {
 TEST(Chroma, OfRingsNests) {
     const VertexTree tree = checkerboard(
         [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
-    const auto sound = vdtree::SoundTree::of(tree);
-    ASSERT_TRUE(sound);
-    const auto rings = ring_chroma(tree);
-    ASSERT_TRUE(rings);
+    const auto sound = require(vdtree::SoundTree::of(tree));
+    const auto rings = require(ring_chroma(tree));
     ASSERT_EQ(rings->size(), tree.interior_count());
     const auto includes = [](const ChromaRange& outer, glm::vec2 lo, glm::vec2 hi) {
         return outer.lo.x <= lo.x && outer.lo.y <= lo.y && hi.x <= outer.hi.x && hi.y <= outer.hi.y;
@@ -228,8 +222,7 @@ TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
     const VertexTree tree = checkerboard(
         [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
     for (const bool safe : {false, true}) {
-        const auto criterion = criterion_of(tree, view_from(near), {safe, true}, true);
-        ASSERT_TRUE(criterion);
+        const auto criterion = require(criterion_of(tree, view_from(near), {safe, true}, true));
         EXPECT_TRUE(criterion->is_monotone());
     }
 }

@@ -2,15 +2,6 @@
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <memory>
-#include <random>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
@@ -23,6 +14,7 @@
 #include "measured.h"
 #include "sound.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 #include "tree_file.h"
 
@@ -111,8 +103,7 @@ TEST_F(LuebkeHallen, NeverCostsLessForAParentThanForItsChild) {
 void expect_as_tight_as_the_formula(const VertexTree& tree, const View& view, const FoldTestOptions& options,
                                     double share) {
     const vdtree::Viewpoint viewpoint = viewpoint_of(tree, view, options, {}, false);
-    const auto criterion = luebke_hallen_distances(tree, view, options);
-    ASSERT_TRUE(criterion) << criterion.error().message;
+    const auto criterion = require(luebke_hallen_distances(tree, view, options));
     const std::vector<float> costs = *vdtree::find_every_cost(tree, *criterion, viewpoint);
     const std::vector<float> exact = support::luebke_hallen_costs(tree, viewpoint, options);
     constexpr float rounding = 1e-4f; // of floats, and of the sensitivity table between its entries
@@ -155,8 +146,7 @@ TEST_F(LuebkeHallen, EqualsItsFormulaOnAFurtherMesh) {
                                     [](const auto& file) { return file.filename().string().starts_with("horse."); });
     if (found == files.end()) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES names no folder with a horse";
     const support::TempFolder scratch;
-    const auto read = meshio::read_mesh(support::uncompressed(*found, scratch.path()));
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(meshio::read_mesh(support::uncompressed(*found, scratch.path())));
     expect_as_tight_on_screen(*vdtree::build_tree(read->mesh.view()));
 }
 
@@ -212,8 +202,7 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
 
 TEST_F(LuebkeHallen, DistanceFormsRefuseWhatIsNoDisplayViewGazeOrScene) {
     const VertexTree measured = support::measured(tree());
-    const auto light_bounds = vdtree::LightBounds::measure(measured);
-    ASSERT_TRUE(light_bounds);
+    const auto light_bounds = require(vdtree::LightBounds::measure(measured));
     const auto bounds = std::make_shared<const vdtree::LightBounds>(*light_bounds);
     const CutRings rings = *bound_cut_rings(measured);
     const auto count_made = [&](auto change) {
@@ -399,24 +388,18 @@ std::pair<int, int> survive_random_lies(const VertexTree& tree, std::uint64_t se
 
 TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
     Mesh mesh = bumpy_sphere(8);
-    const auto grey = vdtree::build_tree(mesh.view());
-    ASSERT_TRUE(grey);
-    const auto measured = measure_folds(*grey, 1);
-    ASSERT_TRUE(measured);
+    const auto grey = require(vdtree::build_tree(mesh.view()));
+    const auto measured = require(measure_folds(*grey, 1));
     for (const glm::dvec3& p : mesh.positions) {
         mesh.colours.emplace_back(0.5 + 0.4 * p.x, 0.5, 0.5 - 0.4 * p.y, 1);
         mesh.uvs.emplace_back(p.x, p.y);
     }
-    const auto coloured = vdtree::build_tree(mesh.view());
-    ASSERT_TRUE(coloured);
+    const auto coloured = require(vdtree::build_tree(mesh.view()));
     mesh.texture = textures::noise(8, 8, 1);
-    const auto textured = vdtree::build_tree(mesh.view());
-    ASSERT_TRUE(textured);
+    const auto textured = require(vdtree::build_tree(mesh.view()));
     mesh.colours.clear(); // of several hues, what folds change of the texture is not measured
-    const auto uncoloured = vdtree::build_tree(mesh.view());
-    ASSERT_TRUE(uncoloured);
-    const auto measured_texture = measure_folds(*uncoloured, 1);
-    ASSERT_TRUE(measured_texture);
+    const auto uncoloured = require(vdtree::build_tree(mesh.view()));
+    const auto measured_texture = require(measure_folds(*uncoloured, 1));
     for (const VertexTree* tree : {&*measured, &*coloured, &*textured, &*measured_texture}) {
         const auto [taken, refused] = survive_random_lies(*tree, 3);
         EXPECT_GT(taken, 50);
@@ -447,8 +430,7 @@ TEST(ViewpointOf, TakesGazesOffCentreAndNoneInParallel) {
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message.find("orthographic"), std::string::npos);
     options.gaze_px = {};
-    const auto criterion = luebke_hallen_distances(tree, parallel, options);
-    ASSERT_TRUE(criterion) << criterion.error().message;
+    const auto criterion = require(luebke_hallen_distances(tree, parallel, options));
     vdtree::Cut cut(tree);
     EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, parallel, options)));
 }

@@ -3,19 +3,8 @@
 #include <unseen/perception/csf.h>
 #include <unseen/perception/internal/motion.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <fstream>
-#include <limits>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "cone_contrast.h"
+#include "testing.h"
 
 namespace unseen::perception::csf_models_test {
 namespace {
@@ -347,8 +336,7 @@ TEST(CsfModels, ArcsAreMinutesAndLogarithmsDecimal) {
 
 TEST(CsfModels, HaveDistinctNames) {
     for (const CsfModel model : csf_models) {
-        const auto found = csf_model(name(model));
-        ASSERT_TRUE(found);
+        const auto found = require(csf_model(name(model)));
         EXPECT_EQ(*found, model);
     }
     const auto unknown = csf_model("barten");

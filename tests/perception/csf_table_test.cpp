@@ -3,21 +3,10 @@
 #include <unseen/perception/csf.h>
 #include <unseen/perception/internal/motion.h>
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <random>
-#include <tuple>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::csf_table_test {
 namespace {
-
-using testing::HasSubstr;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
@@ -111,8 +100,7 @@ TEST(CsfTable, IsWithinHalfAPercentOfTheClosedForm) {
         for (const CsfConditions& conditions : all_conditions) {
             const bool knows_fields = name(model).starts_with("castle") || model == CsfModel::stela;
             if (!knows_fields && conditions.field != VisualField::worst) continue;
-            const auto table = CsfTable::from_model(model, conditions);
-            ASSERT_TRUE(table) << table.error().message;
+            const auto table = require(CsfTable::from_model(model, conditions));
             RandomPlaces random(1);
             int checked = 0;
             for (int i = 0; i < 8000; ++i) {
@@ -189,8 +177,7 @@ TEST(CsfTable, BlackCountsAsTheLowestLuminance) {
 
 TEST(CsfTable, UnderflowInThePeripheryLeavesTheFoveaAlone) {
     // The nasal red-green branch loses 11.6 decades a degree at 64 cpd: by 27 degrees no double holds it.
-    const auto table = CsfTable::from_model(CsfModel::castle_red_green, {.field = VisualField::nasal});
-    ASSERT_TRUE(table);
+    const auto table = require(CsfTable::from_model(CsfModel::castle_red_green, {.field = VisualField::nasal}));
     const Stimulus s = stimulus_of({.field = VisualField::nasal}, CyclesPerDegree(40), Degrees(2), Luminance(100));
     EXPECT_NEAR(interpolated(*table, {40, 2, 100}) / sensitivity(CsfModel::castle_red_green, s), 1, table_accuracy);
     EXPECT_GT(interpolated(*table, {64, 120, 100}), 0);
@@ -567,16 +554,14 @@ TEST(CsfTable, ModelsDoNotGrowWithEccentricity) {
 TEST(CsfTable, WhatIsMadeOfATableIsNotRefused) {
     CsfSamples s = small_samples();
     s.sensitivity = {16, 4, 1e-3, 64, 16, 4, 1.6, 0.4, 0.5, 6.4, 1.6, 0.4};
-    const auto scaled = create(s).scaled(100);
-    ASSERT_TRUE(scaled) << scaled.error().message;
+    const auto scaled = require(create(s).scaled(100));
 }
 
 TEST(CsfTable, OfWhatMovesIsAsFromTheModel) {
     RandomPlaces random(21);
     for (const CsfModel model : {CsfModel::castle, CsfModel::daly, CsfModel::barten_2004}) {
         for (const double velocity : {0.5, 10.0}) {
-            const auto moving = CsfTable::from_model(model).moving(DegreesPerSecond(velocity));
-            ASSERT_TRUE(moving) << moving.error().message;
+            const auto moving = require(CsfTable::from_model(model).moving(DegreesPerSecond(velocity)));
             const auto direct = CsfTable::from_model(model, {.velocity = DegreesPerSecond(velocity)});
             for (int i = 0; i < 500; ++i) {
                 const Place p = random.next();

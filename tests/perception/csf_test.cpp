@@ -1,17 +1,7 @@
 // castleCSF and stelaCSF against the published programs, and at the edges of their domain.
 #include <unseen/perception/csf.h>
 
-#include <array>
-#include <cmath>
-#include <fstream>
-#include <limits>
-#include <numbers>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::csf_test {
 namespace {
@@ -192,8 +182,7 @@ TEST(Csf, WiderPatchesAreSeenBetterByTheLawOfArea) {
 
 TEST(Csf, ModelsHaveNames) {
     for (const CsfModel model : models) {
-        const auto found = csf_model(name(model));
-        ASSERT_TRUE(found);
+        const auto found = require(csf_model(name(model)));
         EXPECT_EQ(*found, model);
     }
     const auto unknown = csf_model("castel");

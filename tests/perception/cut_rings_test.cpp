@@ -1,12 +1,6 @@
 // The rings of all cuts: whatever is folded, no triangle leaves the bounds of the largest of its nodes.
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <cmath>
-#include <random>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/light_bounds.h>
@@ -14,6 +8,7 @@
 #include "built.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::perception {
 
@@ -192,8 +187,7 @@ TEST(CutRings, OfADeepTreeAreQuicklyBounded) {
         for (Index c = 1; c < vertices; ++c) clustering.parents.push_back(std::min(vertices + c, 2 * vertices - 2));
         return clustering;
     };
-    auto tree = build_tree(mesh.view(), chain);
-    ASSERT_TRUE(tree) << tree.error().message;
+    auto tree = require(build_tree(mesh.view(), chain));
     const CutRings rings = *bound_cut_rings(*tree);
     std::mt19937 random(5);
     for (int trial = 0; trial < 5; ++trial) expect_within_rings(random_cut(*tree, random), rings);

@@ -1,10 +1,4 @@
 // Damaged tree files, mapped: what perception makes of whole trees fails with the node or section, and nowhere else.
-#include <filesystem>
-#include <random>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/internal/chroma.h>
@@ -14,6 +8,7 @@
 #include "built.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 #include "tree_file.h"
 

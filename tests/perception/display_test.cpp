@@ -2,18 +2,10 @@
 #include <unseen/perception/display.h>
 #include <unseen/vdtree/colour.h>
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::display_test {
 namespace {
-
-using testing::HasSubstr;
 
 constexpr TransferFunction transfer_functions[] = {TransferFunction::srgb, TransferFunction::gamma,
                                                    TransferFunction::linear};

@@ -1,17 +1,6 @@
 // The fold test by errors, where nodes differ in more ways than its table has rows.
 #include <unseen/perception/criterion.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <numbers>
-#include <random>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include <unseen/perception/csf.h>
 #include <unseen/vdtree/cut.h>
 
@@ -20,6 +9,7 @@
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::perception::error_distances_test {
 namespace {
@@ -91,8 +81,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     view.eye = {0.5, 0.5, 3};
     view.fov_y_degrees = physical_field(options.display, view.height).value();
     options.gaze_px = glm::dvec2(100, 100);
-    const auto all = criterion_of(sound, {errors, {}}, view, options);
-    ASSERT_TRUE(all) << all.error().message;
+    const auto all = require(criterion_of(sound, {errors, {}}, view, options));
     EXPECT_TRUE(all->is_monotone());
     const vdtree::DistanceCriterion::Parts& parts = all->parts();
     const std::size_t bins = parts.eccentricity_bins;
@@ -102,8 +91,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
         std::vector<FoldError> of_height(errors.size());
         for (NodeId node = 0; node < errors.size(); ++node)
             if (heights[node] == height) of_height[node] = errors[node];
-        const auto exact = criterion_of(sound, {std::move(of_height), {}}, view, options);
-        ASSERT_TRUE(exact) << exact.error().message;
+        const auto exact = require(criterion_of(sound, {std::move(of_height), {}}, view, options));
         const vdtree::DistanceCriterion::Parts& own = exact->parts();
         ASSERT_LT(own.switch_distance.size(), most_rows * bins);
         exact_rows += own.switch_distance.size() / bins;

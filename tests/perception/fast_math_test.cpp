@@ -1,13 +1,8 @@
 // The judge's functions of float against those of the standard library.
 #include "judge/fast_math.h"
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "judge/modern_masking.h"
+#include "testing.h"
 
 namespace unseen::perception::fast_math_test {
 namespace {

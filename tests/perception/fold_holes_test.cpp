@@ -2,22 +2,13 @@
 // judge then sees, while luebke_hallen_safe_distances() keeps it.
 #include <unseen/perception/criterion.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <optional>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/perception/internal/cut_rings.h>
 #include <unseen/perception/judge.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::perception::fold_holes_test {
 namespace {

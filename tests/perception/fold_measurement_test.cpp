@@ -1,19 +1,7 @@
 // What folds get wrong: nothing where nothing can be wrong, more up the tree, and the same for any number of threads.
 #include <unseen/perception/fold_measurement.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <ctime>
-#include <limits>
-#include <random>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/builder.h>
@@ -29,6 +17,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::perception {
 
@@ -286,11 +275,9 @@ TEST(FoldErrors, TellHowFarTheyAreAndCanBeCancelledAtAnyTime) {
 // Neither as they are built nor with their light conserved.
 TEST(FoldErrors, LeaveTheLuminancesAsTheyAre) {
     const VertexTree means = support::built(shapes::with_attributes(shapes::torus(24, 12)));
-    const Result<VertexTree> conserved = conserve_light(means);
-    ASSERT_TRUE(conserved);
+    const Result<VertexTree> conserved = require(conserve_light(means));
     for (const VertexTree* tree : {&means, &*conserved}) {
-        const Result<VertexTree> measured = measure_folds(*tree, 1);
-        ASSERT_TRUE(measured);
+        const Result<VertexTree> measured = require(measure_folds(*tree, 1));
         EXPECT_TRUE(has_fold_measurement(*measured));
         EXPECT_TRUE(std::ranges::equal(measured->luminance(), tree->luminance()));
         EXPECT_TRUE(std::ranges::equal(measured->support_luminance(), tree->support_luminance()));

@@ -1,10 +1,6 @@
 // Small pictures of what folds change: gratings, steps and shifts of known size.
 #include "measure/fold_picture.h"
-
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception {
 

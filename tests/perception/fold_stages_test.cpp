@@ -4,16 +4,6 @@
 
 #include "measure/lit_stages.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <numbers>
-#include <random>
-#include <span>
-#include <tuple>
-
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/tree_io.h>
 
 #include "fold/fold_errors.h"
@@ -23,6 +13,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::perception {
 

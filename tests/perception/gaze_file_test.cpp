@@ -1,23 +1,13 @@
 // Gazes from files, as trackers' programs write them.
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <random>
-#include <string>
 
-#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <unseen/perception/gaze.h>
 
+#include "testing.h"
+
 namespace unseen::perception::gaze_file_test {
 namespace {
-
-using testing::AllOf;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
 
 class GazeFileTest : public testing::Test {
 protected:
@@ -251,18 +241,15 @@ TEST_F(GazeFileTest, AnyBytesGiveATraceOrAnError) {
 
 // data/README.md says how they were made.
 TEST_F(GazeFileTest, SimulatedRecordingsAreMadeByTheirRule) {
-    const auto truth = simulate_gaze(
-        {.seed = 1, .duration_s = 5, .samples_per_s = 60, .width_px = 1600, .height_px = 1200}, Display());
-    ASSERT_TRUE(truth);
+    const auto truth = require(simulate_gaze(
+        {.seed = 1, .duration_s = 5, .samples_per_s = 60, .width_px = 1600, .height_px = 1200}, Display()));
     std::vector<GazeSample> expected = truth->samples();
     for (std::size_t i = 1; i < expected.size(); ++i)
         for (const auto& [from_s, to_s] : {std::pair(1.0, 1.15), std::pair(2.5, 2.7), std::pair(4.0, 4.25)})
             if (expected[i].time_s >= from_s && expected[i].time_s < to_s) expected[i].px = expected[i - 1].px;
     for (const char* name : {"data/gaze/simulated-pupil.csv", "data/gaze/simulated-tobii.tsv"}) {
-        const auto recording = read_gaze_recording(name);
-        ASSERT_TRUE(recording) << recording.error().message;
-        const auto trace = recording->in_window(1600, 1200);
-        ASSERT_TRUE(trace);
+        const auto recording = require(read_gaze_recording(name));
+        const auto trace = require(recording->in_window(1600, 1200));
         ASSERT_EQ(trace->samples().size(), expected.size());
         for (std::size_t i = 0; i < expected.size(); ++i) {
             EXPECT_NEAR(trace->samples()[i].time_s, expected[i].time_s, 1e-6) << name;

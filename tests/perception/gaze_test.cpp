@@ -1,17 +1,10 @@
 // Gazes: traces and their errors, the statistics of simulated ones, and what a tracker makes of them.
 #include <unseen/perception/gaze.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <gmock/gmock.h>
+#include "testing.h"
 
 namespace unseen::perception::gaze_test {
 namespace {
-
-using testing::HasSubstr;
 
 GazeTrace trace_of(std::vector<GazeSample> samples) {
     auto trace = GazeTrace::create(std::move(samples));
@@ -61,8 +54,7 @@ TEST(GazeTest, SimulatedGazesHaveThePublishedStatistics) {
     options.width_px = 3000; // 75 degrees, so that the window's edges hardly matter
     options.height_px = 3000;
     const Display display;
-    const auto trace = simulate_gaze(options, display);
-    ASSERT_TRUE(trace) << trace.error().message;
+    const auto trace = require(simulate_gaze(options, display));
     const auto& s = trace->samples();
     const auto degrees = [&](glm::dvec2 px) {
         const glm::dvec2 t = (px - glm::dvec2(1500)) * (0.000254 / 0.5);
@@ -110,8 +102,7 @@ TEST(GazeTest, SimulatedGazesHaveThePublishedStatistics) {
 
 TEST(GazeTest, SimulatedGazesStayInTheWindow) {
     for (const int side : {1, 40, 1024}) {
-        const auto trace = simulate_gaze({.duration_s = 20, .width_px = side, .height_px = side}, Display());
-        ASSERT_TRUE(trace);
+        const auto trace = require(simulate_gaze({.duration_s = 20, .width_px = side, .height_px = side}, Display()));
         for (const GazeSample& s : trace->samples()) {
             EXPECT_GE(std::min(s.px.x, s.px.y), -1e-9);
             EXPECT_LE(std::max(s.px.x, s.px.y), side + 1e-9);

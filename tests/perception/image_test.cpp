@@ -3,19 +3,7 @@
 #include <unseen/perception/image.h>
 #include <unseen/vdtree/colour.h>
 
-#include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <limits>
-#include <random>
-#include <string>
-#include <vector>
 
 #include <unistd.h>
 
@@ -24,11 +12,11 @@
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
-#include <gtest/gtest.h>
 #include <half.h>
 #include <png.h>
 
 #include "largest_allocation.h"
+#include "testing.h"
 
 namespace unseen::perception {
 namespace {
@@ -88,8 +76,7 @@ TEST_F(ImageFiles, ReadWhatWasWritten) {
             const bool is_png = std::string(name) == "a.png";
             const Image image = is_png ? codes(7, 5, channels) : radiances(7, 83, channels);
             ASSERT_TRUE(write_image(path(name), image).has_value());
-            const auto read = read_image(path(name));
-            ASSERT_TRUE(read.has_value()) << read.error().message;
+            const auto read = require(read_image(path(name)));
             EXPECT_EQ(read->is_absolute, !is_png);
             EXPECT_EQ(read->image.width, image.width);
             EXPECT_EQ(read->image.height, image.height);
@@ -175,8 +162,7 @@ TEST_F(ImageFiles, PngGreyOfEveryDepth) {
 }
 
 TEST_F(ImageFiles, PngColourPaletteAndAlpha) {
-    auto read = read_image(store("a.png", make_png({5, 4, 16, PNG_COLOR_TYPE_RGB, true})));
-    ASSERT_TRUE(read.has_value());
+    auto read = require(read_image(store("a.png", make_png({5, 4, 16, PNG_COLOR_TYPE_RGB, true}))));
     EXPECT_EQ(read->image.channels, 3);
     EXPECT_FLOAT_EQ(read->image.at(2, 3, 1), static_cast<float>(raw_byte(14, 3) * 256 + raw_byte(15, 3)) / 65535.0F);
 
@@ -230,8 +216,7 @@ TEST_F(ImageFiles, PfmOfBothEndiansRunsFromTheBottom) {
         ASSERT_TRUE(read.has_value()) << read.error().message;
         EXPECT_EQ(read->image.values, (std::vector<float>{4, 5, 6, 1, 2, 3}));
     }
-    const auto colour = read_image(store("a.pfm", pfm("PF\n1 2\n-1\n", values, true)));
-    ASSERT_TRUE(colour.has_value());
+    const auto colour = require(read_image(store("a.pfm", pfm("PF\n1 2\n-1\n", values, true))));
     EXPECT_EQ(colour->image.values, (std::vector<float>{4, 5, 6, 1, 2, 3}));
 }
 
@@ -285,14 +270,12 @@ TEST_F(ImageFiles, ExrOfHalfAndFloatAndEveryLosslessCompression) {
             const fs::path file =
                 is_half ? make_exr(path("a.exr"), {"Y"}, Imf::HALF, compression, halves, width, height)
                         : make_exr(path("a.exr"), {"depth"}, Imf::FLOAT, compression, floats, width, height);
-            const auto read = read_image(file);
-            ASSERT_TRUE(read.has_value()) << read.error().message;
+            const auto read = require(read_image(file));
             EXPECT_EQ(read->image.values, floats) << compression;
         }
     }
-    const auto colour = read_image(
-        make_exr(path("a.exr"), {"A", "B", "G", "R"}, Imf::FLOAT, Imf::ZIP_COMPRESSION, floats, width, height));
-    ASSERT_TRUE(colour.has_value());
+    const auto colour = require(read_image(
+        make_exr(path("a.exr"), {"A", "B", "G", "R"}, Imf::FLOAT, Imf::ZIP_COMPRESSION, floats, width, height)));
     EXPECT_EQ(colour->image.channels, 3);
     EXPECT_EQ(colour->image.at(7, 3, 2), floats[3 * width + 7]);
 }

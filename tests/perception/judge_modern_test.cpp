@@ -3,15 +3,7 @@
 // it judges for the median person, who is castleCSF. People: tests/calibration/people_test.cpp.
 #include <unseen/perception/judge.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <limits>
-#include <memory>
-#include <numbers>
-#include <string>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::judge_modern_test {
 namespace {
@@ -332,8 +324,7 @@ TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
 
     CsfSamples dull = options.csf_table->samples();
     for (double& s : dull.sensitivity) s /= 4;
-    auto dull_viewer = CsfTable::create(std::move(dull));
-    ASSERT_TRUE(dull_viewer);
+    auto dull_viewer = require(CsfTable::create(std::move(dull)));
     options.csf_table = std::make_shared<const CsfTable>(*std::move(dull_viewer));
     EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
 }
@@ -375,8 +366,7 @@ TEST(ThresholdMapModern, IsOfTheDisplaysDistance) {
         options.csf = CsfModel::daly;
         options.display.distance = Metres(metres);
         set_pixels_per_degree(options.display, PixelsPerDegree(default_ppd()));
-        const auto map = threshold_map_modern(flat(side, side, 20), options);
-        ASSERT_TRUE(map) << map.error().message;
+        const auto map = require(threshold_map_modern(flat(side, side, 20), options));
         double best = 0;
         for (int k = 0; k < 8; ++k) {
             const double cpd = (k == 0 ? 1 : 0.3228 * std::exp2(1 - k)) * default_ppd() / 2;
@@ -399,8 +389,7 @@ TEST(ThresholdMapModern, OnFlatFieldsIsTheClosedForm) {
             for (int x = side - 8; x < side; ++x) image.at(x, y) = 0.6F;
         }
         for (const double e : {0.0, 7.3, 24.6}) {
-            const auto map = threshold_map_modern(image, looking_beside_the_corner(e, side));
-            ASSERT_TRUE(map.has_value());
+            const auto map = require(threshold_map_modern(image, looking_beside_the_corner(e, side)));
             double best = closed_form(default_ppd() / 2, luminance, e);
             for (int k = 1; k < 8; ++k) {
                 best = std::max(best, closed_form(0.3228 * std::exp2(1 - k) * default_ppd() / 2, luminance, e));

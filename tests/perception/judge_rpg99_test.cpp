@@ -1,16 +1,7 @@
 // The rpg99 judge: known values, the behaviour of the program it reproduces, and numbers at which that program fails.
 #include <unseen/perception/judge.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <fstream>
-#include <limits>
-#include <numbers>
-#include <sstream>
-#include <string>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::judge_rpg99_test {
 namespace {
@@ -40,8 +31,7 @@ TEST(JudgeRpg99, KeepsItsVerifiedValues) {
     constexpr double tolerance = 1e-6; // maps are floats
     Rpg99Options options;
     options.field_degrees = 14.8192332;
-    const auto map = rpg99_map(scene(1, 6), scene(2, 6), options);
-    ASSERT_TRUE(map.has_value());
+    const auto map = require(rpg99_map(scene(1, 6), scene(2, 6), options));
     std::ifstream table("tests/data/rpg99_scene.csv");
     ASSERT_TRUE(table) << "run from the source root";
     std::string line;
@@ -70,8 +60,7 @@ TEST(JudgeRpg99, OnFlatFieldsIsThresholdVersusIntensity) {
                                 {2.5, 1.245}};
     for (const auto& [luminance, threshold] : pieces) {
         const Image image = flat(40, 24, static_cast<float>(std::pow(10.0, luminance)));
-        const auto map = rpg99_map(image, image, {});
-        ASSERT_TRUE(map.has_value());
+        const auto map = require(rpg99_map(image, image, {}));
         EXPECT_EQ(map->elevation.at(20, 12), 1.0F);
         EXPECT_NEAR(std::log10(map->threshold.at(20, 12)), threshold, 1e-5) << luminance;
     }
@@ -86,8 +75,7 @@ TEST(JudgeRpg99, SeesASquareInTheDarkAtAnyField) {
     for (const double field : {3.0, 14.8, 45.0, 85.0}) {
         Rpg99Options options;
         options.field_degrees = field;
-        const auto judged = judge_rpg99(black, square, options);
-        ASSERT_TRUE(judged.has_value());
+        const auto judged = require(judge_rpg99(black, square, options));
         EXPECT_GT(judged->visible_pixels, 1500U) << field;
         EXPECT_TRUE(std::isfinite(judged->max_ratio));
     }

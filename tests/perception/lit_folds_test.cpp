@@ -1,19 +1,8 @@
 // What folds change under lights, against what is measured of a tree that these light.
 #include <unseen/perception/internal/lit_folds.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <limits>
-#include <random>
-#include <string>
-#include <vector>
-
 #include <unistd.h>
 
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/internal/light_bounds.h>
@@ -22,11 +11,11 @@
 #include "built.h"
 #include "measure/fold_record.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::perception::lit_folds_test {
 namespace {
 
-using ::testing::HasSubstr;
 using namespace vdtree;
 
 Lighting one_light(glm::dvec3 direction, double ambient = 0.1) {
@@ -38,11 +27,9 @@ Lighting one_light(glm::dvec3 direction, double ambient = 0.1) {
 
 TEST(LitFolds, LightEveryVertexAsItIsDrawn) {
     const VertexTree tree = support::built(shapes::with_attributes(shapes::torus(30, 15)));
-    const auto folds = LitFolds::measure(tree);
-    ASSERT_TRUE(folds) << folds.error().message;
+    const auto folds = require(LitFolds::measure(tree));
     const Lighting lighting = one_light({1, 2, 0.5});
-    const auto lit = folds->under(tree, lighting);
-    ASSERT_TRUE(lit) << lit.error().message;
+    const auto lit = require(folds->under(tree, lighting));
     EXPECT_TRUE(has_fold_measurement(*lit));
     constexpr float half_step = 0.51f / 65535; // of stored luminances
     for (NodeId node = 0; node < tree.node_count(); ++node) {
@@ -63,8 +50,7 @@ TEST(LitFolds, AreHardlyEverLessThanWhatIsMeasuredUnderTheLight) {
         Mesh mesh = shapes::bumpy_sphere(4, 0.04);
         if (is_painted) mesh = shapes::with_attributes(std::move(mesh));
         const VertexTree tree = support::built(mesh);
-        const auto folds = LitFolds::measure(tree);
-        ASSERT_TRUE(folds);
+        const auto folds = require(LitFolds::measure(tree));
         std::mt19937_64 random(8);
         int all = 0, shorter = 0, compared = 0, less = 0, far_more = 0;
         for (int trial = 0; trial < 3; ++trial) {
@@ -94,8 +80,7 @@ TEST(LitFolds, AreHardlyEverLessThanWhatIsMeasuredUnderTheLight) {
 // in another order, and the directions of the lights are few.
 TEST(LitFolds, StagesAreHardlyEverLessThanThoseUnderTheLights) {
     const VertexTree tree = support::built(shapes::bumpy_sphere(4, 0.04));
-    const auto folds = LitFolds::measure(tree);
-    ASSERT_TRUE(folds);
+    const auto folds = require(LitFolds::measure(tree));
     std::mt19937_64 random(11);
     int compared = 0, less = 0, far_more = 0;
     for (int trial = 0; trial < 2; ++trial) {
@@ -127,8 +112,7 @@ TEST(LitFolds, StagesAreHardlyEverLessThanThoseUnderTheLights) {
 // Shifts of the mean are those of the light, not of the worst sum over the axes.
 TEST(LitFolds, BiasIsThatOfTheLight) {
     const VertexTree tree = support::built(shapes::bumpy_sphere(4, 0.04));
-    const auto folds = LitFolds::measure(tree);
-    ASSERT_TRUE(folds);
+    const auto folds = require(LitFolds::measure(tree));
     const VertexTree lit = *folds->under(tree, one_light({1, 2, 0.5}, 0.2));
     const VertexTree exact = *measure_folds(*tree.shaded([&](NodeId node) { return lit.luminance()[node]; }));
     const auto median = [](const VertexTree& of) {
@@ -145,8 +129,7 @@ TEST(LitFolds, BiasIsThatOfTheLight) {
 
 TEST(LitFolds, CostNothingWhereNoLightReaches) {
     const VertexTree tree = support::built(shapes::icosphere(4));
-    const auto folds = LitFolds::measure(tree);
-    ASSERT_TRUE(folds);
+    const auto folds = require(LitFolds::measure(tree));
     const VertexTree lit = *folds->under(tree, one_light({0, 0, 1}, 0.2));
     const auto records = lit.attribute<FoldRecord>(record_name);
     int dark = 0;
@@ -184,10 +167,8 @@ TEST(LitFolds, AreTheSameFromAFile) {
         const auto none = LitFolds::of(tree);
         ASSERT_FALSE(none);
         EXPECT_EQ(none.error().code, ErrorCode::invalid_argument);
-        const auto folds = LitFolds::measure(tree);
-        ASSERT_TRUE(folds);
-        const auto with = folds->with_attributes(tree);
-        ASSERT_TRUE(with) << with.error().message;
+        const auto folds = require(LitFolds::measure(tree));
+        const auto with = require(folds->with_attributes(tree));
         const std::filesystem::path file =
             std::filesystem::temp_directory_path() / ("lit-folds-" + std::to_string(::getpid()) + ".vdt");
         ASSERT_TRUE(write_tree(file, *with));
@@ -195,8 +176,7 @@ TEST(LitFolds, AreTheSameFromAFile) {
         std::filesystem::remove(file);
         ASSERT_TRUE(read) << read.error().message;
         EXPECT_TRUE(has_lit_folds(*read));
-        const auto kept = LitFolds::of(*read);
-        ASSERT_TRUE(kept) << kept.error().message;
+        const auto kept = require(LitFolds::of(*read));
         const Lighting lighting = one_light({1, 2, 0.5});
         EXPECT_TRUE(bytes_of(*folds->under(tree, lighting)) == bytes_of(*kept->under(*read, lighting)));
         EXPECT_FALSE(has_lit_folds(*tree.relit(Light())));
@@ -294,8 +274,7 @@ TEST(LitFolds, RefuseDamagedAttributes) {
 
 TEST(LitFolds, RefuseWhatTheyDoNotKnow) {
     const VertexTree tree = support::built(shapes::icosphere(2)), other = support::built(shapes::icosphere(3));
-    const auto folds = LitFolds::measure(tree);
-    ASSERT_TRUE(folds);
+    const auto folds = require(LitFolds::measure(tree));
     Lighting shiny = one_light({0, 0, 1});
     shiny.specular = 0.1;
     const auto highlights = folds->under(tree, shiny);

@@ -1,14 +1,6 @@
 // Whole runs that must come to the same: the scene moved, scaled, turned or renumbered, the eye a bit aside, a view
 // that stands still, and a path that closes. Each run goes from a mesh to the cuts that the perceptual fold test makes
 // along a path. The entries of docs/numerics.md by these names say what may differ.
-#include <algorithm>
-#include <cmath>
-#include <numeric>
-#include <random>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/builder.h>
@@ -17,6 +9,7 @@
 #include "built.h"
 #include "measured.h"
 #include "shapes.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::perception::metamorphic_test {
@@ -224,8 +217,7 @@ TEST_F(Metamorphic, AStillViewIsAFixedPoint) {
             const std::vector<NodeId> before(cut.indices().begin(), cut.indices().end());
             const std::uint64_t version = cut.index_version();
             for (int again = 0; again < 3; ++again) {
-                const auto stats = cut.follow(criterion, viewpoint, options);
-                ASSERT_TRUE(stats);
+                const auto stats = require(cut.follow(criterion, viewpoint, options));
                 EXPECT_EQ(stats->node_tests + stats->folds + stats->unfolds, 0u);
                 EXPECT_TRUE(cut.changes().empty());
             }
@@ -245,17 +237,14 @@ TEST_F(Metamorphic, AClosedCameraPath) {
          {Case{{}, 1}, Case{{.triangle_budget = 1200}, 1}, Case{{.triangle_budget = 1200, .hysteresis = 1.5f}, 1.5f}}) {
         Cut cut(tree), least(tree);
         const Viewpoint start = viewpoint_of(tree, round[0], options_for(round[0]));
-        const auto at_start = cut.follow(criterion, start, c.options);
-        ASSERT_TRUE(at_start);
+        const auto at_start = require(cut.follow(criterion, start, c.options));
         const auto before = support::sorted_triangles(cut);
         FollowOptions best = c.options;
         best.hysteresis = 1;
-        const auto at_least = least.follow(criterion, start, best);
-        ASSERT_TRUE(at_least);
+        const auto at_least = require(least.follow(criterion, start, best));
         for (const View& view : round)
             ASSERT_TRUE(cut.follow(criterion, viewpoint_of(tree, view, options_for(view)), c.options));
-        const auto at_end = cut.follow(criterion, start, c.options);
-        ASSERT_TRUE(at_end);
+        const auto at_end = require(cut.follow(criterion, start, c.options));
         if (c.factor == 1) {
             EXPECT_EQ(support::sorted_triangles(cut), before);
         }

@@ -1,15 +1,8 @@
 // Sensitivity to moving gratings against golden values, and eyes that follow.
 #include <unseen/perception/internal/motion.h>
 
-#include <cmath>
-#include <fstream>
-#include <limits>
-#include <sstream>
-#include <string>
-
-#include <gtest/gtest.h>
-
 #include "spatiovelocity.h"
+#include "testing.h"
 
 namespace unseen::perception::motion_test {
 namespace {

@@ -1,13 +1,5 @@
 // Hard cases of numbers in light, sensitivity and pictures: the entries of docs/numerics.md, each by its name. In each
 // the naive twin, a formula as papers have it, is shown to fail where what the library does holds its bound.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
@@ -20,12 +12,12 @@
 #include "judge/modern_masking.h"
 #include "luminance_images.h"
 #include "spatiovelocity.h"
+#include "testing.h"
 
 namespace unseen::perception::numerics_test {
 namespace {
 
 using support::flat;
-using testing::HasSubstr;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
@@ -89,12 +81,10 @@ TEST(Numerics, PicturesOfNoLightAndOfTheSun) {
         Display display;
         display.peak = Luminance(1e6);
         const Image reference = flat(33, 17, cdm2);
-        const auto judge = Judge::create(reference, {.display = display});
-        ASSERT_TRUE(judge) << cdm2;
+        const auto judge = require(Judge::create(reference, {.display = display}));
         EXPECT_EQ(judge->judge(reference)->max_ratio, 0) << "the same is the same";
         for (const float other : {0.0f, 1e-6f, 1e5f, 1e6f}) {
-            const auto seen = judge->judge(flat(33, 17, other));
-            ASSERT_TRUE(seen);
+            const auto seen = require(judge->judge(flat(33, 17, other)));
             ASSERT_TRUE(std::isfinite(seen->max_ratio)) << cdm2 << " " << other;
             if (other >= 1e5f && other > 2 * cdm2) {
                 EXPECT_GT(seen->max_ratio, 1) << cdm2 << " " << other;
@@ -207,8 +197,7 @@ double naive_decay(double decades_per_degree, double degrees) {
 
 TEST(Numerics, EccentricitiesUpTo180DegreesInTables) {
     EXPECT_EQ(naive_decay(11.6, 180), infinity) << "a threshold that no double holds";
-    const auto fading = CsfTable::from_model(CsfModel::castle_red_green, {.field = VisualField::nasal});
-    ASSERT_TRUE(fading);
+    const auto fading = require(CsfTable::from_model(CsfModel::castle_red_green, {.field = VisualField::nasal}));
     for (const CsfTable& table : {CsfTable::standard(), *fading}) {
         for (const double cpd : {1 / 16.0, 2.0, 64.0}) {
             double before = infinity;
@@ -324,8 +313,7 @@ TEST(Numerics, DisplaysOfOnePixelAndOf1And1000PixelsPerDegree) {
         if (ppd < 1) continue;
         ASSERT_TRUE(validate(display)) << ppd;
         const Image dark = flat(1, 1, 10), bright = flat(1, 1, 90);
-        const auto judged = judge_modern(dark, bright, {.display = display, .gaze_px = glm::dvec2(0.5)});
-        ASSERT_TRUE(judged) << ppd << ": " << judged.error().message;
+        const auto judged = require(judge_modern(dark, bright, {.display = display, .gaze_px = glm::dvec2(0.5)}));
         EXPECT_TRUE(std::isfinite(judged->max_ratio));
         EXPECT_EQ(judge_modern(dark, dark, {.display = display})->max_ratio, 0);
     }
@@ -375,15 +363,12 @@ TEST(Numerics, PyramidsOf1By1And1ByN) {
         const Image dark = support::noise(width, height, 20, 0.5, 1);
         Image other = dark;
         for (float& v : other.values) v *= 3;
-        const auto judge = Judge::create(dark, {.gaze_px = glm::dvec2(0, 0)});
-        ASSERT_TRUE(judge) << width << "x" << height;
+        const auto judge = require(Judge::create(dark, {.gaze_px = glm::dvec2(0, 0)}));
         EXPECT_EQ(judge->judge(dark)->max_ratio, 0) << width << "x" << height;
-        const auto seen = judge->judge(other);
-        ASSERT_TRUE(seen);
+        const auto seen = require(judge->judge(other));
         EXPECT_TRUE(std::isfinite(seen->max_ratio)) << width << "x" << height;
         EXPECT_GT(seen->max_ratio, 0) << width << "x" << height;
-        const auto map = threshold_map_modern(dark, {});
-        ASSERT_TRUE(map) << width << "x" << height;
+        const auto map = require(threshold_map_modern(dark, {}));
         for (const float v : map->values) ASSERT_TRUE(std::isfinite(v) && v > 0) << width << "x" << height;
     }
 }

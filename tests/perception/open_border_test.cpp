@@ -1,23 +1,14 @@
 // Where a surface ends, and by how far folds move that.
 #include "measure/open_border.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <ctime>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include "fold/fold_errors.h"
 #include "measure/border_shifts.h"
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::perception {
 

@@ -1,8 +1,5 @@
 // What holds of displays, sensitivity and judges whatever the numbers are. As many cases as
 // tests/vdtree/properties_test.cpp says.
-#include <algorithm>
-#include <cmath>
-#include <vector>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -15,6 +12,7 @@
 #include "fold/fold_classes.h"
 #include "judge/fast_math.h"
 #include "judge/modern_masking.h"
+#include "testing.h"
 
 namespace unseen::perception {
 namespace {

@@ -1,18 +1,6 @@
 // The oracle of single folds: each is drawn before and after at many points around it, and what changed is held against
 // what the fold tests count on: how much the luminance changes, and where. Points are exact, unlike pixels, which
 // average.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <functional>
-#include <iterator>
-#include <random>
-#include <string>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/internal/cut_rings.h>
 #include <unseen/vdtree/builder.h>
@@ -21,6 +9,7 @@
 
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::perception {
 

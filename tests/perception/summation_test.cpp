@@ -1,11 +1,6 @@
 // The window over which the judge sums energy, against the law of area.
 #include "judge/summation.h"
-
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::summation_test {
 namespace {

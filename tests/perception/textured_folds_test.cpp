@@ -1,9 +1,4 @@
 // What folds change of textures: what the measurement looks at, and what it finds.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
@@ -17,6 +12,7 @@
 #include "measure/textured_light.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 
 namespace unseen::perception::textured_folds_test {
@@ -129,11 +125,9 @@ TEST(TexturedFolds, OfAWhiteTextureAreThoseOfTheMesh) {
 TEST(TexturedFolds, StayInFiles) {
     const support::TempFolder folder;
     const VertexTree tree = measured(textures::textured_sphere(3, textures::noise(64, 64, 2)));
-    const auto lit = LitFolds::measure(tree)->with_attributes(tree);
-    ASSERT_TRUE(lit) << lit.error().message;
+    const auto lit = require(LitFolds::measure(tree)->with_attributes(tree));
     ASSERT_TRUE(write_tree(folder / "tree.vdt", *lit));
-    const auto read = read_tree(folder / "tree.vdt");
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(read_tree(folder / "tree.vdt"));
     EXPECT_TRUE(has_fold_measurement(*read));
     EXPECT_TRUE(
         std::ranges::equal(read->attribute<FoldTexture>(texture_name), tree.attribute<FoldTexture>(texture_name)));
@@ -147,8 +141,7 @@ TEST(TexturedFolds, StayInFiles) {
         for (float FoldTexture::*member : {&FoldTexture::mean, &FoldTexture::slide}) {
             std::vector<FoldTexture> damaged(whole.begin(), whole.end());
             damaged[3].*member = bad;
-            const auto lying = tree.with_attribute(texture_name, AttributeDomain::interior_node, damaged);
-            ASSERT_TRUE(lying);
+            const auto lying = require(tree.with_attribute(texture_name, AttributeDomain::interior_node, damaged));
             EXPECT_FALSE(error_distances(*lying, view, {}));
         }
 }
@@ -197,13 +190,11 @@ TEST(TexturedFolds, OfOddMeshesAreNumbers) {
     Mesh dot = textures::textured_sphere(2, textures::checkerboard(1, 1, 1, 9, 9));
     for (const Mesh& mesh :
          {constant, far, dot, textures::textured_cases(4), textures::with_uvs(shapes::all_coincident(9), texture)}) {
-        const auto tree = measure_folds(support::built(mesh), 1);
-        ASSERT_TRUE(tree) << tree.error().message;
+        const auto tree = require(measure_folds(support::built(mesh), 1));
         for (const FoldTexture& t : tree->attribute<FoldTexture>(texture_name)) EXPECT_TRUE(is_sound(t));
         vdtree::View view;
         view.eye = {0, 0, 9};
-        const auto criterion = error_distances(*tree, view, {});
-        ASSERT_TRUE(criterion) << criterion.error().message;
+        const auto criterion = require(error_distances(*tree, view, {}));
         EXPECT_TRUE(criterion->is_monotone());
     }
 }

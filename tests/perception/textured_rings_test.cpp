@@ -1,12 +1,6 @@
 // What rings of textured trees can show in any cut.
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
@@ -15,6 +9,7 @@
 #include "built.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "textures.h"
 
 namespace unseen::perception {

@@ -2,14 +2,11 @@
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <cmath>
-
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 
 #include "measured.h"
+#include "testing.h"
 
 namespace unseen::perception::translucency_test {
 namespace {

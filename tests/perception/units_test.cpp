@@ -1,11 +1,7 @@
 // Quantities: arithmetic and conversions. What must not compile is in tests/static/units_static_test.cpp.
 #include <unseen/perception/units.h>
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::perception::units_test {
 namespace {

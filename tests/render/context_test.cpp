@@ -1,14 +1,8 @@
 // Headless contexts.
 #include "gl_test.h"
 
-#include <optional>
-#include <string>
-#include <thread>
-#include <vector>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include "gl_object.h"
 
@@ -62,8 +56,7 @@ TEST_F(ContextTest, SurvivesAMove) {
 }
 
 TEST_F(ContextTest, LivesAsLongAsOneOfItsHandles) {
-    auto first = Context::headless();
-    ASSERT_TRUE(first) << first.error().message;
+    auto first = require(Context::headless());
     std::optional<Context> gone = std::move(*first);
     Context second = *gone;
     gone.reset();
@@ -73,8 +66,7 @@ TEST_F(ContextTest, LivesAsLongAsOneOfItsHandles) {
 }
 
 TEST_F(ContextTest, LivesBesideAnotherOne) {
-    auto other = Context::headless();
-    ASSERT_TRUE(other) << other.error().message;
+    auto other = require(Context::headless());
     const Buffer in_other = Buffer::create("in the other context");
     raise_error();
     ASSERT_TRUE(context().make_current());
@@ -83,10 +75,7 @@ TEST_F(ContextTest, LivesBesideAnotherOne) {
 }
 
 TEST_F(ContextTest, StaysUsableAfterAnotherOneEnds) {
-    {
-        auto other = Context::headless();
-        ASSERT_TRUE(other) << other.error().message;
-    }
+    { auto other = require(Context::headless()); }
     ASSERT_TRUE(context().make_current());
     const Buffer buffer = Buffer::create("after the other context");
     EXPECT_NE(buffer.id(), 0u);

@@ -2,8 +2,6 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <gmock/gmock.h>
-
 #include <unseen/render/internal/difference_count.h>
 #include <unseen/render/internal/stage_times.h>
 
@@ -11,7 +9,6 @@ namespace difference_count_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
-using ::testing::HasSubstr;
 using DifferenceCountTest = unseen::render::testing::GlTest;
 
 constexpr int side = 32;
@@ -118,8 +115,7 @@ TEST_F(DifferenceCountTest, RefusesWhatDoesNotFit) {
 }
 
 TEST_F(DifferenceCountTest, TimesStages) {
-    auto times = StageTimes::create(context());
-    ASSERT_TRUE(times);
+    auto times = require(StageTimes::create(context()));
     EXPECT_TRUE(times->take().empty());
     times->begin(); // forgotten
     times->begin();

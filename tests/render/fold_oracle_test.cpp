@@ -1,14 +1,4 @@
 // What the fold tests call invisible, under the oracle's eyes.
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/criterion.h>
@@ -93,13 +83,10 @@ class FoldOracleRuns : public testing::TestWithParam<Case> {
 protected:
     template <class MakeCriterion, class Check>
     void run(const VertexTree& tree, MakeCriterion&& make_criterion, Check&& check) const {
-        auto context = render::Context::headless();
-        ASSERT_TRUE(context) << context.error().message;
-        auto renderer = render::Renderer::create(*context, tree);
-        ASSERT_TRUE(renderer) << renderer.error().message;
+        auto context = require(render::Context::headless());
+        auto renderer = require(render::Renderer::create(*context, tree));
         for (const oracle::Look& look : oracle::looks_at(tree)) {
-            const auto criterion = make_criterion(look.view, look.options);
-            ASSERT_TRUE(criterion) << criterion.error().message;
+            const auto criterion = require(make_criterion(look.view, look.options));
             EXPECT_TRUE(criterion->is_monotone());
             Cut whole(tree), cut(tree);
             whole.unfold_all();

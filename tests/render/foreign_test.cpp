@@ -1,19 +1,11 @@
 // Contexts of others, adopted; and the sample that draws a followed cut in plain OpenGL, against the renderer.
-#include <array>
-#include <cmath>
-#include <cstdlib>
 #include <initializer_list>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <glm/gtc/matrix_transform.hpp>
-#include <gmock/gmock.h>
 
 #include <unseen/render/renderer.h>
 
@@ -128,14 +120,12 @@ TEST(Adopt, DrawsAsInAContextOfItsOwn) {
     const Scene scene(render::testing::bumpy_sphere(24));
     const auto own = Context::headless();
     if (!own) GTEST_SKIP() << own.error().message;
-    const auto expected = drawn_in(*own, scene);
-    ASSERT_TRUE(expected) << expected.error().message;
+    const auto expected = require(drawn_in(*own, scene));
     EglContext egl;
     SKIP_WITHOUT(egl);
     const auto adopted = Context::adopt({.make_current = [&] { egl.make_current(); }});
     ASSERT_TRUE(adopted) << adopted.error().message;
-    const auto frame = drawn_in(*adopted, scene);
-    ASSERT_TRUE(frame) << frame.error().message;
+    const auto frame = require(drawn_in(*adopted, scene));
     EXPECT_EQ(frame->luminance, expected->luminance);
     EXPECT_EQ(adopted->take_errors(), "");
 }
@@ -260,12 +250,9 @@ TEST(Adopt, LeavesTheOwnersStateAsItWas) {
     const std::vector<double> before = ClientState::now();
     ASSERT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
     {
-        const auto adopted = Context::adopt();
-        ASSERT_TRUE(adopted) << adopted.error().message;
-        auto renderer = Renderer::create(*adopted, scene.tree);
-        ASSERT_TRUE(renderer) << renderer.error().message;
-        const auto frame = renderer->draw(scene.cut, some_view(), {.samples = 4});
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto adopted = require(Context::adopt());
+        auto renderer = require(Renderer::create(*adopted, scene.tree));
+        const auto frame = require(renderer->draw(scene.cut, some_view(), {.samples = 4}));
         EXPECT_EQ(frame->luminance, expected) << "the owner's state got into the picture";
         EXPECT_EQ(ClientState::now(), before);
     }
@@ -278,8 +265,7 @@ TEST(Adopt, SaysWhereTheContextIsNotCurrent) {
     SKIP_WITHOUT(other);
     const Scene scene(render::testing::bumpy_sphere(12));
     egl.make_current();
-    const auto adopted = Context::adopt();
-    ASSERT_TRUE(adopted) << adopted.error().message;
+    const auto adopted = require(Context::adopt());
     other.make_current();
     const auto refused = drawn_in(*adopted, scene);
     ASSERT_FALSE(refused);
@@ -302,8 +288,7 @@ TEST(Adopt, DeletesNothingOfAnotherContextWhenItsOwnIsGone) {
     ASSERT_TRUE(adopted) << adopted.error().message;
     std::optional<Renderer> renderer;
     {
-        auto made = Renderer::create(*adopted, scene.tree);
-        ASSERT_TRUE(made);
+        auto made = require(Renderer::create(*adopted, scene.tree));
         renderer.emplace(std::move(*made));
         ASSERT_TRUE(renderer->draw(scene.cut, some_view(), {.samples = 1}));
     }
@@ -360,12 +345,10 @@ void expect_the_renderers_picture(const Context& context, glm::dvec2 offset) {
     for (int frame = 0; frame < 40; ++frame) {
         const double turn = 0.004 * frame;
         view_from_world = glm::lookAt(3.6 * glm::dvec3(std::sin(turn), 0.2, std::cos(turn)), glm::dvec3(0), {0, 1, 0});
-        auto made = vdtree::view_from_matrices(view_from_world, projection, window_px, window_px);
-        ASSERT_TRUE(made) << made.error().message;
+        auto made = require(vdtree::view_from_matrices(view_from_world, projection, window_px, window_px));
         view = *made;
         if (!criterion) {
-            auto of_view = vdtree::extent_criterion(tree, *view, 3);
-            ASSERT_TRUE(of_view);
+            auto of_view = require(vdtree::extent_criterion(tree, *view, 3));
             criterion = std::move(*of_view);
         }
         ASSERT_TRUE(cut.follow(*criterion, vdtree::viewpoint_of(tree, *view)));
@@ -398,20 +381,16 @@ void expect_the_renderers_picture(const Context& context, glm::dvec2 offset) {
     glDeleteProgram(program);
     ASSERT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
     std::vector<float> plain;
-    const auto pixels = read_pixels(*target);
-    ASSERT_TRUE(pixels) << pixels.error().message;
+    const auto pixels = require(read_pixels(*target));
     for (const glm::vec4& pixel : *pixels) plain.push_back(pixel.r);
 
-    auto gpu_tree = GpuTree::create(context, tree);
-    ASSERT_TRUE(gpu_tree) << gpu_tree.error().message;
+    auto gpu_tree = require(GpuTree::create(context, tree));
     GpuCut gpu_cut(*gpu_tree);
     ASSERT_TRUE(gpu_cut.follow(cut));
     const Item item{.cut = gpu_cut};
-    auto other = Target::create(context, window_px, window_px);
-    ASSERT_TRUE(other);
+    auto other = require(Target::create(context, window_px, window_px));
     ASSERT_TRUE(draw({&item, 1}, {.view = *view}, *other));
-    const auto expected = read_luminance(*other);
-    ASSERT_TRUE(expected);
+    const auto expected = require(read_luminance(*other));
     std::size_t covered = 0;
     for (const float value : *expected) covered += std::abs(value - default_background) > 0.01f;
     EXPECT_GT(covered, expected->size() / 10);
@@ -422,8 +401,7 @@ void expect_the_renderers_picture(const Context& context, glm::dvec2 offset) {
 TEST(PlainGlSample, DrawsWhatTheRendererDrawsUnderEgl) {
     EglContext egl;
     SKIP_WITHOUT(egl);
-    const auto context = Context::adopt();
-    ASSERT_TRUE(context) << context.error().message;
+    const auto context = require(Context::adopt());
     expect_the_renderers_picture(*context, {0, 0});
     expect_the_renderers_picture(*context, {0.3, -0.2});
 }

@@ -2,10 +2,6 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <algorithm>
-#include <cmath>
-#include <memory>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
 
@@ -31,8 +27,7 @@ protected:
         scene_ = std::make_unique<Scene>(bumpy_sphere(48));
         renderer_ = make_renderer();
         View view = view_from(0);
-        auto made = unseen::vdtree::extent_criterion(tree(), view, 6);
-        ASSERT_TRUE(made) << made.error().message;
+        auto made = require(unseen::vdtree::extent_criterion(tree(), view, 6));
         criterion_ = std::make_unique<unseen::vdtree::DistanceCriterion>(std::move(*made));
     }
 
@@ -151,10 +146,8 @@ TEST_F(GeomorphTest, AVertexInTheMiddleIsDrawnThere) {
     // One triangle at a time, of a quad whose four vertices come from one proxy: their shares of the way scale the
     // picture.
     Scene scene(rectangle({-0.5, -0.5}, {0.5, 0.5}, 0, grey(0.8f)));
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer);
-    auto made = Geomorph::create(scene.tree, {.seconds = 1});
-    ASSERT_TRUE(made);
+    auto renderer = require(Renderer::create(context(), scene.tree));
+    auto made = require(Geomorph::create(scene.tree, {.seconds = 1}));
     Cut cut(scene.tree);
     ASSERT_TRUE(made->step(cut, 0));
     cut.unfold_all();
@@ -162,8 +155,7 @@ TEST_F(GeomorphTest, AVertexInTheMiddleIsDrawnThere) {
     const View view = frontal_view(64, 64);
     for (const double share : {0.25, 0.5, 0.75, 1.0}) {
         ASSERT_TRUE(made->step(cut, 0.25));
-        const auto frame = renderer->draw(*made, view, {.samples = 1, .background = 0});
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto frame = require(renderer->draw(*made, view, {.samples = 1, .background = 0}));
         const auto bright =
             std::count_if(frame->luminance.begin(), frame->luminance.end(), [](float l) { return l > 0.1f; });
         const double side = 32 * share; // of the quad in pixels: half of the window when it is whole

@@ -1,7 +1,6 @@
 // Ownership of GL objects.
 #include "gl_test.h"
 
-#include <string>
 #include <type_traits>
 
 #define GL_GLEXT_PROTOTYPES 1

@@ -1,11 +1,9 @@
 // What the GL tests share: a headless context, or a skip with the reason why there is none.
 #pragma once
 
-#include <optional>
-
-#include <gtest/gtest.h>
-
 #include <unseen/render/context.h>
+
+#include "testing.h"
 
 namespace unseen::render::testing {
 

@@ -3,11 +3,6 @@
 #include "scenes.h"
 #include "shapes.h"
 
-#include <algorithm>
-#include <limits>
-
-#include <gmock/gmock.h>
-
 #include <unseen/render/internal/layers.h>
 #include <unseen/render/shadows.h>
 
@@ -15,9 +10,6 @@ namespace layers_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using LayersTest = unseen::render::testing::GlTest;
 using unseen::vdtree::View;
 
@@ -30,8 +22,7 @@ View ahead(int width, int height) {
 
 TEST(LayerSplit, StandsAtEqualFactorsOfDistance) {
     const std::vector<glm::dvec3> centres = {{0, 0, -1}, {5, 0, -3}, {0, 0, -9}, {0, 2, -27}, {0, 0, -81}, {0, 0, 4}};
-    const auto split = split_into_layers(centres, ahead(8, 8), 4);
-    ASSERT_TRUE(split) << split.error().message;
+    const auto split = require(split_into_layers(centres, ahead(8, 8), 4));
     EXPECT_EQ(split->count, 4);
     EXPECT_THAT(split->layer_of, ElementsAre(0, 1, 2, 3, 3, 0));
     ASSERT_EQ(split->borders.size(), 3u);
@@ -40,15 +31,13 @@ TEST(LayerSplit, StandsAtEqualFactorsOfDistance) {
 
 TEST(LayerSplit, LeavesOutWhatHoldsNothing) {
     const std::vector<glm::dvec3> centres = {{0, 0, -1}, {0, 0, -100}, {0, 0, -101}};
-    const auto split = split_into_layers(centres, ahead(8, 8));
-    ASSERT_TRUE(split);
+    const auto split = require(split_into_layers(centres, ahead(8, 8)));
     EXPECT_EQ(split->count, 2);
     EXPECT_THAT(split->layer_of, ElementsAre(0, 1, 1));
     // One object, one distance, or none at all: no layers.
     for (const auto& few :
          {std::vector<glm::dvec3>{}, {{0, 0, -1}}, {{0, 0, -2}, {1, 0, -2}}, {{0, 0, 3}, {0, 0, 4}}}) {
-        const auto none = split_into_layers(few, ahead(8, 8));
-        ASSERT_TRUE(none);
+        const auto none = require(split_into_layers(few, ahead(8, 8)));
         EXPECT_EQ(none->count, 0);
         EXPECT_THAT(none->borders, IsEmpty());
         EXPECT_EQ(none->layer_of, std::vector<int>(few.size(), 0));
@@ -89,8 +78,7 @@ public:
 private:
     void add(const Context& context, const Mesh& mesh, std::vector<Item>& to) {
         Scene& scene = *scenes_.emplace_back(std::make_unique<Scene>(mesh));
-        auto tree = GpuTree::create(context, scene.tree);
-        ASSERT_TRUE(tree);
+        auto tree = require(GpuTree::create(context, scene.tree));
         GpuCut cut(*tree);
         ASSERT_TRUE(cut.follow(scene.cut));
         to.push_back({cut});
@@ -111,8 +99,7 @@ TEST_F(LayersTest, TogetherAreThePictureToTheBit) {
     for (const auto& [width, height] : {std::pair{37, 23}, {64, 64}, {1, 1}})
         for (const ColourFormat format : {ColourFormat::rgba32f, ColourFormat::rgba16f}) {
             const View view = ahead(width, height);
-            auto passes = LayerPasses::create(context(), width, height, {.format = format});
-            ASSERT_TRUE(passes) << passes.error().message;
+            auto passes = require(LayerPasses::create(context(), width, height, {.format = format}));
             ASSERT_TRUE(
                 passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
             EXPECT_EQ(*read_pixels(passes->composite()),
@@ -250,8 +237,7 @@ TEST_F(LayersTest, ShadowsOnALayerMaskWhatIsBehindItAndItsOwnDoNot) {
         EXPECT_EQ(passes->counts().mask_passes, 0);
         const std::uint64_t bytes = passes->counts().texture_bytes;
         const auto plain = *read_pixels(passes->combination());
-        const auto masked = passes->combine(layer, &*by_others);
-        ASSERT_TRUE(masked) << masked.error().message;
+        const auto masked = require(passes->combine(layer, &*by_others));
         EXPECT_EQ(passes->counts().mask_passes, 1);
         EXPECT_EQ(passes->counts().texture_bytes, bytes + 20 * 64 * 64);
         const auto pixels = *read_pixels(passes->combination()), mask = *read_pixels(*passes->mask());

@@ -1,11 +1,5 @@
 // Drawing under lights: every vertex in the luminance that its formula says, and simplifications that nobody tells from
 // the whole.
-#include <cmath>
-#include <memory>
-#include <string>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/display.h>
@@ -79,8 +73,7 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
     Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
     mesh.normals.clear(); // they point anywhere; the vertices have to be seen
     const VertexTree tree = built(mesh);
-    auto renderer = render::Renderer::create(*context_, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context_, tree));
     Cut cut(tree);
     cut.unfold_all();
     const Lighting lighting = lights().lighting;
@@ -97,8 +90,7 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
         render::DrawOptions options;
         options.samples = 1;
         options.lighting = lighting;
-        const auto frame = renderer->draw(cut, view, options);
-        ASSERT_TRUE(frame) << frame.error().message;
+        const auto frame = require(renderer->draw(cut, view, options));
         const double expected = vdtree::lit_luminance(
             lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, node)), view.eye - tree.origin());
         EXPECT_NEAR(frame->luminance[0], expected, 1e-4) << lights().name << ", leaf " << leaf;
@@ -115,15 +107,13 @@ TEST_P(Lit, SimplificationsCannotBeToldFromTheWhole) {
     for (const Mesh& mesh : {shapes::bumpy_sphere(5, 0.0005), shapes::torus(120, 60, 0.8, 0.3)}) {
         const VertexTree tree = built(mesh);
         const auto bounds = std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree));
-        auto renderer = render::Renderer::create(*context_, tree);
-        ASSERT_TRUE(renderer) << renderer.error().message;
+        auto renderer = require(render::Renderer::create(*context_, tree));
         double kept = 0, all = 0;
         for (oracle::Look look : oracle::looks_at(tree, {.window_px = 256, .count = 3, .far_fill = 0.3})) {
             vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, look.view, look.options);
             viewpoint.lighting = lighting;
             look.options.scene = perception::lit_scene(tree, *bounds, lighting, viewpoint.eye, oracle::background);
-            const auto criterion = perception::lit_distances(tree, bounds, look.view, look.options);
-            ASSERT_TRUE(criterion) << criterion.error().message;
+            const auto criterion = require(perception::lit_distances(tree, bounds, look.view, look.options));
             Cut whole(tree), cut(tree);
             whole.unfold_all();
             ASSERT_TRUE(cut.follow(*criterion, viewpoint));
@@ -143,8 +133,7 @@ INSTANTIATE_TEST_SUITE_P(Lights, Lit, testing::Range<std::size_t>(0, 5),
 
 TEST_P(Lit, RefusesLightsThatCannotBe) {
     const VertexTree tree = built(shapes::icosphere(2));
-    auto renderer = render::Renderer::create(*context_, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context_, tree));
     render::DrawOptions options;
     options.lighting = Lighting(); // dark
     View view;

@@ -1,11 +1,4 @@
 // That the picture does not depend on how a mesh numbers its vertices and faces; like tests/perception/metamorphic_test.cpp.
-#include <algorithm>
-#include <cmath>
-#include <numeric>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/cut.h>
@@ -55,11 +48,9 @@ TEST_F(Metamorphic, PicturesOfPermutedMeshes) {
         EXPECT_LE(most, 0.02) << oracle::words(look);
         // What is left where nobody sees it may differ, but nobody sees it.
         for (const VertexTree* one : {&tree, &other}) {
-            const auto criterion = perception::error_distances(*one, look.view, look.options);
-            ASSERT_TRUE(criterion);
+            const auto criterion = require(perception::error_distances(*one, look.view, look.options));
             Cut cut(*one);
-            const auto stats = cut.follow(*criterion, perception::viewpoint_of(*one, look.view, look.options));
-            ASSERT_TRUE(stats);
+            const auto stats = require(cut.follow(*criterion, perception::viewpoint_of(*one, look.view, look.options)));
             folded += one->triangle_count() - stats->triangles;
             const auto judged =
                 oracle::judge(a, oracle::draw(one == &tree ? *renderer : *renderer_of_other, cut, look.view), look,

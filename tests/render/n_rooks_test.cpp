@@ -1,11 +1,7 @@
 // The sample pattern, which needs no GL.
 #include <unseen/render/sample_sum.h>
 
-#include <algorithm>
-#include <cmath>
-#include <set>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace {
 

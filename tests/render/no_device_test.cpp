@@ -1,10 +1,7 @@
 // A machine without any OpenGL driver, which the EGL dispatcher's search path can pretend.
 #include <unseen/render/context.h>
 
-#include <cstdlib>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace {
 

@@ -1,12 +1,4 @@
 // Hard cases of numbers in drawing: the entries of docs/numerics.md, each by its name, with its naive twin.
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/render/draw.h>
 #include <unseen/render/internal/visibility_passes.h>
@@ -46,16 +38,13 @@ TEST_F(Numerics, ShadowMapsAtGrazingLight) {
         GpuCut cut(*GpuTree::create(context(), floor.tree));
         ASSERT_TRUE(cut.follow(floor.cut));
         const std::vector<Item> items = {{cut, {}, Shading::smooth, false, lighting}};
-        auto shadows = Shadows::create(context(), {.size = map_px});
-        ASSERT_TRUE(shadows);
+        auto shadows = require(Shadows::create(context(), {.size = map_px}));
         ASSERT_TRUE(shadows->update(items));
-        auto target = Target::create(context(), window_px, window_px,
-                                     {.colours = {ColourFormat::rgba32f, ColourFormat::rgba32f}});
-        ASSERT_TRUE(target);
+        auto target = require(Target::create(context(), window_px, window_px,
+                                             {.colours = {ColourFormat::rgba32f, ColourFormat::rgba32f}}));
         ASSERT_TRUE(render::draw(items, {.view = view, .shadows = &*shadows, .shadow_mask = 1}, *target));
         float least = 1;
-        const auto mask = read_pixels(*target, 1);
-        ASSERT_TRUE(mask);
+        const auto mask = require(read_pixels(*target, 1));
         for (const glm::vec4& seen : *mask) {
             ASSERT_GE(seen[0], 0) << elevation_deg; // and so a number
             ASSERT_LE(seen[0], 1) << elevation_deg;

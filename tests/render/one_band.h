@@ -2,14 +2,12 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include <unseen/render/context.h>
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/vdtree/internal/judge_tables.h>
+
+#include "testing.h"
 
 namespace unseen::render::testing {
 

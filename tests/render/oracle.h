@@ -2,18 +2,12 @@
 // nothing of trees, under one model of contrast sensitivity and another.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <optional>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/display.h>
 #include <unseen/perception/judge.h>
 #include <unseen/render/renderer.h>
+
+#include "testing.h"
 
 namespace unseen::oracle {
 

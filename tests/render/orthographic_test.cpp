@@ -2,12 +2,6 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <array>
-#include <cmath>
-#include <cstdio>
-#include <stdexcept>
-#include <vector>
-
 #include <unseen/render/renderer.h>
 #include <unseen/render/sample_sum.h>
 
@@ -75,14 +69,12 @@ TEST_F(Orthographic, WhatIsNearerHidesWhatIsFarther) {
         EXPECT_TRUE(cut.follow(scene.cut));
         return Item{cut, placement};
     };
-    auto sum = SampleSum::create(context(), 32, 32);
-    ASSERT_TRUE(sum) << sum.error().message;
+    auto sum = require(SampleSum::create(context(), 32, 32));
     for (const double distance : {1e-4, 1.0, 50.0}) {
         const Item back = item(far, {}), front = item(near, {.scale = 1e-3, .translation = {0, 0, distance}});
         for (const auto& items : {std::vector{back, front}, {front, back}}) {
             ASSERT_TRUE(sum->draw(items, view, Sampling{}));
-            const auto pixels = sum->mean();
-            ASSERT_TRUE(pixels) << pixels.error().message;
+            const auto pixels = require(sum->mean());
             EXPECT_NEAR((*pixels)[16 * 32 + 8].a, 0.3f, exactly) << distance;
             EXPECT_NEAR((*pixels)[16 * 32 + 24].a, 0.6f, exactly) << distance;
         }
@@ -111,15 +103,13 @@ TEST_F(Orthographic, IsWhatPerspectiveBecomesFarAway) {
 
 TEST_F(Orthographic, PassesThatKnowOnlyPerspectiveSaySo) {
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto tree = GpuTree::create(context(), scene.tree);
-    ASSERT_TRUE(tree);
+    auto tree = require(GpuTree::create(context(), scene.tree));
     const Item item{GpuCut(*tree)};
     const View view{.width = 16, .height = 16, .orthographic_height = 2};
     const auto near = near_plane({&item, 1}, view);
     ASSERT_FALSE(near);
     EXPECT_NE(near.error().message.find("orthographic"), std::string::npos) << near.error().message;
-    auto target = Target::create(context(), 16, 16, {});
-    ASSERT_TRUE(target);
+    auto target = require(Target::create(context(), 16, 16, {}));
     EXPECT_FALSE(render::draw({&item, 1}, {.view = view, .near_plane = 1}, *target));
     EXPECT_TRUE(render::draw({&item, 1}, {.view = view}, *target));
 }
@@ -128,14 +118,12 @@ TEST_F(Orthographic, PassesThatKnowOnlyPerspectiveSaySo) {
 TEST_F(Orthographic, NobodySeesWhatIsFolded) {
     const vdtree::VertexTree tree =
         support::measured(support::built(shapes::placed(shapes::bumpy_sphere(5, 0.02), 0.1, {0, 0, 0})), 0);
-    auto renderer = Renderer::create(context(), tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(context(), tree));
     int i = 0;
     for (oracle::Look look : oracle::looks_at(tree, {.window_px = 320, .count = 6})) {
         look.view.orthographic_height = std::array{0.25, 0.05, 2.0}.at(static_cast<std::size_t>(i++ % 3));
         look.options.gaze_px = {};
-        const auto criterion = perception::error_distances(tree, look.view, look.options);
-        ASSERT_TRUE(criterion) << criterion.error().message;
+        const auto criterion = require(perception::error_distances(tree, look.view, look.options));
         vdtree::Cut whole(tree), cut(tree);
         whole.unfold_all();
         ASSERT_TRUE(cut.follow(*criterion, vdtree::viewpoint_of(tree, look.view, {}, true), {.cull_back_faces = true}));

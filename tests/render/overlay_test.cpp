@@ -2,12 +2,8 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <cmath>
-#include <vector>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include <unseen/render/internal/overlay.h>
 #include <unseen/render/renderer.h>
@@ -16,8 +12,6 @@ namespace overlay_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
-using ::testing::Each;
-using ::testing::HasSubstr;
 
 constexpr int width = 7, height = 5;
 constexpr glm::vec4 below{0.1f, 0.2f, 0.4f, 0.3f}; // what targets hold before; luminance in a
@@ -97,8 +91,7 @@ TEST_F(OverlayTest, DisplaysGetTheSameLightInCodes) {
 // lowest.
 TEST_F(OverlayTest, ForeignFramebuffersAreMixedInWhatTheyHold) {
     Target floats = target();
-    auto coded = Target::foreign(context(), width, height, {.id = floats.id()});
-    ASSERT_TRUE(coded);
+    auto coded = require(Target::foreign(context(), width, height, {.id = floats.id()}));
     ASSERT_TRUE(draw({}, {.view = frontal_view(width, height)}, *coded, {.colour = glm::vec4(0)}));
     ASSERT_TRUE(overlay(1, 2, {{255, 255, 255, 128}, {51, 102, 255, 255}}).draw(*coded, {6, 0}));
     const auto pixels = *read_pixels(*coded);
@@ -109,8 +102,7 @@ TEST_F(OverlayTest, ForeignFramebuffersAreMixedInWhatTheyHold) {
     EXPECT_EQ(pixels[5], glm::vec4(0, 0, 0, 1));
     EXPECT_EQ(pixels[6].a, 1);
 
-    auto linear = Target::foreign(context(), width, height, {.id = floats.id(), .is_for_display = false});
-    ASSERT_TRUE(linear);
+    auto linear = require(Target::foreign(context(), width, height, {.id = floats.id(), .is_for_display = false}));
     ASSERT_TRUE(draw({}, {.view = frontal_view(width, height)}, *linear, {.colour = below}));
     ASSERT_TRUE(overlay(1, 1, {{188, 90, 7, 77}}).draw(*linear, {3, 4}));
     EXPECT_NEAR((*read_pixels(*linear))[4 * width + 3].r, mixed({188, 90, 7, 77}).r, 2e-6);
@@ -194,8 +186,7 @@ TEST_F(OverlayTest, ImagesReplaceEachOther) {
 // What comes after it is drawn as before.
 TEST_F(OverlayTest, LeavesTheRendererAlone) {
     const Scene scene(cube());
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer);
+    auto renderer = require(Renderer::create(context(), scene.tree));
     const auto first = renderer->draw(scene.cut, frontal_view(width, height));
     Target to = target();
     ASSERT_TRUE(overlay(2, 1, {{255, 255, 255, 99}, {0, 0, 0, 255}}).draw(to, {1, 1}));
@@ -221,8 +212,7 @@ TEST_F(OverlayTest, RefusesWhatIsNoImageAndNoPicture) {
     EXPECT_FALSE(image.draw(depth, {0, 0})) << "no colours";
     Target to = target();
     EXPECT_FALSE(image.draw(to, {0, 0}, 1));
-    auto other = Context::headless();
-    ASSERT_TRUE(other);
+    auto other = require(Context::headless());
     EXPECT_THAT(Overlay(*other).draw(to, {0, 0}).error().message, HasSubstr("another OpenGL context"));
     ASSERT_TRUE(context().make_current());
 }

@@ -2,11 +2,6 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <map>
-#include <memory>
-
-#include <gmock/gmock.h>
-
 #include <unseen/render/renderer.h>
 
 namespace patching_test {

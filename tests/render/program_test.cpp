@@ -1,8 +1,6 @@
 // Shader programs: what compiles, and what is said about what does not.
 #include "gl_test.h"
 
-#include <gmock/gmock.h>
-
 #include "program.h"
 
 namespace program_test {
@@ -22,8 +20,7 @@ constexpr std::string_view fragment = "layout(location = 1) uniform float grey;\
 TEST_F(ProgramTest, LinksWithDefinesAndTakesUniforms) {
     const ShaderSource sources[] = {{Stage::vertex, vertex}, {Stage::fragment, fragment}};
     const std::string_view defines[] = {"GREY"};
-    const auto program = Program::build("grey", sources, defines);
-    ASSERT_TRUE(program) << program.error().message;
+    const auto program = require(Program::build("grey", sources, defines));
     program->set(0, glm::mat4(1));
     program->set(1, 0.5f);
     program->use();
@@ -51,8 +48,7 @@ TEST_F(ProgramTest, SaysWhyItDoesNotLink) {
 
 TEST_F(ProgramTest, OwnsNothingWhenMovedFrom) {
     const ShaderSource sources[] = {{Stage::vertex, vertex}};
-    auto program = Program::build("moved", sources);
-    ASSERT_TRUE(program) << program.error().message;
+    auto program = require(Program::build("moved", sources));
     const Program taken = std::move(*program);
     EXPECT_NE(taken.id(), 0u);
     EXPECT_EQ(program->id(), 0u); // NOLINT(bugprone-use-after-move)

@@ -5,13 +5,6 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <optional>
-
-#include <gmock/gmock.h>
-
 #include <unseen/render/renderer.h>
 
 #include "built.h"
@@ -215,13 +208,10 @@ TEST_F(RendererTest, DrawsTwiceTheSameBitForBit) {
             DrawOptions options;
             options.wireframe = wireframe;
             options.shading = shading;
-            auto renderer = Renderer::create(context(), scene.tree);
-            ASSERT_TRUE(renderer) << renderer.error().message;
-            const auto first = renderer->draw(scene.cut, view, options);
-            ASSERT_TRUE(first) << first.error().message;
+            auto renderer = require(Renderer::create(context(), scene.tree));
+            const auto first = require(renderer->draw(scene.cut, view, options));
             ASSERT_TRUE(renderer->draw(scene.cut, frontal_view(31, 77), {})); // something else in between
-            const auto second = renderer->draw(scene.cut, view, options);
-            ASSERT_TRUE(second) << second.error().message;
+            const auto second = require(renderer->draw(scene.cut, view, options));
             EXPECT_EQ(first->luminance, second->luminance);
             EXPECT_EQ(first->colour, second->colour);
             const Frame third = draw(scene, view, options); // by another renderer
@@ -535,10 +525,8 @@ TEST_F(RendererTest, FollowsTheCutAsItChanges) {
     Scene scene(bumpy_sphere(30));
     View view = frontal_view(48, 48);
     view.eye = {0, 0, 2.5};
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
-    const auto full = renderer->draw(scene.cut, view);
-    ASSERT_TRUE(full) << full.error().message;
+    auto renderer = require(Renderer::create(context(), scene.tree));
+    const auto full = require(renderer->draw(scene.cut, view));
     scene.cut.fold_all();
     for (int level = 0; level < 3; ++level) {
         std::vector<unseen::vdtree::NodeId> folded;
@@ -547,13 +535,11 @@ TEST_F(RendererTest, FollowsTheCutAsItChanges) {
         for (unseen::vdtree::NodeId node : folded) scene.cut.unfold(node);
     }
     ASSERT_GT(scene.cut.triangle_count(), 0u);
-    const auto coarse = renderer->draw(scene.cut, view);
-    ASSERT_TRUE(coarse) << coarse.error().message;
+    const auto coarse = require(renderer->draw(scene.cut, view));
     EXPECT_GT(difference(*full, *coarse).mean, 1e-3);
     EXPECT_EQ(coarse->luminance, draw(scene, view).luminance) << "as if drawn by a new renderer";
     scene.cut.unfold_all();
-    const auto again = renderer->draw(scene.cut, view);
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(renderer->draw(scene.cut, view));
     EXPECT_EQ(again->luminance, full->luminance);
 }
 
@@ -568,12 +554,10 @@ TEST_F(RendererTest, MeasuresTheTimeOfDrawing) {
 
 TEST_F(RendererTest, SurvivesMovesOfEverything) {
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
-    auto made = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(made) << made.error().message;
+    auto made = require(Renderer::create(context(), scene.tree));
     Renderer renderer = std::move(*made);
     Context elsewhere = std::move(context());
-    const auto frame = renderer.draw(scene.cut, frontal_view(8, 8));
-    ASSERT_TRUE(frame) << frame.error().message;
+    const auto frame = require(renderer.draw(scene.cut, frontal_view(8, 8)));
     EXPECT_NEAR(frame->luminance[0], 0.5, value_tolerance);
     context() = std::move(elsewhere);
     { const Renderer last = std::move(renderer); }
@@ -582,25 +566,19 @@ TEST_F(RendererTest, SurvivesMovesOfEverything) {
 
 TEST_F(RendererTest, OutlivesTheHandleOfItsContext) {
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
-    auto other = Context::headless();
-    ASSERT_TRUE(other) << other.error().message;
+    auto other = require(Context::headless());
     std::optional<Context> gone = std::move(*other);
-    auto renderer = Renderer::create(*gone, scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(*gone, scene.tree));
     gone.reset();
-    const auto frame = renderer->draw(scene.cut, frontal_view(8, 8));
-    ASSERT_TRUE(frame) << frame.error().message;
+    const auto frame = require(renderer->draw(scene.cut, frontal_view(8, 8)));
     EXPECT_NEAR(frame->luminance[0], 0.5, value_tolerance);
 }
 
 TEST_F(RendererTest, TakesTurnsWithARendererOfAnotherContext) {
     const Scene half(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f))), quarter(rectangle({-9, -9}, {9, 9}, 0, grey(0.25f)));
-    auto other_context = Context::headless();
-    ASSERT_TRUE(other_context) << other_context.error().message;
-    auto other = Renderer::create(*other_context, quarter.tree);
-    ASSERT_TRUE(other) << other.error().message;
-    auto renderer = Renderer::create(context(), half.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto other_context = require(Context::headless());
+    auto other = require(Renderer::create(*other_context, quarter.tree));
+    auto renderer = require(Renderer::create(context(), half.tree));
     for (int i = 0; i < 3; ++i) {
         const auto a = renderer->draw(half.cut, frontal_view(8, 8));
         const auto b = other->draw(quarter.cut, frontal_view(8, 8));
@@ -613,8 +591,7 @@ TEST_F(RendererTest, TakesTurnsWithARendererOfAnotherContext) {
 
 TEST_F(RendererTest, RefusesWhatCannotBeDrawn) {
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(context(), scene.tree));
     const auto why_not = [&](const View& view, const DrawOptions& options, const Similarity& placement) {
         const auto frame = renderer->draw(scene.cut, view, options, placement);
         EXPECT_EQ(context().take_errors(), "");
@@ -654,8 +631,7 @@ TEST_F(RendererTest, RefusesAFrameLargerThanTheDriverDraws) {
     const int side = largest_target_side() + 1;
     if (side > 32768) GTEST_SKIP() << "this driver draws every window that a view may ask for";
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(context(), scene.tree));
     const auto frame = renderer->draw(scene.cut, frontal_view(side, 1));
     ASSERT_FALSE(frame);
     EXPECT_EQ(frame.error().code, unseen::ErrorCode::unsupported);
@@ -665,8 +641,7 @@ TEST_F(RendererTest, RefusesAFrameLargerThanTheDriverDraws) {
 
 TEST_F(RendererTest, RefusesTheCutOfAnotherTree) {
     const Scene mine(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f))), yours(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto renderer = Renderer::create(context(), mine.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(context(), mine.tree));
     const auto frame = renderer->draw(yours.cut, frontal_view(8, 8));
     ASSERT_FALSE(frame);
     EXPECT_THAT(frame.error().message, ::testing::HasSubstr("another tree"));
@@ -674,8 +649,7 @@ TEST_F(RendererTest, RefusesTheCutOfAnotherTree) {
 
 TEST_F(RendererTest, RefusesToDrawToAWindowThatIsNotThere) {
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto renderer = Renderer::create(context(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(context(), scene.tree));
     const auto drawn = renderer->draw_to_window(scene.cut, frontal_view(8, 8));
     ASSERT_FALSE(drawn);
     EXPECT_THAT(drawn.error().message, ::testing::HasSubstr("headless"));

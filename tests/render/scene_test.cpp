@@ -3,13 +3,8 @@
 #include "gl_test.h"
 #include "scenes.h"
 
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include <unseen/render/renderer.h>
 
@@ -17,9 +12,6 @@ namespace scene_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
-using ::testing::Each;
-using ::testing::FloatNear;
-using ::testing::HasSubstr;
 using unseen::vdtree::Cut;
 using unseen::vdtree::Geomorph;
 using unseen::vdtree::Similarity;
@@ -122,8 +114,7 @@ TEST_F(SceneTest, SamplesAreAddedAcrossItems) {
         cube(), transformed(painted(bumpy_sphere(40), 0.8f), [](glm::dvec3 p) { return p + glm::dvec3(1, 1, 1); })));
     const std::vector<Item> items = {{.cut = cut_on_gpu(box)}, {.cut = cut_on_gpu(sphere), .placement = at({1, 1, 1})}};
     const Item merged_item{.cut = cut_on_gpu(both)};
-    auto sum = SampleSum::create(context(), window, window);
-    ASSERT_TRUE(sum) << sum.error().message;
+    auto sum = require(SampleSum::create(context(), window, window));
     const auto mean = [&](std::span<const Item> drawn) {
         EXPECT_TRUE(sum->draw(drawn, oblique_view(), {.samples = 8}));
         const auto pixels = sum->mean();
@@ -143,8 +134,7 @@ TEST_F(SceneTest, SamplesAreAddedAcrossItems) {
         ASSERT_TRUE(draw(items, {.view = oblique_view(), .point = point}, sum->sample()));
         ASSERT_TRUE(sum->add());
     }
-    const auto by_hand = sum->mean();
-    ASSERT_TRUE(by_hand);
+    const auto by_hand = require(sum->mean());
     EXPECT_TRUE(std::ranges::equal(*by_hand, drawn));
 }
 
@@ -153,8 +143,7 @@ TEST_F(SceneTest, OneTreeIsSharedByCutsOfItsOwn) {
     const GpuTree tree = on_gpu(scene);
     GpuCut fine(tree), coarse(tree);
     ASSERT_TRUE(fine.follow(scene.cut));
-    const auto criterion = unseen::vdtree::extent_criterion(scene.tree, oblique_view(), 12);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(unseen::vdtree::extent_criterion(scene.tree, oblique_view(), 12));
     Cut folded(scene.tree);
     ASSERT_TRUE(folded.follow(*criterion, {.eye = {1.5, 2, 4}}));
     ASSERT_TRUE(coarse.follow(folded));
@@ -177,8 +166,8 @@ TEST_F(SceneTest, GlidesOfOneCutDoNotMoveAnotherOfItsTree) {
     GpuCut still(tree), gliding(tree);
     ASSERT_TRUE(still.follow(scene.cut));
     Cut followed(scene.tree);
-    auto geomorph = Geomorph::create(scene.tree, {.seconds = 1, .jump_share = std::numeric_limits<double>::infinity()});
-    ASSERT_TRUE(geomorph);
+    auto geomorph =
+        require(Geomorph::create(scene.tree, {.seconds = 1, .jump_share = std::numeric_limits<double>::infinity()}));
     ASSERT_TRUE(geomorph->step(followed, 0));
     followed.unfold_all();
     ASSERT_TRUE(geomorph->step(followed, 0));
@@ -202,8 +191,7 @@ TEST_F(SceneTest, DrawsIntoWhatIsThereWhereNothingIsCleared) {
     const Scene box(cube()), sphere(painted(bumpy_sphere(40), 0.8f));
     const Item first{.cut = cut_on_gpu(box)}, second{.cut = cut_on_gpu(sphere), .placement = at({1, 1, 1})};
     const std::vector<Item> both = {first, second};
-    const auto near = near_plane(both, oblique_view());
-    ASSERT_TRUE(near);
+    const auto near = require(near_plane(both, oblique_view()));
     const Camera camera{.view = oblique_view(), .near_plane = *near};
     Target to = target();
     ASSERT_TRUE(draw({&second, 1}, camera, to));
@@ -253,8 +241,7 @@ TEST_F(SceneTest, DisplaysGetOpaqueSrgb) {
     const auto encoded = [](double linear) { return 1.055 * std::pow(linear, 1 / 2.4) - 0.055; };
     for (Target* to : {&own, &*foreign}) {
         ASSERT_TRUE(draw({&item, 1}, {.view = frontal_view(window, window)}, *to));
-        const auto pixels = read_pixels(*to);
-        ASSERT_TRUE(pixels);
+        const auto pixels = require(read_pixels(*to));
         constexpr double code = 1.0 / 255; // drivers round in either direction
         EXPECT_NEAR(pixels->front().g, encoded(0.5), code);
         EXPECT_NEAR(pixels->back().g, encoded(default_background), code);
@@ -278,8 +265,7 @@ TEST_F(SceneTest, HardwareSamplesSmoothEdges) {
 
 TEST_F(SceneTest, AnEmptySceneIsTheBackground) {
     EXPECT_THAT(picture({}, oblique_view()), Each(default_background));
-    auto sum = SampleSum::create(context(), 4, 4);
-    ASSERT_TRUE(sum);
+    auto sum = require(SampleSum::create(context(), 4, 4));
     ASSERT_TRUE(sum->draw({}, frontal_view(4, 4), {.samples = 3, .background = 0.4f}));
     EXPECT_THAT(*sum->mean(), Each(glm::vec4(0.4f)));
     ASSERT_TRUE(sum->begin(0.4f));
@@ -315,8 +301,7 @@ TEST_F(SceneTest, TilesAreThatPartOfTheWindow) {
     View view = oblique_view();
     view.eye *= 1.5;
     const auto whole = picture({item}, view);
-    const auto shown = pixels_of({&item, 1}, view);
-    ASSERT_TRUE(shown) << shown.error().message;
+    const auto shown = require(pixels_of({&item, 1}, view));
     ASSERT_GT(shown->width, 8);
     ASSERT_LT(shown->width * shown->height, window * window / 2);
     for (int i = 0; i < window * window; ++i) {
@@ -327,8 +312,7 @@ TEST_F(SceneTest, TilesAreThatPartOfTheWindow) {
         }
     }
 
-    auto sheet = Target::create(context(), 700, 300);
-    ASSERT_TRUE(sheet);
+    auto sheet = require(Target::create(context(), 700, 300));
     const float untouched = 0.9f;
     View of_sheet = view;
     of_sheet.width = 700, of_sheet.height = 300;
@@ -336,8 +320,7 @@ TEST_F(SceneTest, TilesAreThatPartOfTheWindow) {
     const PixelBox right{shown->left + shown->width / 2, shown->top, shown->width - shown->width / 2, shown->height};
     const std::vector<Tile> tiles = {{*shown, 10, 20}, {right, 700 - right.width, 300 - right.height}};
     for (const Tile& tile : tiles) ASSERT_TRUE(draw({&item, 1}, {.view = view, .tile = tile}, *sheet));
-    const auto pixels = read_luminance(*sheet);
-    ASSERT_TRUE(pixels);
+    const auto pixels = require(read_luminance(*sheet));
     std::vector<float> expected(pixels->size(), untouched);
     for (const Tile& tile : tiles)
         for (int y = 0; y < tile.part.height; ++y)
@@ -384,10 +367,8 @@ TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     EXPECT_THAT(why_not({.cut = cut}, {.view = view, .tile = Tile{all, 1, 0}}), HasSubstr("the target"));
     EXPECT_THAT(why_not({.cut = cut}, {.view = view, .shadow_mask = 0, .tile = Tile{all, 0, 0}}), HasSubstr("mask"));
 
-    auto other = Context::headless();
-    ASSERT_TRUE(other);
-    auto stranger = GpuTree::create(*other, scene.tree);
-    ASSERT_TRUE(stranger);
+    auto other = require(Context::headless());
+    auto stranger = require(GpuTree::create(*other, scene.tree));
     EXPECT_THAT(why_not({.cut = GpuCut(*stranger)}, {.view = view}), HasSubstr("another OpenGL context"));
     EXPECT_EQ(why_not({.cut = cut}, {.view = view}), "drawn");
 }

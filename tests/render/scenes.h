@@ -1,19 +1,12 @@
 // Small meshes and views of known truth for the renderer's tests.
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <functional>
-#include <stdexcept>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/view.h>
+
+#include "testing.h"
 
 namespace unseen::render::testing {
 

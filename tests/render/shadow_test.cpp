@@ -1,11 +1,5 @@
 // Shadows: where geometry says they are, still when the eye moves, none where nothing hides the light, and free where no
 // light casts one.
-#include <cmath>
-#include <numbers>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/render/draw.h>
 #include <unseen/render/shadows.h>
@@ -407,8 +401,7 @@ TEST_F(ShadowTest, AllKindsOfSurfacesAreDrawnWithThem) {
             auto shadows = Shadows::create(context(), {.size = map_px});
             ASSERT_TRUE(shadows->update(items));
             auto target = Target::create(context(), window_px, window_px);
-            const auto drawn = render::draw(items, {.view = from_above(), .shadows = &*shadows}, *target);
-            ASSERT_TRUE(drawn) << drawn.error().message;
+            const auto drawn = require(render::draw(items, {.view = from_above(), .shadows = &*shadows}, *target));
             const auto pixels = *read_pixels(*target);
             EXPECT_NEAR(pixels[static_cast<std::size_t>(window_px * pixel_at(0.05) + pixel_at(-0.5))].a, 0.2, 1e-5);
         }

@@ -1,7 +1,4 @@
 // A stereo pair drawn from one cut, judged eye by eye.
-#include <algorithm>
-
-#include <gtest/gtest.h>
 
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
@@ -22,8 +19,7 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
     if (!context) GTEST_SKIP() << context.error().message;
     const vdtree::VertexTree tree =
         support::measured(support::built(shapes::placed(shapes::bumpy_sphere(5, 0.02), 0.1, {0, 0, 0})), 0);
-    auto renderer = render::Renderer::create(*context, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context, tree));
     for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = 320, .count = 4, .far_fill = 0.3})) {
         const vdtree::CameraFrame frame = vdtree::camera_frame(look.view);
         const double apart = 0.063, screen = glm::length(look.view.eye - look.view.target); // world units
@@ -37,10 +33,8 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
         }
         perception::FoldTestOptions options = look.options;
         options.gaze_px = {};
-        const auto criterion = perception::error_distances(tree, eyes[0], options);
-        ASSERT_TRUE(criterion) << criterion.error().message;
-        const auto viewpoint = vdtree::viewpoint_of_pair(tree, eyes[0], eyes[1]);
-        ASSERT_TRUE(viewpoint) << viewpoint.error().message;
+        const auto criterion = require(perception::error_distances(tree, eyes[0], options));
+        const auto viewpoint = require(vdtree::viewpoint_of_pair(tree, eyes[0], eyes[1]));
         const vdtree::FollowOptions follow{.cull_back_faces = true};
         Cut whole(tree), both(tree);
         whole.unfold_all();

@@ -1,23 +1,14 @@
 // Targets, their limits, and how they are read back.
 #include "gl_test.h"
 
-#include <array>
-#include <limits>
-#include <optional>
-#include <utility>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include <unseen/render/target.h>
 
 namespace target_test {
 
 using namespace unseen::render;
-using ::testing::Each;
-using ::testing::FloatEq;
-using ::testing::HasSubstr;
 using TargetTest = unseen::render::testing::GlTest;
 
 void fill(const Target& target, int attachment, glm::vec4 colour) {
@@ -29,8 +20,7 @@ void fill(const Target& target, int attachment, glm::vec4 colour) {
 TEST_F(TargetTest, IsMadeInAnyShape) {
     for (auto [width, height] : {std::pair{1, 1}, {640, 3}, {3, 640}})
         for (bool depth : {true, false}) {
-            const auto made = Target::create(context(), width, height, {.depth = depth, .label = "test"});
-            ASSERT_TRUE(made) << made.error().message;
+            const auto made = require(Target::create(context(), width, height, {.depth = depth, .label = "test"}));
             EXPECT_EQ(made->width(), width);
             EXPECT_EQ(made->height(), height);
             EXPECT_NE(made->id(), 0u);
@@ -62,8 +52,8 @@ TEST_F(TargetTest, RefusesMoreThanTheDriverCanDraw) {
 }
 
 TEST_F(TargetTest, KeepsItsColoursApart) {
-    const auto made = Target::create(context(), 5, 3, {.colours = {ColourFormat::rgba32f, ColourFormat::rgba16f}});
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made =
+        require(Target::create(context(), 5, 3, {.colours = {ColourFormat::rgba32f, ColourFormat::rgba16f}}));
     fill(*made, 0, {0.1f, 0.2f, 0.3f, 0.7f});
     fill(*made, 1, {1, 2, 4, 0.5f});
     const auto luminance = read_luminance(*made), colour = read_colour(*made, 1), other = read_luminance(*made, 1);
@@ -78,16 +68,13 @@ TEST_F(TargetTest, KeepsItsColoursApart) {
 }
 
 TEST_F(TargetTest, ReadsDepthOfDepthOnlyTargets) {
-    const auto made = Target::create(context(), 4, 4, {.colours = {}});
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(Target::create(context(), 4, 4, {.colours = {}}));
     const float depth = 0.3f;
     glClearNamedFramebufferfv(made->id(), GL_DEPTH, 0, &depth);
-    const auto read = read_depth(*made);
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(read_depth(*made));
     EXPECT_THAT(*read, Each(FloatEq(depth)));
     EXPECT_FALSE(read_luminance(*made));
-    const auto flat = Target::create(context(), 4, 4, {.depth = false});
-    ASSERT_TRUE(flat);
+    const auto flat = require(Target::create(context(), 4, 4, {.depth = false}));
     EXPECT_FALSE(read_depth(*flat));
 }
 
@@ -101,36 +88,31 @@ TEST_F(TargetTest, SamplesAreResolvedBeforeTheyAreRead) {
     ASSERT_FALSE(unread);
     EXPECT_THAT(unread.error().message, HasSubstr("resolved"));
     ASSERT_TRUE(resolve(*many, *one));
-    const auto pixels = read_pixels(*one);
-    ASSERT_TRUE(pixels);
+    const auto pixels = require(read_pixels(*one));
     EXPECT_THAT(*pixels, Each(glm::vec4(0.25f, 0.5f, 0.75f, 1)));
     EXPECT_FALSE(resolve(*many, *smaller));
 }
 
 TEST_F(TargetTest, RowsComeFromTheTopAlsoOfForeignFramebuffers) {
-    const auto own = Target::create(context(), 2, 3);
-    ASSERT_TRUE(own);
+    const auto own = require(Target::create(context(), 2, 3));
     for (int row = 0; row < 3; ++row) { // in the order of memory
         const std::array<glm::vec4, 2> values = {glm::vec4(static_cast<float>(row)),
                                                  glm::vec4(static_cast<float>(row))};
         glTextureSubImage2D(own->colour_texture(), 0, 0, row, 2, 1, GL_RGBA, GL_FLOAT, values.data());
     }
     EXPECT_THAT(*read_luminance(*own), ::testing::ElementsAre(0, 0, 1, 1, 2, 2));
-    const auto foreign = Target::foreign(context(), 2, 3, {.id = own->id(), .is_for_display = false});
-    ASSERT_TRUE(foreign) << foreign.error().message;
+    const auto foreign = require(Target::foreign(context(), 2, 3, {.id = own->id(), .is_for_display = false}));
     EXPECT_THAT(*read_luminance(*foreign), ::testing::ElementsAre(2, 2, 1, 1, 0, 0));
     const PixelBox bottom{1, 1, 1, 2};
     EXPECT_THAT(*read_depth(*own, bottom), ::testing::SizeIs(2));
     EXPECT_THAT(*read_pixels(*own, 0, bottom), ::testing::ElementsAre(glm::vec4(1), glm::vec4(2)));
     EXPECT_THAT(*read_pixels(*foreign, 0, bottom), ::testing::ElementsAre(glm::vec4(1), glm::vec4(0)));
-    const auto display = Target::foreign(context(), 2, 3, {.id = own->id()});
-    ASSERT_TRUE(display);
+    const auto display = require(Target::foreign(context(), 2, 3, {.id = own->id()}));
     EXPECT_FALSE(read_luminance(*display)) << "displays get codes";
 }
 
 TEST_F(TargetTest, PartsThatAreReadLieInIt) {
-    const auto made = Target::create(context(), 5, 3);
-    ASSERT_TRUE(made);
+    const auto made = require(Target::create(context(), 5, 3));
     constexpr int most = std::numeric_limits<int>::max();
     for (const PixelBox& part : {PixelBox{0, 0, 6, 3}, PixelBox{0, 1, 5, 3}, PixelBox{-1, 0, 2, 2},
                                  PixelBox{0, 0, 0, 1}, PixelBox{most, 0, most, 1}, PixelBox{0, -most, 1, most}}) {
@@ -142,8 +124,7 @@ TEST_F(TargetTest, PartsThatAreReadLieInIt) {
 }
 
 TEST_F(TargetTest, ForeignFramebuffersStayTheirOwners) {
-    const auto own = Target::create(context(), 2, 2);
-    ASSERT_TRUE(own);
+    const auto own = require(Target::create(context(), 2, 2));
     { const auto foreign = Target::foreign(context(), 2, 2, {.id = own->id()}); }
     EXPECT_TRUE(glIsFramebuffer(own->id()));
     const auto none = Target::foreign(context(), 2, 2);
@@ -152,11 +133,9 @@ TEST_F(TargetTest, ForeignFramebuffersStayTheirOwners) {
 }
 
 TEST_F(TargetTest, IsDeletedInItsOwnContext) {
-    auto target = Target::create(context(), 2, 2);
-    ASSERT_TRUE(target);
+    auto target = require(Target::create(context(), 2, 2));
     const unsigned id = target->id();
-    auto other = Context::headless();
-    ASSERT_TRUE(other);
+    auto other = require(Context::headless());
     ASSERT_TRUE(other->make_current());
     { const Target gone = std::move(*target); }
     ASSERT_TRUE(context().make_current());
@@ -166,10 +145,8 @@ TEST_F(TargetTest, IsDeletedInItsOwnContext) {
 TEST_F(TargetTest, KeepsItsContextAlive) {
     std::optional<Target> target;
     {
-        auto other = Context::headless();
-        ASSERT_TRUE(other);
-        auto made = Target::create(*other, 2, 2);
-        ASSERT_TRUE(made);
+        auto other = require(Context::headless());
+        auto made = require(Target::create(*other, 2, 2));
         target = std::move(*made);
     }
     EXPECT_TRUE(read_pixels(*target));

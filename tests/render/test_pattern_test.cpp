@@ -1,19 +1,12 @@
 // Test patterns: the luminances that dithered codes come to, against the formulas.
 #include "gl_test.h"
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-
-#include <gmock/gmock.h>
-
 #include <unseen/render/internal/test_pattern.h>
 
 namespace test_pattern_test {
 
 using namespace unseen::render;
 using namespace unseen::render::testing;
-using ::testing::HasSubstr;
 
 constexpr double degrees = 180 / std::numbers::pi;
 constexpr double tangent_per_pixel = 0.000508; // 34.36 pixels per degree
@@ -30,8 +23,7 @@ protected:
     void SetUp() override {
         GlTest::SetUp();
         if (IsSkipped()) return;
-        auto made = TestPatternDrawer::create(context(), levels());
-        ASSERT_TRUE(made) << made.error().message;
+        auto made = require(TestPatternDrawer::create(context(), levels()));
         drawer_.emplace(std::move(*made));
     }
     void TearDown() override {
@@ -154,8 +146,7 @@ TEST_F(TestPatternTest, MatchesAndMarks) {
     pattern.code = 0.4;
     pattern.marks = {{30, 2, 33, 5}};
     pattern.mark_code = 1;
-    const auto codes = drawer().draw(pattern, 40, 16);
-    ASSERT_TRUE(codes);
+    const auto codes = require(drawer().draw(pattern, 40, 16));
     const auto at = [&](int x, int y) { return (*codes)[static_cast<std::size_t>(y * 40 + x)]; };
     for (int y = 0; y < 16; ++y) EXPECT_EQ(at(5, y), y % 4 == 0 ? 1.0f : 0.0f) << y;
     EXPECT_NEAR(at(35, 9), 0.4, 1e-6);

@@ -1,9 +1,4 @@
 // Drawing textures: the right texel in the right place, in linear light, and nothing of all that without one.
-#include <cmath>
-#include <memory>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
@@ -17,6 +12,7 @@
 #include "built.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "textures.h"
 
 namespace unseen::texture_test {
@@ -172,8 +168,7 @@ TEST_F(Textured, NothingIsMadeWithoutATexture) {
         return objects;
     };
     const VertexTree tree = built(textures::textured_grid(4, four_colours()));
-    const auto plain = tree.untextured();
-    ASSERT_TRUE(plain);
+    const auto plain = require(tree.untextured());
     const auto made_for = [&](const VertexTree& t) {
         const int before = count();
         auto renderer = render::Renderer::create(*context_, t);
@@ -221,8 +216,7 @@ TEST_F(Textured, AreBoundedUnderLights) {
     for (std::size_t v = 0; v < mesh.positions.size(); ++v)
         mesh.colours.push_back({0.3f + 0.7f * static_cast<float>(v % 2), 0.8f, v % 3 ? 0.2f : 1.0f, 1});
     const VertexTree tree = built(mesh);
-    const auto bounds = vdtree::LightBounds::measure(tree);
-    ASSERT_TRUE(bounds);
+    const auto bounds = require(vdtree::LightBounds::measure(tree));
     vdtree::Lighting lighting;
     lighting.ambient = 0.1;
     lighting.specular = 0.05;

@@ -1,13 +1,5 @@
 // The test by errors on textured models, under the oracle's eyes: nothing is seen, and about as much folds as without
 // the texture.
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <string>
-#include <tuple>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
@@ -162,14 +154,12 @@ TEST_P(TexturedErrors, AreSeenByNobody) {
     const VertexTree tree = support::measured(support::built(GetParam().make(), {.prelit = GetParam().prelit}));
     auto context = render::Context::headless();
     if (!context) GTEST_SKIP() << context.error().message;
-    auto renderer = render::Renderer::create(*context, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context, tree));
     double kept = 0, views = 0;
     for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = window_px, .to_the_front = 1.2})) {
         Cut whole(tree);
         whole.unfold_all();
-        const auto criterion = perception::error_distances(tree, look.view, look.options);
-        ASSERT_TRUE(criterion) << criterion.error().message;
+        const auto criterion = require(perception::error_distances(tree, look.view, look.options));
         EXPECT_TRUE(criterion->is_monotone());
         const Cut cut = cut_of(tree, *criterion, look);
         expect_unseen(oracle::draw(*renderer, whole, look.view), oracle::draw(*renderer, cut, look.view), look, cut);
@@ -183,22 +173,18 @@ TEST_P(TexturedErrors, AreSeenByNobody) {
 TEST_P(TexturedErrors, AreSeenByNobodyUnderLights) {
     if (!GetParam().is_lit_too) GTEST_SKIP() << "others are lit";
     const VertexTree tree = support::built(GetParam().make(), {.prelit = GetParam().prelit});
-    const auto folds = perception::LitFolds::measure(tree);
-    ASSERT_TRUE(folds) << folds.error().message;
+    const auto folds = require(perception::LitFolds::measure(tree));
     vdtree::Lighting lighting;
     lighting.ambient = 0.15;
     lighting.lights.push_back({.intensity = 0.6, .direction = glm::normalize(glm::dvec3(-0.5, 0.3, 0.8))});
     lighting.lights.push_back({.intensity = 0.2, .direction = glm::normalize(glm::dvec3(1, 0.2, -0.1))});
-    const auto lit = folds->under(tree, lighting);
-    ASSERT_TRUE(lit) << lit.error().message;
+    const auto lit = require(folds->under(tree, lighting));
     auto context = render::Context::headless();
     if (!context) GTEST_SKIP() << context.error().message;
-    auto renderer = render::Renderer::create(*context, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context, tree));
     double kept = 0, views = 0;
     for (const oracle::Look& look : oracle::looks_at(*lit, {.window_px = window_px, .to_the_front = 1.2})) {
-        const auto criterion = perception::error_distances(*lit, look.view, look.options);
-        ASSERT_TRUE(criterion) << criterion.error().message;
+        const auto criterion = require(perception::error_distances(*lit, look.view, look.options));
         Cut whole(tree);
         whole.unfold_all();
         const Cut cut = cut_of(tree, *criterion, look);

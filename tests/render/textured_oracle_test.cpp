@@ -1,10 +1,4 @@
 // What the fold tests call invisible on textured models, under the oracle's eyes.
-#include <algorithm>
-#include <cmath>
-#include <string>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/display.h>
@@ -78,17 +72,15 @@ TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
     const perception::CutRings rings = *perception::bound_cut_rings(tree);
     auto context = render::Context::headless();
     if (!context) GTEST_SKIP() << context.error().message;
-    auto renderer = render::Renderer::create(*context, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(render::Renderer::create(*context, tree));
     for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = window_px, .to_the_front = 1.2})) {
         Cut whole(tree);
         whole.unfold_all();
         const perception::Image before = oracle::draw(*renderer, whole, look.view);
         for (const bool is_safe : {false, true}) {
-            const auto criterion = is_safe
-                                       ? perception::luebke_hallen_safe_distances(tree, rings, look.view, look.options)
-                                       : perception::luebke_hallen_distances(tree, look.view, look.options);
-            ASSERT_TRUE(criterion) << criterion.error().message;
+            const auto criterion =
+                require(is_safe ? perception::luebke_hallen_safe_distances(tree, rings, look.view, look.options)
+                                : perception::luebke_hallen_distances(tree, look.view, look.options));
             EXPECT_TRUE(criterion->is_monotone());
             Cut cut(tree);
             const bool is_closed = tree.closedness() == vdtree::Closedness::closed_outward;

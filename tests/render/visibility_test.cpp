@@ -2,13 +2,8 @@
 // right: tests/apps/gpu_judge_test.cpp.
 #include "gl_test.h"
 
-#include <cmath>
-#include <string>
-#include <vector>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
-#include <gmock/gmock.h>
 
 #include <unseen/render/internal/visibility_passes.h>
 #include <unseen/render/target.h>
@@ -19,24 +14,18 @@
 namespace visibility_test {
 
 using namespace unseen::render;
-using ::testing::Each;
-using ::testing::FloatNear;
-using ::testing::HasSubstr;
 using unseen::render::testing::picture;
 using unseen::render::testing::tables;
 using VisibilityTest = unseen::render::testing::GlTest;
 
 TEST_F(VisibilityTest, CountsInThresholds) {
     const auto reference = picture(context(), 6, 3, 10), test = picture(context(), 6, 3, 11);
-    auto passes = VisibilityPasses::create(context(), tables(6, 3), reference.texture());
-    ASSERT_TRUE(passes) << passes.error().message;
+    auto passes = require(VisibilityPasses::create(context(), tables(6, 3), reference.texture()));
     ASSERT_TRUE(passes->judge(test.texture()));
     const float v = std::sqrt(2.f) * 0.8f; // a contrast of 0.1, seen 8 times
-    const auto read = passes->read_visibility();
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(passes->read_visibility());
     EXPECT_THAT(*read, Each(FloatNear(v, 1e-5f)));
-    const auto summary = passes->summary();
-    ASSERT_TRUE(summary);
+    const auto summary = require(passes->summary());
     EXPECT_NEAR(summary->largest, v, 1e-5);
     EXPECT_EQ(summary->visible_pixels, 18u);
     ASSERT_TRUE(passes->map_thresholds());
@@ -48,8 +37,7 @@ TEST_F(VisibilityTest, CountsInThresholds) {
 
 TEST_F(VisibilityTest, MakesOnlyWhatIsCalledFor) {
     const auto reference = picture(context(), 6, 3, 10);
-    auto passes = VisibilityPasses::create(context(), tables(6, 3), reference.texture());
-    ASSERT_TRUE(passes);
+    auto passes = require(VisibilityPasses::create(context(), tables(6, 3), reference.texture()));
     EXPECT_EQ(passes->thresholds_texture(), 0u);
     EXPECT_FALSE(passes->summary());
     EXPECT_FALSE(passes->read_visibility());
@@ -68,8 +56,7 @@ TEST_F(VisibilityTest, RefusesTablesForAnotherSize) {
 
 TEST_F(VisibilityTest, RefusesTexturesThatAreNoPictures) {
     const auto reference = picture(context(), 4, 4, 10);
-    auto passes = VisibilityPasses::create(context(), tables(4, 4), reference.texture());
-    ASSERT_TRUE(passes);
+    auto passes = require(VisibilityPasses::create(context(), tables(4, 4), reference.texture()));
     const auto refused = [&](const LuminanceTexture& t, const char* why) {
         const auto judged = passes->judge(t);
         ASSERT_FALSE(judged) << why;
@@ -108,8 +95,7 @@ TEST_F(VisibilityTest, ReadsTexturesWithoutMipLevels) {
     glBindTexture(GL_TEXTURE_2D, id);
     const std::vector<float> values(16 * 4, 7);
     glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, 4, 4, 0, GL_RGBA, GL_FLOAT, values.data());
-    const auto extent = luminance_extent(context(), {.id = id, .width = 4, .height = 4, .channel = 3}, "test");
-    ASSERT_TRUE(extent) << extent.error().message;
+    const auto extent = require(luminance_extent(context(), {.id = id, .width = 4, .height = 4, .channel = 3}, "test"));
     EXPECT_EQ(extent->least, 7);
     EXPECT_EQ(extent->largest, 7);
     glBindTexture(GL_TEXTURE_2D, 0);
@@ -119,10 +105,8 @@ TEST_F(VisibilityTest, ReadsTexturesWithoutMipLevels) {
 TEST_F(VisibilityTest, FindsTheExtentOfAPicture) {
     std::vector<float> values(100 * 70, 3);
     values[17] = -0.f, values[6999] = 1e5f;
-    auto image = LuminanceImage::create(context(), 100, 70, values);
-    ASSERT_TRUE(image);
-    const auto extent = luminance_extent(context(), image->texture(), "reference");
-    ASSERT_TRUE(extent) << extent.error().message;
+    auto image = require(LuminanceImage::create(context(), 100, 70, values));
+    const auto extent = require(luminance_extent(context(), image->texture(), "reference"));
     EXPECT_EQ(extent->least, 0);
     EXPECT_EQ(extent->largest, 1e5f);
     values[201] = -1;

@@ -3,18 +3,10 @@
 #include "scenes.h"
 #include "virtual_display.h"
 
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <string>
-
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
-#include <gmock/gmock.h>
 
 #include <unseen/render/context.h>
 #include <unseen/render/renderer.h>
@@ -95,11 +87,9 @@ TEST_F(WindowTest, GivesAWindowWithAContext) {
 TEST_F(WindowTest, DrawsEncodedAsSrgb) {
     Mesh mesh = rectangle({-9, -9}, {0, 9}, 0, grey(0.5f)); // the left half
     const Scene scene(mesh);
-    auto renderer = Renderer::create(window(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(window(), scene.tree));
     for (int frame = 0; frame < 3; ++frame) {
-        const auto drawn = renderer->draw_to_window(scene.cut, view());
-        ASSERT_TRUE(drawn) << drawn.error().message;
+        const auto drawn = require(renderer->draw_to_window(scene.cut, view()));
         EXPECT_THAT(pixel(view().width / 4, view().height / 2), ::testing::Each(about(srgb_byte(0.5))));
         EXPECT_THAT(pixel(3 * view().width / 4, view().height / 2),
                     ::testing::Each(about(srgb_byte(DrawOptions{}.background))));
@@ -114,8 +104,7 @@ TEST_F(WindowTest, DrawsUpAtTheTopAndNearInFront) {
     add_rectangle(mesh, {-9, 0}, {9, 9}, 0, grey(0.9f));     // the upper half, in front of ...
     add_rectangle(mesh, {-9, -9}, {9, 9}, -0.5, grey(0.1f)); // ... everything
     const Scene scene(mesh);
-    auto renderer = Renderer::create(window(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(window(), scene.tree));
     ASSERT_TRUE(renderer->draw_to_window(scene.cut, view()));
     EXPECT_THAT(pixel(view().width / 2, view().height / 4), ::testing::Each(about(srgb_byte(0.9))));
     EXPECT_THAT(pixel(view().width / 2, 3 * view().height / 4), ::testing::Each(about(srgb_byte(0.1))));
@@ -124,8 +113,7 @@ TEST_F(WindowTest, DrawsUpAtTheTopAndNearInFront) {
 TEST_F(WindowTest, CullsTheSameFacesAsOffScreen) {
     for (bool outward : {true, false}) {
         const Scene scene(cube(outward));
-        auto renderer = Renderer::create(window(), scene.tree);
-        ASSERT_TRUE(renderer) << renderer.error().message;
+        auto renderer = require(Renderer::create(window(), scene.tree));
         View looking = view();
         looking.eye = {0, 0, 3};
         ASSERT_TRUE(renderer->draw_to_window(scene.cut, looking));
@@ -136,8 +124,7 @@ TEST_F(WindowTest, CullsTheSameFacesAsOffScreen) {
 
 TEST_F(WindowTest, DrawsWireframesAndFlatShading) {
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f))); // its diagonal crosses the window's centre
-    auto renderer = Renderer::create(window(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(window(), scene.tree));
     DrawOptions options;
     options.wireframe = true;
     options.shading = Shading::flat;
@@ -148,11 +135,9 @@ TEST_F(WindowTest, DrawsWireframesAndFlatShading) {
 
 TEST_F(WindowTest, DrawsOffScreenToo) {
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
-    auto renderer = Renderer::create(window(), scene.tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
+    auto renderer = require(Renderer::create(window(), scene.tree));
     ASSERT_TRUE(renderer->draw_to_window(scene.cut, view()));
-    const auto frame = renderer->draw(scene.cut, frontal_view(16, 16));
-    ASSERT_TRUE(frame) << frame.error().message;
+    const auto frame = require(renderer->draw(scene.cut, frontal_view(16, 16)));
     constexpr float stored_tolerance = 0.5f / 65535 + 1e-6f; // luminance is stored in 16 bits
     EXPECT_THAT(frame->luminance, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance)));
     ASSERT_TRUE(renderer->draw_to_window(scene.cut, view()));
@@ -163,15 +148,11 @@ TEST_F(WindowTest, TakesTurnsWithAHeadlessContext) {
     auto headless = Context::headless();
     if (!headless) GTEST_SKIP() << headless.error().message;
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
-    auto off_screen = Renderer::create(*headless, scene.tree);
-    ASSERT_TRUE(off_screen) << off_screen.error().message;
-    auto on_screen = Renderer::create(window(), scene.tree);
-    ASSERT_TRUE(on_screen) << on_screen.error().message;
+    auto off_screen = require(Renderer::create(*headless, scene.tree));
+    auto on_screen = require(Renderer::create(window(), scene.tree));
     for (int i = 0; i < 2; ++i) {
-        const auto frame = off_screen->draw(scene.cut, frontal_view(8, 8));
-        ASSERT_TRUE(frame) << frame.error().message;
-        const auto drawn = on_screen->draw_to_window(scene.cut, view());
-        ASSERT_TRUE(drawn) << drawn.error().message;
+        const auto frame = require(off_screen->draw(scene.cut, frontal_view(8, 8)));
+        const auto drawn = require(on_screen->draw_to_window(scene.cut, view()));
     }
     EXPECT_EQ(headless->take_errors(), "");
 }

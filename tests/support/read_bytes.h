@@ -1,12 +1,9 @@
 // Reads meshes from memory, as tests expect them to be read or refused.
 #pragma once
 
-#include <string>
-#include <utility>
-
-#include <gtest/gtest.h>
-
 #include <unseen/meshio/mesh_file.h>
+
+#include "testing.h"
 
 namespace unseen::support {
 

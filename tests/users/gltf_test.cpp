@@ -143,8 +143,7 @@ protected:
                  "4",      "--target", "0",  "0",        "0",      "--fov",  "40",      "--samples", "4", "--prelit"});
         if (drawn.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
         ASSERT_EQ(drawn.status, 0) << drawn.err;
-        const auto picture = unseen::perception::read_image(path("card.pfm"));
-        ASSERT_TRUE(picture) << picture.error().message;
+        const auto picture = require(unseen::perception::read_image(path("card.pfm")));
         // The middles of 6 x 6 blocks: the card runs from -1 to 1, its coordinates from -1 to 2.
         for (int row = 0; row < 6; ++row)
             for (int column = 0; column < 6; ++column) {

@@ -94,8 +94,7 @@ TEST_F(ObjUsers, ColoursOfMaterialsAlone) {
                                "--eye", "0", "0", "6", "--target", "0", "0", "0", "--fov", "40"});
     if (drawn.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
     ASSERT_EQ(drawn.status, 0) << drawn.err;
-    const auto picture = unseen::perception::read_image(path("flat.pfm"));
-    ASSERT_TRUE(picture) << picture.error().message;
+    const auto picture = require(unseen::perception::read_image(path("flat.pfm")));
     const auto luminance = [](double r, double g, double b) {
         const auto linear = [](double code) { return std::pow((code + 0.055) / 1.055, 2.4); };
         return 0.5 + 99.5 * (0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b));

@@ -1,15 +1,13 @@
 // Meshes of scanners and CAD programs: PLY with colours, STL, OFF, in other units, and with what goes wrong in them.
-#include <map>
 
 #include "mesh_files.h"
+#include "testing.h"
 #include "user_file.h"
 
 namespace scan_test {
 
 using namespace unseen::app::testing;
 using mesh_files::little;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 class ScanUsers : public UserFileTest {
 protected:

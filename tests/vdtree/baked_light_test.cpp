@@ -1,17 +1,11 @@
 // Light in colours: found where it was baked in, and not where it was not.
 #include <unseen/vdtree/internal/baked_light.h>
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <stdexcept>
-
-#include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
-#include <gtest/gtest.h>
 
 #include "built.h"
 #include "shapes.h"
+#include "testing.h"
 #include "textures.h"
 
 namespace unseen::vdtree::baked_light_test {

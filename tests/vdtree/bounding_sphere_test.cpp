@@ -1,16 +1,7 @@
 // Enclosing spheres against CGAL's exact smallest ones, against exact containment, and how tight those of a tree are.
 #include "build/bounding_sphere.h"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <iostream>
-#include <numbers>
-#include <random>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 
@@ -18,6 +9,7 @@
 #include "exact_sphere.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -300,8 +292,7 @@ TEST(TreeSpheres, AreTight) {
     };
     for (const shapes::Named& named : meshes) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto tree = build_tree(named.mesh.view(), {.clusterer = kind});
-            ASSERT_TRUE(tree) << tree.error().message;
+            const auto tree = require(build_tree(named.mesh.view(), {.clusterer = kind}));
             const Tightness tightness = measure(*tree);
             std::cout << named.name << ", " << name(kind) << ": mean radius over the smallest one " << tightness.support
                       << " (support), " << tightness.ring << " (ring); largest " << tightness.worst << '\n';

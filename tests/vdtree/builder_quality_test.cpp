@@ -2,17 +2,7 @@
 // quadric decimation.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <iostream>
-#include <limits>
-#include <span>
-#include <stdexcept>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #ifdef UNSEEN_TEST_WITH_OPENMESH
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
@@ -23,6 +13,7 @@
 #include <unseen/vdtree/cut.h>
 
 #include "shapes.h"
+#include "testing.h"
 #include "triangle_distance.h"
 
 namespace unseen::vdtree {

@@ -1,37 +1,17 @@
 // Built trees: that they are what they should be, by brute force, for every awkward mesh and both clusterers.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
-#include <chrono>
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <map>
-#include <numeric>
-#include <random>
-#include <set>
-#include <span>
-#include <string>
-#include <tuple>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 
 #include "exact.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::builder_test {
 namespace {
-
-using testing::ElementsAre;
-using testing::HasSubstr;
 
 // The direction of a normal is computed in double from float positions, here and there by other formulas.
 constexpr double direction_rounding = 1e-7;
@@ -167,32 +147,27 @@ INSTANTIATE_TEST_SUITE_P(All, BuiltTree, testing::ValuesIn(cases()), [](const au
 });
 
 TEST_P(BuiltTree, IsVerified) {
-    const auto tree = build();
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build());
     const auto verified = verify(*tree);
     EXPECT_TRUE(verified) << verified.error().message;
 }
 
 TEST_P(BuiltTree, IsNumberedDepthFirst) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     EXPECT_EQ(support::fault_in_structure(*tree), "");
     EXPECT_GT(tree->byte_size(), tree->node_count() * sizeof(glm::vec3));
 }
 
 TEST_P(BuiltTree, GivesBackTheInputWhenUnfolded) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     EXPECT_EQ(support::fault_when_unfolded(*tree, mesh().view()), "");
     const Mesh floats = shapes::in_floats(mesh());
-    const auto from_floats = build_tree(floats.view(), {.clusterer = GetParam().kind});
-    ASSERT_TRUE(from_floats);
+    const auto from_floats = require(build_tree(floats.view(), {.clusterer = GetParam().kind}));
     EXPECT_EQ(support::fault_when_unfolded(*from_floats, floats.view()), "");
 }
 
 TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         for (Index t = support::sound(*tree).first_triangle()[node];
              t < support::sound(*tree).first_triangle()[node + 1]; ++t) {
@@ -214,8 +189,7 @@ TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
 }
 
 TEST_P(BuiltTree, HasSpheresThatContainTheirRegionsExactly) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     const Regions regions(*tree, mesh());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         const Sphere support = tree->support_spheres()[node], ring = tree->bounds()[node].ring;
@@ -238,8 +212,7 @@ TEST_P(BuiltTree, HasSpheresThatContainTheirRegionsExactly) {
 }
 
 TEST_P(BuiltTree, KnowsTheNormalsOfTheDilatedRing) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     const Regions regions(*tree, mesh());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         if (regions.is_coincident(node)) {
@@ -268,8 +241,7 @@ TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
         if (made) clustering = *made;
         return made;
     };
-    const auto tree = build_tree(mesh().view(), remember);
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(mesh().view(), remember));
     const std::size_t vertices = mesh().positions.size(), clusters = clustering.parents.size();
     std::vector<Index> leaf_of_vertex(vertices);
     for (Index leaf = 0; leaf < vertices; ++leaf) leaf_of_vertex[tree->source_vertices()[leaf]] = leaf;
@@ -308,8 +280,7 @@ TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
 }
 
 TEST_P(BuiltTree, FlagsRingsWithIrregularEdges) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     const Regions regions(*tree, mesh());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         if (regions.is_coincident(node)) continue;
@@ -319,8 +290,7 @@ TEST_P(BuiltTree, FlagsRingsWithIrregularEdges) {
 }
 
 TEST_P(BuiltTree, BoundsLuminance) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     const Regions regions(*tree, mesh());
     for (NodeId node = tree->interior_count(); node-- > 0;) {
         const auto y = tree->luminance();
@@ -369,8 +339,7 @@ TEST_P(BuiltTree, BoundsLuminance) {
 }
 
 TEST_P(BuiltTree, MeasuresDisplacement) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     for (NodeId node = tree->interior_count(); node-- > 0;) {
         double largest = 0;
         const glm::dvec3 proxy(tree->positions()[node]);
@@ -390,8 +359,7 @@ TEST_P(BuiltTree, MeasuresDisplacement) {
 }
 
 TEST_P(BuiltTree, MergesCoincidentVerticesAtNoCost) {
-    const auto tree = build();
-    ASSERT_TRUE(tree);
+    const auto tree = require(build());
     std::map<std::tuple<double, double, double>, std::vector<Index>> places;
     for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
         const glm::dvec3 p = mesh().positions[tree->source_vertices()[leaf]];
@@ -411,11 +379,9 @@ TEST_P(BuiltTree, MergesCoincidentVerticesAtNoCost) {
 }
 
 TEST_P(BuiltTree, DoesNotDependOnThreads) {
-    const auto one = build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = 1});
-    ASSERT_TRUE(one);
+    const auto one = require(build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = 1}));
     for (const int threads : {2, 8, 0}) {
-        const auto several = build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = threads});
-        ASSERT_TRUE(several);
+        const auto several = require(build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = threads}));
         EXPECT_EQ(support::difference(*one, *several), "") << threads << " threads";
     }
 }
@@ -423,11 +389,9 @@ TEST_P(BuiltTree, DoesNotDependOnThreads) {
 TEST(BuildTree, DoesNotDependOnThreadsWhereThereIsWorkForAll) {
     for (const Mesh& mesh : {shapes::bumpy_sphere(5), shapes::unwelded(shapes::bumpy_sphere(4))}) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto one = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
-            ASSERT_TRUE(one);
+            const auto one = require(build_tree(mesh.view(), {.clusterer = kind, .threads = 1}));
             for (const int threads : {2, 8}) {
-                const auto several = build_tree(mesh.view(), {.clusterer = kind, .threads = threads});
-                ASSERT_TRUE(several);
+                const auto several = require(build_tree(mesh.view(), {.clusterer = kind, .threads = threads}));
                 EXPECT_EQ(support::difference(*one, *several), "") << name(kind) << ", " << threads << " threads";
             }
             EXPECT_TRUE(verify(*one));
@@ -470,8 +434,7 @@ TEST(LiteralTree, QuadOfTwoTriangles) {
     quad.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
     quad.triangles = {{0, 1, 2}, {0, 2, 3}};
     const Clustering clustering{{4, 4, 5, 5, 6, 6, 6}, {{0.5, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, 0}}};
-    const auto tree = build_tree(quad.view(), fixed(clustering));
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(quad.view(), fixed(clustering)));
     //        0            nodes 0 to 2, leaves 3 to 6
     //      /   \.
     //     1     2
@@ -517,8 +480,7 @@ TEST(LiteralTree, Fan) {
     fan.positions = {{0, 0, 0}, {2, 0, 0}, {1, 2, 0}, {-1, 2, 0}, {-2, 0, 0}, {-1, -2, 0}};
     fan.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}};
     const Clustering clustering{{9, 9, 6, 6, 7, 8, 7, 8, 9, 9}, {}};
-    const auto tree = build_tree(fan.view(), fixed(clustering));
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(fan.view(), fixed(clustering)));
     // Leaves in depth-first order: 0 1 (5 (4 (2 3))).
     EXPECT_EQ(tree->interior_count(), 4u);
     EXPECT_THAT(copy(tree->source_vertices()), ElementsAre(0, 1, 5, 4, 2, 3));
@@ -546,8 +508,7 @@ TEST(LiteralTree, ClustersWithOneChildAreThatChild) {
     const Mesh mesh = shapes::single_triangle();
     // 3 = {0, 1}, 4 = {3}, 5 = {2}, 6 = {4, 5}, 7 = {6}
     const Clustering clustering{{3, 3, 5, 4, 6, 6, 7, 7}, {}};
-    const auto tree = build_tree(mesh.view(), fixed(clustering));
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(mesh.view(), fixed(clustering)));
     EXPECT_EQ(tree->interior_count(), 2u);
     EXPECT_EQ(support::fault_in_structure(*tree), "");
     EXPECT_EQ(support::fault_when_unfolded(*tree, mesh.view()), "");
@@ -558,8 +519,7 @@ TEST(LiteralTree, OneClusterForAll) {
     const Mesh mesh = shapes::cube(2);
     const Index n = static_cast<Index>(mesh.positions.size());
     const Clustering clustering{std::vector<Index>(n + 1, n), {}};
-    const auto tree = build_tree(mesh.view(), fixed(clustering));
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view(), fixed(clustering)));
     EXPECT_EQ(tree->interior_count(), 1u);
     EXPECT_EQ(support::fault_when_unfolded(*tree, mesh.view()), "");
     EXPECT_TRUE(verify(*tree));
@@ -666,8 +626,7 @@ TEST(UserClustering, IsGivenLuminanceNormalsAreasAndCoincidence) {
 
 TEST(BuildTree, CountsTheTrianglesItDrops) {
     const Mesh mesh = shapes::with_degenerate_triangles(shapes::cube(2));
-    const auto tree = build_tree(mesh.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view()));
     EXPECT_EQ(tree->dropped_triangles(), 16u);
     EXPECT_EQ(tree->triangle_count(), 48u);
 }
@@ -726,16 +685,14 @@ TEST(BuildTree, RefusesSizesThatNumbersCannotHold) {
         ASSERT_FALSE(tree) << scale;
         EXPECT_THAT(tree.error().message, testing::HasSubstr("scale it up"));
     }
-    const auto smallest = build_tree(shapes::placed(ball, 1e-36).view());
-    ASSERT_TRUE(smallest);
+    const auto smallest = require(build_tree(shapes::placed(ball, 1e-36).view()));
     EXPECT_TRUE(verify(*smallest));
     for (const double x : {1e15, -1e15, 1e30}) {
         const auto tree = build_tree(far(x).view());
         ASSERT_FALSE(tree) << x;
         EXPECT_THAT(tree.error().message, testing::HasSubstr("move it nearer to the origin"));
     }
-    const auto farthest = build_tree(far(1e13).view());
-    ASSERT_TRUE(farthest);
+    const auto farthest = require(build_tree(far(1e13).view()));
     EXPECT_TRUE(verify(*farthest));
     Mesh wall = shapes::grid(4); // exact there, since one of its coordinates is the same everywhere
     for (glm::dvec3& p : wall.positions) p.z = 1e15;
@@ -753,8 +710,7 @@ TEST(BuildTree, IsSoundWhereFloatsDoNotTellVerticesApart) {
             mesh.positions[v] += apart * glm::dvec3(v % 3, v % 5, v % 7);
         mesh = shapes::with_attributes(mesh);
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto tree = build_tree(mesh.view(), {.clusterer = kind});
-            ASSERT_TRUE(tree);
+            const auto tree = require(build_tree(mesh.view(), {.clusterer = kind}));
             const auto sound = verify(*tree);
             EXPECT_TRUE(sound) << apart << ": " << sound.error().message;
         }
@@ -786,8 +742,7 @@ TEST(BuildTree, ComputesNormalsThatAreMissing) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     mesh.normals[3] = {nan, 0, 0};
     mesh.normals[7] = {0, 0, 0};
-    const auto tree = build_tree(mesh.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view()));
     for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
         const Index v = tree->source_vertices()[leaf];
         const glm::vec3 n = tree->normals()[tree->interior_count() + leaf];
@@ -823,16 +778,14 @@ TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
         {"nothing but a point", shapes::all_coincident(4), Closedness::open},
     };
     for (const auto& [what, mesh, closedness] : expected) {
-        const auto tree = build_tree(mesh.view());
-        ASSERT_TRUE(tree) << what;
+        const auto tree = require(build_tree(mesh.view()));
         EXPECT_EQ(tree->closedness(), closedness) << what;
     }
 }
 
 TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
     const Mesh mesh = shapes::inside_out(shapes::icosphere(2));
-    const auto tree = build_tree(mesh.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view()));
     for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
         const NodeId node = tree->interior_count() + leaf;
         EXPECT_GT(glm::dot(glm::vec3(tree->normals()[node]), tree->positions()[node]), 0.9f);
@@ -842,8 +795,8 @@ TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
 TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
     for (const bool colours_differ : {false, true}) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto tree = build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind, .prelit = true});
-            ASSERT_TRUE(tree);
+            const auto tree =
+                require(build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind, .prelit = true}));
             EXPECT_TRUE(tree->is_prelit());
             int merges = 0;
             for (NodeId node = 0; node < tree->interior_count(); ++node) {
@@ -863,8 +816,7 @@ TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
 TEST(BuildTree, KeepsThePrecisionOfNorthings) {
     // Metres of UTM: a float has a step of 0.5 m at 5e6, the tree's one of micrometres.
     const Mesh mesh = shapes::placed(shapes::bumpy_sphere(3), 20, {4.5e5, 5.4e6, 300});
-    const auto tree = build_tree(mesh.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view()));
     for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
         const glm::dvec3 p = tree->origin() + glm::dvec3(tree->positions()[tree->interior_count() + leaf]);
         ASSERT_LT(glm::distance(p, mesh.positions[tree->source_vertices()[leaf]]), 5e-6);
@@ -884,8 +836,7 @@ TEST(Relit, EqualsATreeBuiltWithThatLight) {
         EXPECT_EQ(support::difference(*tree->relit(light), *expected), "") << shape;
         EXPECT_EQ(support::difference(*tree->relit(light)->relit(tree->light()), *tree), "") << shape;
     }
-    const auto quadric = build_tree(meshes().at("bumpy_sphere").view());
-    ASSERT_TRUE(quadric);
+    const auto quadric = require(build_tree(meshes().at("bumpy_sphere").view()));
     EXPECT_TRUE(verify(*quadric->relit(light)));
 }
 
@@ -915,8 +866,7 @@ TEST(BuildTree, LightsColoursUnlessTheyArePrelit) {
 
 TEST(Relit, ShadesColoursByTheLight) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
-    const auto tree = build_tree(mesh.view(), {.prelit = true});
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view(), {.prelit = true}));
     EXPECT_TRUE(tree->is_prelit());
     const Light light{.direction = {0, 0, 1}, .ambient = 0.3f, .fill = 0};
     const VertexTree lit = *tree->relit(light);
@@ -936,8 +886,7 @@ TEST(Relit, ShadesColoursByTheLight) {
 TEST(Relit, StaysWithinTheRangeOfLuminance) {
     Mesh white = shapes::icosphere(2);
     white.colours.assign(white.positions.size(), glm::vec4(1));
-    const auto tree = build_tree(white.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(white.view()));
     const float nan = std::numeric_limits<float>::quiet_NaN();
     for (const Light& light : {Light{{0, 0, 1.0009f}, 0}, Light{{0, 0, 9}, 0.5f}, Light{{nan, 0, 0}, 0.2f},
                                Light{{0, 0, 1}, nan}, Light{{0, 0, 1}, -3}}) {
@@ -952,8 +901,7 @@ TEST(Relit, StaysWithinTheRangeOfLuminance) {
 TEST(BuildTree, LightsFacesThatTurnAwayMoreWeakly) {
     const Mesh mesh = shapes::icosphere(3);
     const Light light{.direction = {0, 0, 1}, .ambient = 0.25f, .fill = 0.5f};
-    const auto tree = build_tree(mesh.view(), {.light = light});
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(mesh.view(), {.light = light}));
     const auto expected = [](float facing) {
         return default_albedo * (0.25f + 0.75f * (facing > 0 ? facing : -0.5f * facing));
     };

@@ -1,21 +1,15 @@
 // The adapter for CGAL's surface meshes: to trees, and back from cuts.
 #include <unseen/cgal/cgal.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Simple_cartesian.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::cgal {
 namespace {
 
-using testing::HasSubstr;
 using vdtree::Index;
 using vdtree::Mesh;
 using vdtree::Triangle;
@@ -43,11 +37,9 @@ Triangle from_least(Triangle t) {
 
 template <class M>
 void expect_round_trip(const Mesh& mesh) {
-    const auto made = from_mesh<M>(mesh.view());
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(from_mesh<M>(mesh.view()));
     EXPECT_EQ(made->loose_triangles, 0u);
-    const auto back = to_mesh(made->mesh);
-    ASSERT_TRUE(back) << back.error().message;
+    const auto back = require(to_mesh(made->mesh));
     EXPECT_EQ(back->mesh.positions, mesh.positions);
     EXPECT_EQ(back->mesh.normals, mesh.normals);
     EXPECT_EQ(back->mesh.uvs, mesh.uvs);
@@ -68,15 +60,12 @@ TEST(CgalAdapter, MeshesGoThereAndBack) {
 
 TEST(CgalAdapter, ATreesFullCutIsTheMesh) {
     const Mesh mesh = with_attributes(shapes::torus(24, 16));
-    const auto made = from_mesh<Surface>(mesh.view());
-    ASSERT_TRUE(made);
-    const auto tree = build_tree(made->mesh, {.prelit = true});
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto made = require(from_mesh<Surface>(mesh.view()));
+    const auto tree = require(build_tree(made->mesh, {.prelit = true}));
     ASSERT_TRUE(vdtree::verify(*tree));
     vdtree::Cut cut(*tree);
     cut.unfold_all();
-    const auto whole = extract_mesh<Surface>(cut);
-    ASSERT_TRUE(whole) << whole.error().message;
+    const auto whole = require(extract_mesh<Surface>(cut));
     EXPECT_EQ(whole->mesh.number_of_faces(), mesh.triangles.size());
     EXPECT_EQ(whole->mesh.number_of_vertices(), mesh.positions.size());
     EXPECT_TRUE(whole->mesh.is_valid());
@@ -94,8 +83,7 @@ TEST(CgalAdapter, NonManifoldTrianglesKeepVerticesOfTheirOwn) {
     Mesh mesh;
     mesh.positions = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}};
     mesh.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
-    const auto made = from_mesh<Surface>(mesh.view());
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(from_mesh<Surface>(mesh.view()));
     EXPECT_EQ(made->loose_triangles, 1u);
     EXPECT_EQ(made->mesh.number_of_faces(), 3u);
     EXPECT_EQ(made->sources, (std::vector<Index>{0, 1, 2, 3, 4, 0, 1, 4}));
@@ -103,8 +91,7 @@ TEST(CgalAdapter, NonManifoldTrianglesKeepVerticesOfTheirOwn) {
 }
 
 TEST(CgalAdapter, RemovedElementsAreLeftOutWithoutCollectingGarbage) {
-    auto made = from_mesh<Surface>(with_attributes(shapes::torus(12, 8)).view());
-    ASSERT_TRUE(made);
+    auto made = require(from_mesh<Surface>(with_attributes(shapes::torus(12, 8)).view()));
     Surface& mesh = made->mesh;
     const auto faces = mesh.number_of_faces();
     CGAL::Euler::remove_center_vertex(mesh.halfedge(Surface::Vertex_index(5)), mesh); // leaves a hexagon
@@ -158,8 +145,7 @@ TEST(CgalAdapter, CornersSplitVerticesAtSeams) {
     auto uvs = mesh.add_property_map<Surface::Halfedge_index, Kernel::Point_2>("h:uv").first;
     for (const auto h : mesh.halfedges_around_face(mesh.halfedge(lower))) uvs[h] = {0.25, 0};
     for (const auto h : mesh.halfedges_around_face(mesh.halfedge(upper))) uvs[h] = {0.75, 0};
-    const auto soup = to_mesh(mesh);
-    ASSERT_TRUE(soup);
+    const auto soup = require(to_mesh(mesh));
     EXPECT_EQ(soup->mesh.positions.size(), 6u); // b and c twice
     for (const Index v : soup->mesh.triangles[0]) EXPECT_EQ(soup->mesh.uvs[v].x, 0.25f);
     for (const Index v : soup->mesh.triangles[1]) EXPECT_EQ(soup->mesh.uvs[v].x, 0.75f);

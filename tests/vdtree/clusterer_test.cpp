@@ -2,21 +2,12 @@
 // depend on threads, in time that grows with the mesh, and that keep what the attributes show.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
 #include <atomic>
-#include <chrono>
-#include <cmath>
 #include <condition_variable>
 #include <deque>
-#include <functional>
-#include <map>
 #include <mutex>
-#include <random>
-#include <thread>
 
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <unseen/vdtree/internal/team.h>
@@ -26,6 +17,7 @@
 #include "build/surface.h"
 #include "clustering_tools.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree::clusterer_test {
 namespace {

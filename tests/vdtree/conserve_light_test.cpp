@@ -1,19 +1,13 @@
 // Proxies that conserve light: what curved surfaces radiate, and bounds that hold.
 #include <unseen/vdtree/internal/conserve_light.h>
 
-#include <algorithm>
-#include <cmath>
-#include <span>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/view.h>
 
 #include "built.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree::conserve_light_test {
 namespace {
@@ -33,8 +27,7 @@ Mesh coloured(Mesh mesh) {
 TEST(ConserveLight, KeepsTheLightOfACurvedSurface) {
     const Mesh mesh = shapes::icosphere(5);
     const VertexTree plain = built(mesh);
-    const Result<VertexTree> conserved = conserve_light(plain);
-    ASSERT_TRUE(conserved);
+    const Result<VertexTree> conserved = require(conserve_light(plain));
     const auto mean_light = [](const VertexTree& tree, std::span<const Index> corners, glm::dvec3 direction) {
         double light = 0, area = 0;
         for (std::size_t i = 0; i < corners.size(); i += 3) {
@@ -69,8 +62,7 @@ TEST(ConserveLight, MovesTheBoundsWithTheProxies) {
     for (const Mesh& mesh : {shapes::torus(24, 12), shapes::bumpy_sphere(2, 0.03), shapes::grid(8),
                              shapes::random_soup(200, 300, 1), shapes::all_coincident(50)}) {
         const VertexTree tree = built(coloured(mesh));
-        const Result<VertexTree> conserved = conserve_light(tree);
-        ASSERT_TRUE(conserved);
+        const Result<VertexTree> conserved = require(conserve_light(tree));
         const Result<void> sound = verify(*conserved);
         EXPECT_TRUE(sound) << sound.error().message;
     }
@@ -80,8 +72,7 @@ TEST(ConserveLight, ChangesProxiesOnlyAndNothingWhenDoneAgain) {
     const VertexTree once = *conserve_light(built(coloured(shapes::torus(24, 12))));
     const VertexTree tree = *once.with_attribute("mark", AttributeDomain::tree, std::vector<float>{1});
     const VertexTree means = built(coloured(shapes::torus(24, 12)));
-    const Result<VertexTree> again = conserve_light(tree);
-    ASSERT_TRUE(again);
+    const Result<VertexTree> again = require(conserve_light(tree));
     EXPECT_FALSE(std::ranges::equal(tree.luminance(), means.luminance()));
     EXPECT_TRUE(std::ranges::equal(tree.luminance().subspan(tree.interior_count()),
                                    means.luminance().subspan(tree.interior_count())));

@@ -1,19 +1,6 @@
 // The geometric criteria and the frustum test, against brute force, up the tree, and under similarity transforms.
 #include <unseen/vdtree/criteria.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <stdexcept>
-#include <thread>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/depth_picture.h>
@@ -21,6 +8,7 @@
 
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 
 namespace unseen::vdtree::criteria_test {
 namespace {
@@ -245,8 +233,7 @@ TEST(Displacement, IsNotExceededByTheEye) {
         const auto& p = input.mesh.positions;
         return Result<Clustering>(Clustering{{5, 5, 5, 6, 6, 6, 6}, {p[0], p[3]}});
     };
-    const auto tree = build_tree(mesh.view(), cluster);
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(mesh.view(), cluster));
     const View view{.eye = {0, 0, 1.1}};
     const auto costs = costs_of(displacement_criterion, *tree, view, 1);
     const double angle = 2 * std::atan(h / (1.1 - h)); // between A and B
@@ -431,15 +418,13 @@ TEST(InfiniteCosts, AreThoseOfEyesOnAndInSpheresHoweverTheCutIsMade) {
         const auto parents = support::sound(tree).parents();
         const glm::dvec3 far = glm::dvec3(tree.bounding_sphere().centre) + glm::dvec3(0, 0, 50);
         for (const MakeCriterion make : {&extent_criterion, &displacement_criterion}) {
-            const auto criterion = make(tree, View{}, 3);
-            ASSERT_TRUE(criterion);
+            const auto criterion = require(make(tree, View{}, 3));
             Cut followed(tree);
             for (const bool on_the_sphere : {false, true}) {
                 const auto eyes = eyes_at_spheres(tree, on_the_sphere);
                 for (std::size_t i = 0; i < eyes.size(); i += 1 + eyes.size() / 20) {
                     const auto& [node, eye] = eyes[i];
-                    const auto costs = find_every_cost(tree, *criterion, {.eye = eye});
-                    ASSERT_TRUE(costs);
+                    const auto costs = require(find_every_cost(tree, *criterion, {.eye = eye}));
                     EXPECT_EQ((*costs)[node], std::numeric_limits<float>::infinity())
                         << named.name << ", node " << node;
                     for (const float cost : *costs) ASSERT_FALSE(std::isnan(cost)) << named.name;
@@ -486,14 +471,11 @@ const auto cluster_by_number = [](const ClusterInput& input) {
 };
 
 TEST(InfiniteCosts, UnfoldFirstUnderABudgetAndInTheOrderOfNodes) {
-    const auto made_tree = build_tree(shapes::random_soup(128, 300, 3).view(), cluster_by_number);
-    ASSERT_TRUE(made_tree) << made_tree.error().message;
+    const auto made_tree = require(build_tree(shapes::random_soup(128, 300, 3).view(), cluster_by_number));
     const VertexTree& tree = *made_tree;
     const Viewpoint viewpoint{.eye = glm::dvec3(tree.bounding_sphere().centre)};
-    const auto criterion = extent_criterion(tree, View{}, 3);
-    ASSERT_TRUE(criterion);
-    const auto costs = find_every_cost(tree, *criterion, viewpoint);
-    ASSERT_TRUE(costs);
+    const auto criterion = require(extent_criterion(tree, View{}, 3));
+    const auto costs = require(find_every_cost(tree, *criterion, viewpoint));
     const auto parents = support::sound(tree).parents();
     int cut_between_infinite_ones = 0;
     for (Index budget = 0; budget <= tree.triangle_count(); ++budget) {
@@ -678,8 +660,7 @@ TEST(Orthographic, FoldsBySizesThatDoNotFallWithTheDistance) {
             const auto criterion =
                 by_extent ? extent_criterion(tree, view, tolerance) : displacement_criterion(tree, view, tolerance);
             ASSERT_TRUE(criterion);
-            const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false));
-            ASSERT_TRUE(bits) << bits.error().message;
+            const auto bits = require(test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false)));
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
                 const double length = by_extent ? 2.0 * static_cast<double>(tree.support_spheres()[node].radius)
                                                 : static_cast<double>(tree.displacement()[node]);
@@ -705,14 +686,12 @@ TEST(Orthographic, TakesAllOutlinesForOutlines) {
     DistanceCriterion::Parts parts;
     parts.classes.assign(tree.interior_count(), {0, 1});
     parts.switch_distance = {DistanceCriterion::never_visible, DistanceCriterion::always_visible};
-    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
     std::size_t outlines = 0, all_kept = 0;
     for (int i = 0; i < 40; ++i) {
         View view = random_view(random, tree);
         view.orthographic_height = 2.2 * tree.bounding_sphere().radius;
-        const auto bits = test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false));
-        ASSERT_TRUE(bits) << bits.error().message;
+        const auto bits = require(test_every_node(tree, *criterion, viewpoint_of(tree, view, {}, false)));
         const glm::dvec3 back = camera_frame(view).back;
         std::vector<std::uint8_t> sides(tree.interior_count());
         for (std::size_t t = 0; t < tree.triangle_count(); ++t) {
@@ -744,8 +723,7 @@ TEST(ViewpointOfPair, HoldsWhatEitherWindowShowsAndRefusesWhatIsNone) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     View left{.eye = {-0.03, 0, 3}, .target = {-0.03, 0, 0}, .shift = {0.2, 0}};
     View right{.eye = {0.03, 0, 3}, .target = {0.03, 0, 0}, .shift = {-0.2, 0}};
-    const auto pair = viewpoint_of_pair(tree, left, right, {.scale = 2});
-    ASSERT_TRUE(pair);
+    const auto pair = require(viewpoint_of_pair(tree, left, right, {.scale = 2}));
     EXPECT_EQ(pair->frusta.size(), 2u);
     EXPECT_NEAR(pair->eye_spread, 0.015, 1e-9); // mesh units
     EXPECT_NEAR(glm::length(pair->eye + tree.origin() - glm::dvec3(0, 0, 1.5)), 0, 1e-12);

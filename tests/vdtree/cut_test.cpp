@@ -1,23 +1,11 @@
 // Cuts: what must hold after anything that can be done to them, and that adjust() gives what it promises.
 #include <unseen/vdtree/cut.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <random>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::cut_test {
@@ -559,8 +547,7 @@ TEST(ExtractMesh, KeepsEveryTriangleInItsRange) {
 TEST(ExtractMesh, DoesNotDependOnTheHistoryOfTheCut) {
     const VertexTree tree = built(shapes::with_attributes(shapes::bumpy_sphere(4, 0.03)));
     ASSERT_FALSE(tree.ranges().empty());
-    const auto criterion = extent_criterion(tree, View{}, 100);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(extent_criterion(tree, View{}, 100));
     Cut cut(tree);
     int patched = 0;
     for (int frame = 0; frame < 60; ++frame) {

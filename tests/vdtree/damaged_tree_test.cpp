@@ -1,15 +1,7 @@
 // Tree files with flipped bits, mapped, so that nobody has looked at all of them: whatever is asked of them gives an
 // error or stays within the file. Sanitizers see most.
 #include <cstddef>
-#include <filesystem>
-#include <map>
-#include <random>
-#include <stdexcept>
-#include <string>
 #include <type_traits>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/lighting.h>
@@ -18,6 +10,7 @@
 #include "built.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 #include "tree_file.h"
 #include "tree_use.h"
@@ -27,7 +20,6 @@ namespace {
 
 using support::built;
 using support::TreeFile;
-using ::testing::HasSubstr;
 
 // Links are given by trees alone that somebody has looked at.
 template <class Tree>
@@ -105,8 +97,7 @@ TEST_P(DamagedTrees, AreToldWithTheNode) {
     TreeFile file = honest();
     const std::size_t interior = file["first_leaf"].count();
     file["parents"].set(interior - 1, 0x40000000u);
-    const auto tree = mapped(file);
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(mapped(file));
     const auto lit = LightBounds::measure(*tree);
     ASSERT_FALSE(lit);
     EXPECT_THAT(lit.error().message, HasSubstr("of the mapped tree is damaged. Build the tree again"));
@@ -120,8 +111,7 @@ TEST_P(DamagedTrees, AreToldWithTheSection) {
     const auto expect_fault = [&](const char* section, std::size_t at, std::uint32_t bits, const char* what) {
         TreeFile file = honest();
         file[section].set(at, bits);
-        const auto tree = mapped(file);
-        ASSERT_TRUE(tree) << tree.error().message;
+        const auto tree = require(mapped(file));
         const auto sound = SoundTree::of(*tree);
         ASSERT_FALSE(sound) << section;
         EXPECT_THAT(sound.error().message, HasSubstr(what));
@@ -136,10 +126,8 @@ TEST_P(DamagedTrees, AreToldWithTheSection) {
 
 // What passes costs nothing more, and is what was written.
 TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
-    const auto tree = mapped(honest());
-    ASSERT_TRUE(tree);
-    const auto sound = SoundTree::of(*tree);
-    ASSERT_TRUE(sound) << sound.error().message;
+    const auto tree = require(mapped(honest()));
+    const auto sound = require(SoundTree::of(*tree));
     EXPECT_EQ(sound->parents().data(), SoundTree::of(*tree)->parents().data());
     EXPECT_EQ(sound->node_count(), tree->node_count());
     EXPECT_TRUE(support::use_everything(*tree));

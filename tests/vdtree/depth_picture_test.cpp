@@ -1,19 +1,11 @@
 // What a picture's depths hide, against points between others, looked up one by one.
 #include <unseen/vdtree/depth_picture.h>
 
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <span>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree::depth_picture_test {
 namespace {
@@ -126,10 +118,8 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     std::vector<float> depth(64 * 64, infinity);
     for (std::size_t i = 0; i < depth.size(); ++i)
         if (i % 64 < 32) depth[i] = 3;
-    const auto hidden = find_hidden(tree, {}, *DepthPicture::create(view, depth));
-    ASSERT_TRUE(hidden);
-    const auto criterion = folding_hidden(tree, extent, *hidden);
-    ASSERT_TRUE(criterion) << criterion.error().message;
+    const auto hidden = require(find_hidden(tree, {}, *DepthPicture::create(view, depth)));
+    const auto criterion = require(folding_hidden(tree, extent, *hidden));
     EXPECT_TRUE(criterion->is_monotone());
     Cut half(tree);
     ASSERT_TRUE(half.follow(*criterion, viewpoint));

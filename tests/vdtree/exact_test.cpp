@@ -1,21 +1,16 @@
 // Bounds of trees in exact arithmetic.
 #include <unseen/exact/exact.h>
 
-#include <cmath>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "built.h"
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::exact {
 namespace {
 
-using testing::HasSubstr;
 using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::Sphere;
@@ -38,8 +33,7 @@ TEST(VerifyExactly, TreesOfAllShapesAreSound) {
         for (const auto kind : {vdtree::ClustererKind::quadric, vdtree::ClustererKind::octree}) {
             const auto tree = vdtree::build_tree(shape.mesh.view(), {.clusterer = kind});
             if (!tree) continue; // shapes that no tree can be built of
-            const auto verified = verify_exactly(*tree);
-            ASSERT_TRUE(verified) << shape.name << ": " << verified.error().message;
+            const auto verified = require(verify_exactly(*tree));
             EXPECT_GT(verified->comparisons, tree->node_count()) << shape.name;
             EXPECT_LT(verified->in_rationals, verified->comparisons) << shape.name;
         }
@@ -74,8 +68,7 @@ TEST(VerifyExactly, SeesWhatDoublesCannot) {
         clustering.parents.assign(input.mesh.positions.size() + 1, 4);
         return clustering;
     };
-    const auto tree = vdtree::build_tree(mesh.view(), flat);
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(vdtree::build_tree(mesh.view(), flat));
     ASSERT_EQ(tree->interior_count(), 1u);
     EXPECT_TRUE(verify_exactly(*tree));
     const VertexTree tight = changed(tree->share(), [](vdtree::TreeGeometry& g) {

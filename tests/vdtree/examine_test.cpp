@@ -2,11 +2,7 @@
 #include <unseen/meshio/examine.h>
 
 #include "shapes.h"
-
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
+#include "testing.h"
 
 namespace unseen::vdtree::examine_test {
 namespace {

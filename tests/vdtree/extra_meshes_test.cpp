@@ -3,13 +3,6 @@
 #include <unseen/vdtree/builder.h>
 
 #include <cctype>
-#include <chrono>
-#include <cstdio>
-#include <filesystem>
-#include <random>
-#include <string>
-
-#include <gtest/gtest.h>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/criteria.h>
@@ -20,6 +13,7 @@
 #include "extra_meshes.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::extra_meshes_test {
@@ -57,8 +51,7 @@ std::string fault_in_spheres(const VertexTree& tree) {
 }
 
 void check(const VertexTree& tree, const Mesh& mesh) {
-    const auto verified = verify(tree);
-    ASSERT_TRUE(verified) << verified.error().message;
+    const auto verified = require(verify(tree));
     ASSERT_EQ(support::fault_in_structure(tree), "");
     ASSERT_EQ(support::fault_when_unfolded(tree, mesh.view()), "");
     ASSERT_EQ(fault_in_spheres(tree), "");
@@ -70,8 +63,7 @@ void check(const VertexTree& tree, const Mesh& mesh) {
         if (!(ball.radius > 0)) break; // all at one point
         const View view = frame_sphere(tree.origin() + glm::dvec3(ball.centre), ball.radius,
                                        shapes::random_direction(random), 0.9, {});
-        const auto extent = extent_criterion(tree, view, shapes::random_between(random, 2, 40));
-        ASSERT_TRUE(extent) << extent.error().message;
+        const auto extent = require(extent_criterion(tree, view, shapes::random_between(random, 2, 40)));
         const Viewpoint viewpoint{.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}};
         FollowOptions options;
         if (round % 2) options.triangle_budget = tree.triangle_count() / 3;
@@ -109,8 +101,7 @@ TEST_P(ExtraMesh, BuildsVerifiesAndUnfolds) {
         if (testing::Test::HasFatalFailure()) return;
         const auto tree_file = scratch / "tree.vdt";
         ASSERT_TRUE(write_tree(tree_file, *tree));
-        const auto again = read_tree(tree_file);
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(read_tree(tree_file));
         EXPECT_EQ(support::difference(*tree, *again), "");
     }
 }

@@ -1,13 +1,6 @@
 // Files as people have them: what does not decide the shape is a warning that says what is lost, and the rest is read;
 // what decides it is an error that says what to do.
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include <unseen/meshio/mesh_file.h>
@@ -16,13 +9,13 @@
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::vdtree::flawed_mesh_test {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using testing::HasSubstr;
 using Files = std::map<std::string, std::string>;
 
 void write(const fs::path& folder, const Files& files) {
@@ -226,8 +219,7 @@ TEST(FlawedMesh, WhatDoesNotDecideTheShapeIsAWarning) {
         SCOPED_TRACE(c.what);
         const support::TempFolder folder;
         write(folder.path(), c.files);
-        const auto read = meshio::read_mesh(folder / c.name);
-        ASSERT_TRUE(read) << read.error().message;
+        const auto read = require(meshio::read_mesh(folder / c.name));
         EXPECT_EQ(read->mesh.triangles.size(), c.triangles);
         EXPECT_EQ(read->warnings.size(), c.warnings.size()) << in_lines(read->warnings);
         for (std::size_t i = 0; i < std::min(c.warnings.size(), read->warnings.size()); ++i)
@@ -242,24 +234,20 @@ TEST(FlawedMesh, CanBeWrittenAgain) {
     for (const Case& c : cases()) {
         const support::TempFolder folder;
         write(folder.path(), c.files);
-        auto read = meshio::read_mesh(folder / c.name);
-        ASSERT_TRUE(read) << c.what;
+        auto read = require(meshio::read_mesh(folder / c.name));
         if (read->document) {
             read->document->vertex_parts.assign(read->mesh.positions.size(), 0);
             read->mesh.document = meshio::pack(*read->document);
         }
-        const auto tree = build_tree(read->mesh.view());
-        ASSERT_TRUE(tree) << c.what;
+        const auto tree = require(build_tree(read->mesh.view()));
         Cut cut(*tree);
         cut.unfold_all();
         for (const std::string& ending : meshio::written_endings()) {
             SCOPED_TRACE(c.what + ", as " + ending);
             fs::create_directory(folder / "out");
             const fs::path out = folder / ("out/out" + ending);
-            const auto written = meshio::write_cut(out, cut);
-            ASSERT_TRUE(written) << written.error().message;
-            const auto again = meshio::read_mesh(out);
-            ASSERT_TRUE(again) << again.error().message;
+            const auto written = require(meshio::write_cut(out, cut));
+            const auto again = require(meshio::read_mesh(out));
             EXPECT_EQ(again->mesh.triangles.size(), c.triangles);
             const bool holds_images = ending == ".obj" || ending == ".glb" || ending == ".gltf";
             if (holds_images && !c.image.empty() && !again->mesh.uvs.empty()) {
@@ -282,19 +270,16 @@ TEST(FlawedMesh, SearchFolderIsTheWayOut) {
               {{"m/a.obj", "mtllib s/a.mtl\n" + textured}, {"m/s/a.mtl", mtl(image)}, {"tex/t.png", picture}});
         meshio::ReadOptions options;
         options.search_folder = folder / "tex";
-        auto read = meshio::read_mesh(folder / "m/a.obj", options);
-        ASSERT_TRUE(read) << read.error().message;
+        auto read = require(meshio::read_mesh(folder / "m/a.obj", options));
         ASSERT_TRUE(read->warnings.empty()) << in_lines(read->warnings);
         ASSERT_TRUE(read->materials[0].has_image());
         read->document->vertex_parts.assign(read->mesh.positions.size(), 0);
         read->mesh.document = meshio::pack(*read->document);
-        const auto tree = build_tree(read->mesh.view());
-        ASSERT_TRUE(tree);
+        const auto tree = require(build_tree(read->mesh.view()));
         Cut cut(*tree);
         cut.unfold_all();
         ASSERT_TRUE(meshio::write_cut(folder / "out/b.obj", cut));
-        const auto again = meshio::read_mesh(folder / "out/b.obj");
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(meshio::read_mesh(folder / "out/b.obj"));
         EXPECT_TRUE(again->warnings.empty()) << in_lines(again->warnings);
         ASSERT_TRUE(again->materials.at(0).has_image());
         EXPECT_EQ(*again->materials[0].image_bytes, picture);
@@ -305,8 +290,7 @@ TEST(FlawedMesh, SearchFolderIsTheWayOut) {
 TEST(FlawedMesh, ImagesThatNobodyDecodesAreKeptByteForByte) {
     const support::TempFolder folder;
     write(folder.path(), {{"a.glb", glb(R"({"extensions":{"EXT_texture_webp":{"source":0}}})")}});
-    const auto read = meshio::read_mesh(folder / "a.glb");
-    ASSERT_TRUE(read);
+    const auto read = require(meshio::read_mesh(folder / "a.glb"));
     ASSERT_TRUE(read->document);
     ASSERT_EQ(read->document->files.size(), 1u);
     ASSERT_TRUE(read->document->files[0].bytes);
@@ -341,8 +325,8 @@ TEST(FlawedMesh, WhatDecidesTheShapeSaysTheWayOut) {
         ASSERT_FALSE(read) << c.error;
         EXPECT_THAT(read.error().message, HasSubstr(c.error));
     }
-    const auto read = meshio::read_mesh_bytes(mesh_files::glb(plain.dump(), mesh_files::gltf_triangle_data()), "a.glb");
-    ASSERT_TRUE(read) << "there are plain data beside the compressed ones: " << read.error().message;
+    const auto read =
+        require(meshio::read_mesh_bytes(mesh_files::glb(plain.dump(), mesh_files::gltf_triangle_data()), "a.glb"));
     EXPECT_TRUE(read->warnings.empty()) << in_lines(read->warnings);
 }
 

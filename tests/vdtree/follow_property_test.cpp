@@ -1,12 +1,7 @@
 // Cuts that follow viewpoints, options and criteria at random, over small trees: see follow_drive.h.
-#include <cstdint>
-#include <cstdlib>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
 
 #include "follow_drive.h"
+#include "testing.h"
 
 namespace unseen::vdtree::follow_property_test {
 namespace {

@@ -1,20 +1,6 @@
 // Cuts that follow a viewpoint: whatever the way, they are what the criterion asks for, and the index buffer is theirs.
 #include <unseen/vdtree/cut.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <numbers>
-#include <optional>
-#include <random>
-#include <set>
-#include <thread>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 
 #include "cut/index_buffer.h"
@@ -22,6 +8,7 @@
 #include "follow_tools.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::follow_test {
@@ -259,8 +246,7 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
         options.cull_back_faces = with_gaze && with_frustum && tree.closedness() != Closedness::open;
         for (int frame = 0; frame < frame_count() / 8; ++frame) {
             const Viewpoint viewpoint = path.next();
-            const auto stats = cut.follow(criterion, viewpoint, options);
-            ASSERT_TRUE(stats);
+            const auto stats = require(cut.follow(criterion, viewpoint, options));
             const std::vector<bool> expected = from_scratch(tree, criterion, viewpoint, options);
             ASSERT_EQ(state_of(cut), expected) << "frame " << frame << ", variant " << variant;
             ASSERT_EQ(support::fault_in_cut(cut), "") << "frame " << frame << ", variant " << variant;
@@ -406,8 +392,7 @@ TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     std::mt19937_64 random(17);
     for (FoldClass& rows : parts.classes)
         rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
-    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
     EXPECT_FALSE(criterion->is_monotone());
     EXPECT_TRUE(rich_criterion(tree, 3, false).is_monotone());
     Path path(tree, 19, false, true);
@@ -442,16 +427,14 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
             for (const NodeBounds& bounds : tree.bounds()) parts.facing.push_back(bounds.slabs);
             parts.least_cost.assign(parts.switch_distance.size(), 0.5f);
         }
-        const auto criterion = DistanceCriterion::create(tree, std::move(parts));
-        ASSERT_TRUE(criterion);
+        const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
         Path path(tree, 31 + static_cast<std::uint64_t>(variant), with_gaze, with_frustum);
         for (int frame = 0; frame < 12; ++frame) {
             Viewpoint viewpoint = path.next();
             if (frame % 3 == 0)
                 viewpoint.eye = glm::dvec3(tree.positions()[random() % tree.node_count()]); // inside of many rings
             const FollowOptions options{.threshold = 0.7f, .cull_back_faces = cull};
-            const auto every = test_every_node(tree, *criterion, viewpoint, options);
-            ASSERT_TRUE(every);
+            const auto every = require(test_every_node(tree, *criterion, viewpoint, options));
             FoldTester tester(tree, *criterion, cull, options.threshold);
             tester.look_from(viewpoint, 1);
             std::vector<FoldCandidate> candidates;
@@ -514,8 +497,7 @@ TEST(FollowStill, CostsNothingAndChangesNothing) {
     const Viewpoint viewpoint{.eye = {3, 1, 2}, .gaze = glm::normalize(glm::dvec3(-3, -1, -2))};
     ASSERT_TRUE(cut.follow(criterion, viewpoint));
     for (int frame = 0; frame < 5; ++frame) {
-        const auto stats = cut.follow(criterion, viewpoint);
-        ASSERT_TRUE(stats);
+        const auto stats = require(cut.follow(criterion, viewpoint));
         EXPECT_EQ(stats->node_tests, 0u);
         EXPECT_EQ(stats->folds + stats->unfolds, 0u);
         EXPECT_TRUE(cut.changes().empty());
@@ -529,8 +511,7 @@ TEST(FollowFrustum, AddsHardlyATestWhereItShowsAllOfTheModel) {
     const Sphere sphere = tree.bounding_sphere();
     DistanceCriterion::Parts parts;
     parts.switch_distance = {40};
-    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
     std::uint64_t tests[2] = {};
     Cut cuts[2] = {Cut(tree), Cut(tree)};
     constexpr int frames = 90, warm_up = 2; // then there are deadlines
@@ -541,8 +522,7 @@ TEST(FollowFrustum, AddsHardlyATestWhereItShowsAllOfTheModel) {
         Viewpoint viewpoint{.eye = eye_in_tree(tree, view, {})};
         for (const bool with_frustum : {false, true}) {
             if (with_frustum) viewpoint.frusta = {frustum_of(tree, view)};
-            const auto stats = cuts[with_frustum].follow(*criterion, viewpoint);
-            ASSERT_TRUE(stats);
+            const auto stats = require(cuts[with_frustum].follow(*criterion, viewpoint));
             if (degrees >= warm_up) tests[with_frustum] += stats->node_tests;
         }
         ASSERT_EQ(state_of(cuts[0]), state_of(cuts[1])) << degrees << " degrees";
@@ -665,8 +645,7 @@ TEST(FollowBudget, IsTheSameWhateverWasBefore) {
     for (int frame = 0; frame < 60; ++frame) {
         const Viewpoint viewpoint = path.next();
         const FollowOptions options{.triangle_budget = static_cast<Index>(100 + 37 * (frame % 7))};
-        const auto stats = cut.follow(criterion, viewpoint, options);
-        ASSERT_TRUE(stats);
+        const auto stats = require(cut.follow(criterion, viewpoint, options));
         Cut fresh(tree);
         ASSERT_TRUE(fresh.follow(criterion, viewpoint, options));
         ASSERT_EQ(state_of(cut), state_of(fresh)) << "frame " << frame;
@@ -678,8 +657,7 @@ TEST(FollowBudget, StopsAtCostZeroUnlessToldToFill) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     DistanceCriterion::Parts parts;
     parts.switch_distance = {DistanceCriterion::never_visible};
-    const auto invisible = DistanceCriterion::create(tree, parts);
-    ASSERT_TRUE(invisible);
+    const auto invisible = require(DistanceCriterion::create(tree, parts));
     Cut cut(tree);
     ASSERT_TRUE(cut.follow(*invisible, {.eye = {5, 0, 0}}, {.triangle_budget = 200}));
     EXPECT_EQ(cut.triangle_count(), 0u);
@@ -754,8 +732,7 @@ TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
     const Viewpoint viewpoint{.eye = {2, 1, 2}};
     Cut whole(tree), hurried(tree);
     ASSERT_TRUE(whole.follow(criterion, viewpoint));
-    auto stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
-    ASSERT_TRUE(stats);
+    auto stats = require(hurried.follow(criterion, viewpoint, {.milliseconds = 0.0}));
     EXPECT_FALSE(stats->is_complete);
     EXPECT_LT(hurried.triangle_count(), whole.triangle_count());
     int calls = 0;
@@ -788,13 +765,11 @@ TEST(FollowInTime, AStillViewIsDoneInSmallStepsWithoutTestsInVain) {
         Viewpoint viewpoint{.eye = {2, 1, 2}};
         if (with_gaze) viewpoint.gaze = glm::normalize(glm::dvec3(-2, -1, -2));
         Cut whole(tree), hurried(tree);
-        const auto at_once = whole.follow(criterion, viewpoint);
-        ASSERT_TRUE(at_once);
+        const auto at_once = require(whole.follow(criterion, viewpoint));
         std::uint64_t tests = 0, unfolds = 0;
         std::size_t calls = 0;
         for (bool is_complete = false; !is_complete && calls < 10000; ++calls) {
-            const auto stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
-            ASSERT_TRUE(stats);
+            const auto stats = require(hurried.follow(criterion, viewpoint, {.milliseconds = 0.0}));
             is_complete = stats->is_complete;
             tests += stats->node_tests;
             unfolds += stats->unfolds;
@@ -837,8 +812,7 @@ TEST(FollowInTime, TellsTheLargestCostOfWhatItLeaves) {
             for (; !is_complete && calls < 10000; ++calls) {
                 const FollowOptions options{
                     .triangle_budget = budget, .hysteresis = budget ? 1.1f : 1, .milliseconds = 0.0};
-                const auto stats = cut.follow(criterion, viewpoint, options);
-                ASSERT_TRUE(stats);
+                const auto stats = require(cut.follow(criterion, viewpoint, options));
                 const float largest = largest_cost_of(cut, criterion, viewpoint);
                 ASSERT_GE(stats->max_fold_cost, largest * (1 - 1e-5f)) << "call " << calls; // the rounding of a test
                 EXPECT_LE(stats->triangles, budget.value_or(tree.triangle_count()));
@@ -888,14 +862,13 @@ TEST(FollowScene, SharesABudgetAmongObjects) {
     Cut near_cut(near_tree), far_cut(far_tree);
     const SceneObject objects[] = {{near_cut, near_criterion, {.eye = {3, 0, 0}}},
                                    {far_cut, far_criterion, {.eye = {0, 40, 9}}}};
-    const auto stats = follow_scene(objects, 2000);
-    ASSERT_TRUE(stats);
+    const auto stats = require(follow_scene(objects, 2000));
     EXPECT_LE(near_cut.triangle_count() + far_cut.triangle_count(), 2000u);
     EXPECT_GT(near_cut.triangle_count() + far_cut.triangle_count(), 1900u);
     // The same threshold for both: neither alone would do better within its share.
     Cut alone(near_tree);
-    const auto own = alone.follow(near_criterion, {.eye = {3, 0, 0}}, {.triangle_budget = near_cut.triangle_count()});
-    ASSERT_TRUE(own);
+    const auto own =
+        require(alone.follow(near_criterion, {.eye = {3, 0, 0}}, {.triangle_budget = near_cut.triangle_count()}));
     EXPECT_EQ(state_of(alone), state_of(near_cut));
     const SceneObject twice[] = {{near_cut, near_criterion, {}}, {near_cut, near_criterion, {}}};
     EXPECT_FALSE(follow_scene(twice, 10));
@@ -949,8 +922,7 @@ TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
 
 TEST(FollowFarAway, FoldsToNothing) {
     const VertexTree tree = built(shapes::bumpy_sphere(4));
-    const auto criterion = extent_criterion(tree, View{}, 1);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(extent_criterion(tree, View{}, 1));
     Cut cut(tree);
     ASSERT_TRUE(cut.follow(*criterion, {.eye = {3, 0, 0}}));
     EXPECT_GT(cut.triangle_count(), 0u);
@@ -1076,8 +1048,7 @@ TEST(FollowHardTrees, OneTriangleCoincidentVerticesAndEqualDistances) {
         c.parents[2 * n - 2] = 2 * n - 2;
         return c;
     };
-    Result<VertexTree> deep = build_tree(fan.view(), chain);
-    ASSERT_TRUE(deep);
+    Result<VertexTree> deep = require(build_tree(fan.view(), chain));
     std::vector<VertexTree> trees;
     trees.push_back(std::move(*deep));
     trees.push_back(built(shapes::single_triangle()));
@@ -1086,8 +1057,7 @@ TEST(FollowHardTrees, OneTriangleCoincidentVerticesAndEqualDistances) {
         DistanceCriterion::Parts parts;
         parts.lengths.assign(tree.interior_count(), 0.5f); // all D equal
         parts.switch_distance = {2};
-        const auto criterion = DistanceCriterion::create(tree, parts);
-        ASSERT_TRUE(criterion);
+        const auto criterion = require(DistanceCriterion::create(tree, parts));
         Cut cut(tree);
         for (int frame = 0; frame < 300; ++frame) {
             const Viewpoint viewpoint{.eye = {1 + 0.01 * frame, 0.3, 0.2}};

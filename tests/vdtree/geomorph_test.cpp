@@ -1,22 +1,13 @@
 // Geomorphs: what is drawn moves continuously, is a valid cut at any time, and comes to rest at the followed cut.
 #include <unseen/vdtree/geomorph.h>
 
-#include <cmath>
-#include <cstring>
-#include <functional>
-#include <limits>
-#include <map>
-#include <numbers>
-#include <random>
-
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::geomorph_test {
@@ -240,8 +231,7 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
     const VertexTree tree = GetParam().make();
     View view;
     view.width = view.height = 256;
-    const auto criterion = extent_criterion(tree, view, 12);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(extent_criterion(tree, view, 12));
     const std::vector<Longest> longest = longest_glides(tree);
     const Sphere sphere = tree.bounding_sphere();
     Cut cut(tree);
@@ -437,8 +427,7 @@ TEST(Geomorph, GlidesDownChainsOfAnyDepth) {
         }
         return clustering;
     };
-    const auto tree = build_tree(mesh.view(), chain);
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(mesh.view(), chain));
     Cut cut(*tree);
     Geomorph geomorph = made(*tree, {0.25, std::numeric_limits<double>::infinity()});
     ASSERT_TRUE(geomorph.step(cut, 0));

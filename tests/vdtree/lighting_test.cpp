@@ -2,15 +2,6 @@
 // that move.
 #include <unseen/vdtree/lighting.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <random>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/contrast_classes.h>
@@ -19,6 +10,7 @@
 #include "cut/kernel/lit_kernel.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::lighting_test {
@@ -436,8 +428,7 @@ TEST(Keeping, NodesNeverFoldFromWhereverTheyAreSeen) {
     const VertexTree tree = std::move(*build_tree(shapes::icosphere(4).view()));
     View view;
     view.eye = {0, 0, 1e4};
-    const auto plain = extent_criterion(tree, view, 4);
-    ASSERT_TRUE(plain);
+    const auto plain = require(extent_criterion(tree, view, 4));
     std::vector<std::uint64_t> none((tree.interior_count() + 63) / 64, 0), some = none;
     const NodeId kept = tree.interior_count() / 2;
     for (NodeId node = kept;; node = support::sound(tree).parents()[node]) {
@@ -457,15 +448,13 @@ TEST(Keeping, NodesNeverFoldFromWhereverTheyAreSeen) {
 
 TEST(Keeping, NodesStayOutOfFrustaAndBehindOccluders) {
     const VertexTree tree = std::move(*build_tree(shapes::icosphere(4).view()));
-    const auto plain = displacement_criterion(tree, {}, 0.01);
-    ASSERT_TRUE(plain);
+    const auto plain = require(displacement_criterion(tree, {}, 0.01));
     std::vector<std::uint64_t> some((tree.interior_count() + 63) / 64, 0);
     for (NodeId node = tree.interior_count() / 2;; node = support::sound(tree).parents()[node]) {
         some[node / 64] |= std::uint64_t{1} << (node % 64);
         if (node == VertexTree::root()) break;
     }
-    const auto kept = keeping(tree, *plain, some);
-    ASSERT_TRUE(kept);
+    const auto kept = require(keeping(tree, *plain, some));
     // The mesh is behind the eye; and behind a sphere.
     View view;
     view.eye = {0, 0, 3};
@@ -474,10 +463,8 @@ TEST(Keeping, NodesStayOutOfFrustaAndBehindOccluders) {
     away.frusta = {frustum_of(tree, view)};
     DistanceCriterion::Parts of_rings;
     of_rings.switch_distance = {100};
-    const auto rings = DistanceCriterion::create(tree, of_rings);
-    ASSERT_TRUE(rings);
-    const auto kept_rings = keeping(tree, *rings, some);
-    ASSERT_TRUE(kept_rings);
+    const auto rings = require(DistanceCriterion::create(tree, of_rings));
+    const auto kept_rings = require(keeping(tree, *rings, some));
     Viewpoint behind{.eye = away.eye + glm::dvec3(0, 0, 7)};
     behind.occluders = {{glm::vec3(glm::dvec3(0, 0, 5) + away.eye - glm::dvec3(0, 0, 3)), 4.0f}};
     const auto triangles = [&](const DistanceCriterion& criterion, const Viewpoint& viewpoint) {
@@ -557,8 +544,7 @@ void expect_cuts_without_history(const Subject& s, bool with_gaze, bool eye_move
     options.threshold = seed % 5 == 0 ? 2.0f : 1.0f;
     Cut cut(s.tree);
     for (int frame = 0; frame < 60; ++frame) {
-        const auto stats = cut.follow(criterion, viewpoint, options);
-        ASSERT_TRUE(stats) << stats.error().message;
+        const auto stats = require(cut.follow(criterion, viewpoint, options));
         Cut fresh(s.tree);
         ASSERT_TRUE(fresh.follow(criterion, viewpoint, options));
         for (NodeId node = 0; node < s.tree.interior_count(); ++node)

@@ -10,30 +10,18 @@
 #include "mesh_readers.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "text_scanner.h"
 #include "tree_file.h"
 #include "vtp_files.h"
 
-#include <cstdint>
-#include <cstdlib>
-#include <cstring>
-#include <fstream>
-#include <map>
-#include <memory>
-#include <random>
-#include <set>
-
 #include <nlohmann/json.hpp>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace unseen::vdtree {
 namespace {
 
 namespace fs = std::filesystem;
 using namespace std::string_literals;
-using testing::HasSubstr;
 
 // What a reader may allocate at once: a vertex of one byte a coordinate becomes 60 bytes, and small files have
 // overhead.
@@ -295,8 +283,7 @@ TEST(MalformedMesh, BadVerticesAndFacesAreLeftOutWhereAsked) {
     const std::string none_left = mesh_files::glb(mesh_files::gltf_triangle_json(), gltf);
     for (const auto& [name, bytes] :
          {std::pair("a.ply", three_ply), std::pair("a.obj", three_obj), std::pair("a.off", three_off)}) {
-        const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(bytes, name, options);
-        ASSERT_TRUE(read) << read.error().message;
+        const Result<meshio::ReadResult> read = require(meshio::read_mesh_bytes(bytes, name, options));
         EXPECT_EQ(read->bad.vertices, 2u) << name;
         EXPECT_EQ(read->bad.faces, 1u) << name;
         EXPECT_EQ(read->bad.left_out, 2u) << name;
@@ -322,8 +309,7 @@ TEST(MalformedMesh, BadFacetsOfStlAreLeftOutWhereAsked) {
                                       "faces concerned with read.skip_bad.");
     meshio::ReadOptions options;
     options.skip_bad = true;
-    const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(stl, "a.stl", options);
-    ASSERT_TRUE(read) << read.error().message;
+    const Result<meshio::ReadResult> read = require(meshio::read_mesh_bytes(stl, "a.stl", options));
     EXPECT_EQ(read->mesh.triangles.size(), 1u);
     EXPECT_EQ(read->mesh.positions.size(), 3u);
     EXPECT_EQ(read->bad.left_out, 1u);
@@ -335,13 +321,11 @@ TEST(MalformedMesh, PolygonsAndStripsLoseOnlyWhatIsBad) {
     const std::string strip = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
                               "property float z\nelement tristrips 1\nproperty list int int vertex_indices\n"
                               "end_header\nnan 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n2 1 0\n6 0 1 2 3 4 5\n";
-    const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(strip, "a.ply", options);
-    ASSERT_TRUE(read) << read.error().message;
+    const Result<meshio::ReadResult> read = require(meshio::read_mesh_bytes(strip, "a.ply", options));
     EXPECT_EQ(read->mesh.triangles.size(), 3u);
     EXPECT_EQ(read->bad.left_out, 1u);
     const std::string quads = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 nan\nf 1 2 3 4\nf 1 2 3\n";
-    const Result<meshio::ReadResult> rest = meshio::read_mesh_bytes(quads, "a.obj", options);
-    ASSERT_TRUE(rest) << rest.error().message;
+    const Result<meshio::ReadResult> rest = require(meshio::read_mesh_bytes(quads, "a.obj", options));
     EXPECT_EQ(rest->mesh.triangles, (std::vector<Triangle>{{0, 1, 2}})); // nothing of the quad
 }
 
@@ -590,8 +574,7 @@ TEST(MalformedMesh, GlbChunksAreChecked) {
 TEST(MalformedMesh, CompressedGltfIsChecked) {
     const std::string file = mesh_files::compressed_glb();
     if (file.empty()) GTEST_SKIP() << "this build is without meshoptimizer";
-    const Result<meshio::ReadResult> whole = meshio::read_mesh_bytes(file, "levels.glb");
-    ASSERT_TRUE(whole) << whole.error().message;
+    const Result<meshio::ReadResult> whole = require(meshio::read_mesh_bytes(file, "levels.glb"));
     EXPECT_EQ(whole->mesh.triangles.size(), 80u);
     std::uint32_t json_size = 0;
     std::memcpy(&json_size, file.data() + 12, 4);
@@ -746,8 +729,7 @@ TEST(MalformedMesh, FurtherMeshesLoadOrFailAsExpected) {
 // Tables of sections that claim what is not there: one section, or each, the whole file or more than any disk has.
 TEST(MalformedTree, AsksForNoMoreMemoryThanItsFileIsWorth) {
     using support::TreeFile;
-    const auto tree = build_tree(shapes::cube(1).view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(build_tree(shapes::cube(1).view()));
     const support::TempFolder folder;
     const fs::path file = folder / "t.vdt";
     ASSERT_TRUE(write_tree(file, *tree));

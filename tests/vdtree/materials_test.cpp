@@ -1,13 +1,10 @@
 // What files say of materials: colours, opacity and the names of images; nothing of it is decoded here.
-#include <filesystem>
-#include <fstream>
-
-#include <gtest/gtest.h>
 
 #include <unseen/meshio/mesh_file.h>
 
 #include "mesh_files.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::vdtree::materials_test {
 namespace {
@@ -49,16 +46,14 @@ TEST_F(Materials, OfObjectsAreRead) {
     EXPECT_EQ(clamped.image, "textures/p.jpg");
     EXPECT_EQ(clamped.wrap_u, Wrap::clamp);
     EXPECT_EQ(clamped.wrap_v, Wrap::clamp);
-    const auto scaled = read("newmtl a\nmap_Kd -s 2 3 4 p.png\n");
-    ASSERT_TRUE(scaled);
+    const auto scaled = require(read("newmtl a\nmap_Kd -s 2 3 4 p.png\n"));
     EXPECT_EQ(scaled->materials[0].image, "p.png");
     ASSERT_EQ(scaled->warnings.size(), 1u);
     EXPECT_NE(scaled->warnings[0].find("'-s' of an image was ignored"), std::string::npos) << scaled->warnings[0];
 
     // The first of a name counts, and a library that is named twice is read once.
     write("n.mtl", "newmtl a\nKd 0 0 0\nnewmtl b\n");
-    const auto several = read("newmtl a\nKd 1 1 1\n", "m.mtl n.mtl\nmtllib m.mtl");
-    ASSERT_TRUE(several);
+    const auto several = require(read("newmtl a\nKd 1 1 1\n", "m.mtl n.mtl\nmtllib m.mtl"));
     ASSERT_EQ(several->materials.size(), 2u);
     EXPECT_EQ(several->materials[0].colour, glm::vec4(1));
     EXPECT_EQ(several->materials[1].name, "b");
@@ -78,27 +73,23 @@ TEST_F(Materials, ThatCannotBeReadAreNoted) {
         {"newmtl a\nmap_Kd x/../../p.png\n", "outside of the mesh's folder"},
         {std::string("newmtl a\nKd 1 1 1\0\n", 20), "should be 3 numbers"}};
     for (const auto& [mtl, warning] : odd) {
-        const auto result = read(mtl);
-        ASSERT_TRUE(result) << result.error().message;
+        const auto result = require(read(mtl));
         ASSERT_EQ(result->warnings.size(), 1u) << mtl;
         EXPECT_NE(result->warnings[0].find(warning), std::string::npos) << result->warnings[0];
         EXPECT_FALSE(result->materials.at(0).has_image());
     }
     for (const char* library : {"nowhere.mtl", "../m.mtl", ""}) {
-        const auto result = read("newmtl a\n", library);
-        ASSERT_TRUE(result) << result.error().message;
+        const auto result = require(read("newmtl a\n", library));
         EXPECT_TRUE(result->materials.empty());
         EXPECT_EQ(result->warnings.size(), *library ? 1u : 0u);
     }
-    const auto other = read("newmtl other\n");
-    ASSERT_TRUE(other);
+    const auto other = require(read("newmtl other\n"));
     ASSERT_EQ(other->warnings.size(), 1u);
     EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos)
         << other->warnings[0];
     meshio::ReadOptions without;
     without.images = false;
-    const auto result = read("newmtl a\nKd 0 0 0\nmap_Kd ../p.png\n", "m.mtl", without);
-    ASSERT_TRUE(result) << result.error().message;
+    const auto result = require(read("newmtl a\nKd 0 0 0\nmap_Kd ../p.png\n", "m.mtl", without));
     EXPECT_FALSE(result->materials.at(0).has_image());
 }
 
@@ -130,12 +121,10 @@ TEST_F(Materials, OfGltfShareTheirImage) {
             mesh_files::gltf_triangle_data() + "  " + picture);
     };
     write("one.glb", glb(true));
-    const auto one = meshio::read_mesh(folder_ / "one.glb");
-    ASSERT_TRUE(one) << one.error().message;
+    const auto one = require(meshio::read_mesh(folder_ / "one.glb"));
     ASSERT_EQ(one->materials.size(), std::size_t{count});
     write("many.glb", glb(false));
-    const auto many = meshio::read_mesh(folder_ / "many.glb");
-    ASSERT_TRUE(many) << many.error().message;
+    const auto many = require(meshio::read_mesh(folder_ / "many.glb"));
     for (const auto* read : {&*one, &*many}) {
         ASSERT_TRUE(read->materials[0].image_bytes);
         EXPECT_EQ(*read->materials[0].image_bytes, picture);

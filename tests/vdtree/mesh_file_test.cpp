@@ -8,18 +8,7 @@
 #include "polygon_triangulator.h"
 #include "read_bytes.h"
 
-#include <chrono>
-#include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <limits>
-#include <random>
 #include <stop_token>
-#include <thread>
-
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace unseen::vdtree::mesh_file_test {
 namespace {
@@ -28,8 +17,6 @@ namespace fs = std::filesystem;
 using namespace std::string_literals;
 using support::error_of;
 using support::read;
-using testing::ElementsAre;
-using testing::HasSubstr;
 
 // A folder of its own for each test, removed with everything in it.
 class MeshFiles : public testing::Test {
@@ -852,10 +839,8 @@ TEST_F(MeshFiles, ComeBackAsTheyWereWritten) {
     for (const bool has_attributes : {false, true}) {
         for (const std::string name : {"a.ply", "a.obj", "a.glb"}) {
             const Mesh mesh = random_mesh(true, has_attributes);
-            const Result<void> written = meshio::write_mesh(folder_ / name, mesh.view());
-            ASSERT_TRUE(written) << written.error().message;
-            const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / name);
-            ASSERT_TRUE(again) << again.error().message;
+            const Result<void> written = require(meshio::write_mesh(folder_ / name, mesh.view()));
+            const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / name));
             EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
             EXPECT_EQ(again->mesh.triangles, mesh.triangles) << name;
             EXPECT_EQ(again->mesh.uvs, mesh.uvs) << name;
@@ -879,8 +864,7 @@ TEST_F(MeshFiles, KeepDoublesInPlyAndObj) {
     const Mesh mesh = random_mesh(false, false);
     for (const std::string name : {"a.ply", "a.obj"}) {
         ASSERT_TRUE(meshio::write_mesh(folder_ / name, mesh.view()));
-        const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / name);
-        ASSERT_TRUE(again);
+        const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / name));
         EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
     }
 }
@@ -892,8 +876,7 @@ TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
             {offset, offset, 0.1 * size}, {offset + 0.3 * size, offset, 0}, {offset, offset + 0.7 * size, 0}};
         mesh.triangles = {{0, 1, 2}};
         ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
-        const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / "a.glb");
-        ASSERT_TRUE(again) << again.error().message;
+        const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / "a.glb"));
         // Half an ulp of a float relative to the size, and of the double at the offset.
         const double tolerance = size * 0x1p-23 + offset * 0x1p-52;
         for (std::size_t i = 0; i < 3; ++i) {
@@ -910,8 +893,7 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
                    {"glass", MeshRange::Kind::material, 100, 50},
                    {"stone \"grey\"", MeshRange::Kind::material, 200, 100}};
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<meshio::ReadResult> obj = meshio::read_mesh(folder_ / "a.obj");
-    ASSERT_TRUE(obj);
+    const Result<meshio::ReadResult> obj = require(meshio::read_mesh(folder_ / "a.obj"));
     ASSERT_EQ(obj->mesh.ranges.size(), 4u);
     for (std::size_t i = 0; i < 4; ++i) {
         EXPECT_EQ(obj->mesh.ranges[i].name, mesh.ranges[i].name);
@@ -920,8 +902,7 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
         EXPECT_EQ(obj->mesh.ranges[i].triangle_count, mesh.ranges[i].triangle_count);
     }
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
-    const Result<meshio::ReadResult> glb_file = meshio::read_mesh(folder_ / "a.glb");
-    ASSERT_TRUE(glb_file) << glb_file.error().message;
+    const Result<meshio::ReadResult> glb_file = require(meshio::read_mesh(folder_ / "a.glb"));
     EXPECT_EQ(glb_file->mesh.triangles, mesh.triangles);
     std::vector<std::string> materials;
     for (const MeshRange& range : glb_file->mesh.ranges) {
@@ -935,8 +916,7 @@ TEST_F(MeshFiles, NamesCannotBreakTheLinesOfAnObj) {
     Mesh mesh = random_mesh(true, false);
     mesh.ranges = {{"a\nv 1 2\\", MeshRange::Kind::material, 0, 300}};
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / "a.obj");
-    ASSERT_TRUE(again) << again.error().message;
+    const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / "a.obj"));
     EXPECT_EQ(again->mesh.ranges[0].name, "a_v 1 2_");
 }
 
@@ -959,8 +939,7 @@ TEST_F(MeshFiles, LeaveNothingBehindWhenWritingFails) {
 
 TEST_F(MeshFiles, AnAbandonedAtomicFileLeavesNothing) {
     {
-        Result<AtomicFile> file = AtomicFile::create(folder_ / "a.bin");
-        ASSERT_TRUE(file);
+        Result<AtomicFile> file = require(AtomicFile::create(folder_ / "a.bin"));
         ASSERT_TRUE(file->write("half"));
         EXPECT_EQ(files(), 1u);
     }
@@ -975,11 +954,9 @@ TEST_F(MeshFiles, AreNotTakenForOrphansWhileTheyAreWritten) {
         while (!stop.stop_requested()) AtomicFile::remove_orphans(target);
     });
     for (int i = 0; i < 200; ++i) {
-        Result<AtomicFile> file = AtomicFile::create(target);
-        ASSERT_TRUE(file) << file.error().message;
+        Result<AtomicFile> file = require(AtomicFile::create(target));
         ASSERT_TRUE(file->write("whole"));
-        const Result<void> committed = file->commit();
-        ASSERT_TRUE(committed) << "round " << i << ": " << committed.error().message;
+        const Result<void> committed = require(file->commit());
     }
 }
 

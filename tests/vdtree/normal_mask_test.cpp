@@ -1,19 +1,10 @@
 // Normal masks and slabs against brute force: every answer must hold for every normal, seen from every point.
 #include <unseen/vdtree/internal/normal_mask.h>
 
-#include <array>
 #include <bit>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <utility>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree::normal_mask_test {
 namespace {

@@ -1,15 +1,5 @@
 // Hard cases of numbers in geometry and masks: the entries of docs/numerics.md, each by its name. In each the naive twin, a
 // formula as textbooks have it, is shown to fail where what the library does holds its bound.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
@@ -23,6 +13,7 @@
 #include "exact.h"
 #include "exact_sphere.h"
 #include "shapes.h"
+#include "testing.h"
 #include "tree/unit_vector.h"
 #include "tree_checks.h"
 
@@ -187,8 +178,7 @@ TEST(Numerics, NodesOfRadiusZero) {
     for (const glm::dvec3& eye : {there, there + glm::dvec3(1e-300, 0, 0), there + glm::dvec3(1e-20), glm::dvec3(9)}) {
         for (const float cost : costs_from(tree, extent(tree, view), {.eye = eye}))
             EXPECT_TRUE(eye == glm::dvec3(9) ? cost == 0 : cost >= 0) << cost;
-        const auto displacement = displacement_criterion(tree, view, 1);
-        ASSERT_TRUE(displacement);
+        const auto displacement = require(displacement_criterion(tree, view, 1));
         for (const float cost : costs_from(tree, *displacement, {.eye = eye})) EXPECT_EQ(cost, 0) << "nothing moves";
     }
 }
@@ -549,8 +539,7 @@ TEST(Numerics, EccentricitiesOf0And90And180Degrees) {
     parts.lengths.assign(tree.interior_count(), 1);
     parts.eccentricity_bins = 181;
     for (int bin = 0; bin <= 180; ++bin) parts.switch_distance.push_back(static_cast<float>(1000 - bin));
-    const auto criterion = DistanceCriterion::create(tree, parts);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(DistanceCriterion::create(tree, parts));
     const Sphere root = tree.support_spheres()[VertexTree::root()];
     std::mt19937_64 random(8);
     int naive_nans = 0;

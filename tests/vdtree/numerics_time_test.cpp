@@ -1,17 +1,6 @@
 // Hard cases of numbers in budgets, sums and long runs: entries of docs/numerics.md, like those of numerics_test.cpp. With
 // UNSEEN_NUMERICS=full in as many frames, terms and triangles as the catalogue says; else in a part of that.
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <limits>
-#include <numeric>
 #include <queue>
-#include <random>
-#include <string_view>
-#include <vector>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/criteria.h>
@@ -24,6 +13,7 @@
 #include "cut/kernel/fold_tester.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -80,8 +70,7 @@ TEST(Numerics, BudgetsOf0And1AndMoreThanThereAre) {
         Cut adjusted(tree);
         EXPECT_LE(adjusted.adjust(costs, {.triangle_budget = budget}).triangles, budget);
         const SceneObject objects[] = {{cut, criterion, viewpoint}, {adjusted, criterion, viewpoint}};
-        const auto shared = follow_scene(objects, budget);
-        ASSERT_TRUE(shared);
+        const auto shared = require(follow_scene(objects, budget));
         EXPECT_LE(std::uint64_t{(*shared)[0].triangles} + (*shared)[1].triangles, budget);
     }
     // Inside, budgets are of 64 bits, and so are sums over a scene.
@@ -161,8 +150,7 @@ TEST(Numerics, MillionsOfEqualCosts) {
     expect_expected(cut, "from another cut");
     DistanceCriterion::Parts parts;
     parts.switch_distance = {DistanceCriterion::always_visible}; // all costs are infinite
-    const auto criterion = DistanceCriterion::create(tree, parts);
-    ASSERT_TRUE(criterion);
+    const auto criterion = require(DistanceCriterion::create(tree, parts));
     Cut follower(tree);
     followed(follower, *criterion, {.eye = {0.5, 0.5, 3}}, {.triangle_budget = budget});
     expect_expected(follower, "by distances");
@@ -329,8 +317,7 @@ TEST(Numerics, TimeStepsOf0AndBelow) {
     const DistanceCriterion criterion = extent(tree, 20);
     const double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
     for (const double seconds : {0.0, 5e-324, 0.25, 1e300}) {
-        auto geomorph = Geomorph::create(tree, {.seconds = seconds, .jump_share = inf});
-        ASSERT_TRUE(geomorph);
+        auto geomorph = require(Geomorph::create(tree, {.seconds = seconds, .jump_share = inf}));
         Cut cut(tree);
         double distance = 6;
         for (const double step : {0.0, -0.0, 5e-324, 1e-300, 1 / 60.0, 1e300}) {

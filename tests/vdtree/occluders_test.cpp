@@ -1,20 +1,13 @@
 // Spheres inside of solids, and what they hide.
 #include <unseen/vdtree/criteria.h>
 
-#include <cmath>
-#include <limits>
-#include <random>
-#include <stdexcept>
-
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"
 #include "shapes.h"
 #include "sound.h"
+#include "testing.h"
 #include "triangle_distance.h"
 
 namespace unseen::vdtree::occluders_test {
@@ -139,8 +132,7 @@ TEST(Occluders, RefuseWhatHidesNothing) {
     EXPECT_FALSE(follows({{nan, 0, 0}, 0.5f}));
     EXPECT_FALSE(follows({{0, 0, 0}, nan}));
     EXPECT_FALSE(follows({{0, 0, 0}, -1}));
-    const auto extent = extent_criterion(tree, View{}, 1);
-    ASSERT_TRUE(extent);
+    const auto extent = require(extent_criterion(tree, View{}, 1));
     ASSERT_EQ(extent->parts().spheres, DistanceCriterion::Spheres::support);
     EXPECT_FALSE(cut.follow(*extent, {.eye = {0, 0, 5}, .occluders = {{{0, 0, 0}, 0.5f}}}));
 }

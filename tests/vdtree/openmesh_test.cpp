@@ -2,24 +2,17 @@
 #include <unseen/openmesh/decimater_clusterer.h>
 #include <unseen/openmesh/openmesh.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <set>
-
 #include <OpenMesh/Core/Mesh/PolyMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
 #include <OpenMesh/Tools/Decimater/ModRoundnessT.hh>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "shapes.h"
+#include "testing.h"
 #include "triangle_distance.h"
 
 namespace unseen::openmesh {
 namespace {
 
-using testing::HasSubstr;
 using vdtree::Index;
 using vdtree::Mesh;
 using vdtree::Triangle;
@@ -65,12 +58,10 @@ void expect_equal(const Mesh& a, const Mesh& b) {
 TEST(OpenMeshAdapter, MeshesGoThereAndBack) {
     for (const Mesh& mesh :
          {with_attributes(shapes::bumpy_sphere(3)), with_attributes(shapes::torus(20, 12)), shapes::cube(2)}) {
-        const auto made = from_mesh<TriMesh>(mesh.view());
-        ASSERT_TRUE(made) << made.error().message;
+        const auto made = require(from_mesh<TriMesh>(mesh.view()));
         EXPECT_EQ(made->loose_triangles, 0u);
         EXPECT_EQ(made->mesh.has_vertex_colors(), !mesh.colours.empty());
-        const auto back = to_mesh(made->mesh);
-        ASSERT_TRUE(back) << back.error().message;
+        const auto back = require(to_mesh(made->mesh));
         Mesh expected = mesh;
         if (expected.normals.empty()) {
             EXPECT_TRUE(back->mesh.normals.empty());
@@ -82,15 +73,12 @@ TEST(OpenMeshAdapter, MeshesGoThereAndBack) {
 
 TEST(OpenMeshAdapter, ATreesFullCutIsTheMesh) {
     const Mesh mesh = with_attributes(shapes::torus(24, 16));
-    const auto made = from_mesh<TriMesh>(mesh.view());
-    ASSERT_TRUE(made);
-    const auto tree = build_tree(made->mesh, {.prelit = true});
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto made = require(from_mesh<TriMesh>(mesh.view()));
+    const auto tree = require(build_tree(made->mesh, {.prelit = true}));
     ASSERT_TRUE(vdtree::verify(*tree));
     vdtree::Cut cut(*tree);
     cut.unfold_all();
-    const auto whole = extract_mesh<TriMesh>(cut);
-    ASSERT_TRUE(whole) << whole.error().message;
+    const auto whole = require(extract_mesh<TriMesh>(cut));
     EXPECT_EQ(whole->mesh.n_faces(), mesh.triangles.size());
     EXPECT_EQ(whole->mesh.n_vertices(), mesh.positions.size());
     EXPECT_EQ(whole->loose_triangles, 0u);
@@ -107,16 +95,14 @@ TEST(OpenMeshAdapter, ATreesFullCutIsTheMesh) {
 
 TEST(OpenMeshAdapter, ASmallCutIsAManifoldMeshOrSaysWhatIsLoose) {
     const Mesh mesh = shapes::bumpy_sphere(4);
-    const auto tree = vdtree::build_tree(mesh.view());
-    ASSERT_TRUE(tree);
+    const auto tree = require(vdtree::build_tree(mesh.view()));
     vdtree::Cut cut(*tree);
     const auto displacement = [](const vdtree::VertexTree& t, std::span<const vdtree::NodeId> nodes,
                                  std::span<float> costs) {
         for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = t.displacement()[nodes[i]];
     };
     cut.adjust(displacement, {.triangle_budget = 300});
-    const auto small = extract_mesh<FloatMesh>(cut);
-    ASSERT_TRUE(small) << small.error().message;
+    const auto small = require(extract_mesh<FloatMesh>(cut));
     EXPECT_EQ(small->mesh.n_faces(), cut.triangle_count()); // none is lost
 }
 
@@ -124,8 +110,7 @@ TEST(OpenMeshAdapter, NonManifoldTrianglesKeepVerticesOfTheirOwn) {
     Mesh mesh; // three triangles on one edge
     mesh.positions = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, -1, 0}};
     mesh.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
-    const auto made = from_mesh<TriMesh>(mesh.view());
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(from_mesh<TriMesh>(mesh.view()));
     EXPECT_EQ(made->loose_triangles, 1u);
     EXPECT_EQ(made->mesh.n_faces(), 3u);
     EXPECT_EQ(made->mesh.n_vertices(), 8u);
@@ -135,11 +120,9 @@ TEST(OpenMeshAdapter, NonManifoldTrianglesKeepVerticesOfTheirOwn) {
 
 TEST(OpenMeshAdapter, DeletedElementsAreLeftOutWithoutCollectingGarbage) {
     const Mesh mesh = with_attributes(shapes::torus(12, 8));
-    auto made = from_mesh<TriMesh>(mesh.view());
-    ASSERT_TRUE(made);
+    auto made = require(from_mesh<TriMesh>(mesh.view()));
     made->mesh.delete_vertex(TriMesh::VertexHandle(5), true);
-    const auto soup = to_mesh(made->mesh);
-    ASSERT_TRUE(soup) << soup.error().message;
+    const auto soup = require(to_mesh(made->mesh));
     EXPECT_EQ(soup->mesh.triangles.size(), mesh.triangles.size() - 6);
     EXPECT_EQ(soup->mesh.positions.size(), mesh.positions.size() - 1);
     EXPECT_EQ(soup->vertices[5].idx(), 6);
@@ -164,8 +147,7 @@ TEST(OpenMeshAdapter, PolygonsAreNamed) {
     ASSERT_FALSE(soup);
     EXPECT_THAT(soup.error().message, HasSubstr("Face 1 has 4 corners"));
     mesh.triangulate();
-    const auto triangulated = to_mesh(mesh);
-    ASSERT_TRUE(triangulated);
+    const auto triangulated = require(to_mesh(mesh));
     EXPECT_EQ(triangulated->mesh.triangles.size(), 3u);
 }
 
@@ -193,8 +175,7 @@ TEST(OpenMeshAdapter, CornersSplitVerticesAtSeams) {
     const auto lower = mesh.add_face(a, b, c), upper = mesh.add_face(b, d, c);
     for (const auto h : mesh.fh_range(lower)) mesh.set_texcoord2D(h, {0.25f, 0.0f});
     for (const auto h : mesh.fh_range(upper)) mesh.set_texcoord2D(h, {0.75f, 0.0f});
-    const auto soup = to_mesh(mesh);
-    ASSERT_TRUE(soup);
+    const auto soup = require(to_mesh(mesh));
     EXPECT_EQ(soup->mesh.positions.size(), 6u); // b and c twice
     EXPECT_EQ(soup->mesh.uvs[soup->mesh.triangles[0][0]].x, 0.25f);
     for (const Index v : soup->mesh.triangles[1]) EXPECT_EQ(soup->mesh.uvs[v].x, 0.75f);
@@ -227,8 +208,7 @@ TEST(DecimaterClusterer, MakesSoundTreesOfClosedOpenAndPartedSurfaces) {
     }
     for (const Mesh& mesh :
          {shapes::tetrahedron(), shapes::bumpy_sphere(3), shapes::torus(30, 12), two_spheres(), soup}) {
-        const auto tree = decimated_tree(mesh);
-        ASSERT_TRUE(tree) << tree.error().message;
+        const auto tree = require(decimated_tree(mesh));
         const auto sound = vdtree::verify(*tree);
         EXPECT_TRUE(sound) << sound.error().message;
         EXPECT_EQ(tree->triangle_count(), mesh.triangles.size());

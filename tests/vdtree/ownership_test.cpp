@@ -1,18 +1,11 @@
 // What outlives what: callbacks in options, the tree of a cut, and the value of a failed Result.
-#include <algorithm>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-
-#include <gtest/gtest.h>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -51,8 +44,7 @@ TEST(OptionsOwn, WhatABuildTells) {
 }
 
 TEST(OptionsOwn, TheirVisibilityTest) {
-    const auto tree = build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1});
-    ASSERT_TRUE(tree) << tree.error().message;
+    const auto tree = require(build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1}));
     AdjustOptions options;
     auto calls = std::make_shared<int>(0);
     options.visibility = [calls](const VertexTree&, std::span<const NodeId>, std::span<RingVisibility> seen) {
@@ -70,8 +62,7 @@ TEST(OptionsOwn, TheirVisibilityTest) {
 }
 
 TEST(CutOwns, AHandleOfItsTree) {
-    auto tree = build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1});
-    ASSERT_TRUE(tree) << tree.error().message;
+    auto tree = require(build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1}));
     std::optional<VertexTree> first = std::move(*tree);
     const VertexTree::Data* const data = &first->data();
     const Index triangles = first->triangle_count();

@@ -1,16 +1,10 @@
 // What a tree stores in few bits: shares, directions, and normal masks.
-#include <cmath>
-#include <limits>
-#include <random>
-
-#include <glm/geometric.hpp>
-
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "shapes.h"
+#include "testing.h"
 #include "tree/mask_pool.h"
 
 namespace unseen::vdtree::packed_test {

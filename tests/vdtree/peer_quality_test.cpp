@@ -2,14 +2,8 @@
 // and, from the folder UNSEEN_EXTRA_MESHES, the Stanford dragon and bunny.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
-#include <cmath>
 #include <iostream>
-#include <random>
-#include <vector>
 
-#include <glm/geometric.hpp>
-#include <gtest/gtest.h>
 #ifdef UNSEEN_TEST_WITH_MESHOPTIMIZER
 #include <meshoptimizer.h>
 #endif
@@ -21,6 +15,7 @@
 #include "shapes.h"
 #include "surface_distance.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -47,8 +42,7 @@ Mesh simplified_by_meshoptimizer(const Mesh& mesh, std::size_t triangles, bool s
 
 void compare(const char* what, const Mesh& mesh, std::size_t triangles, bool sloppy) {
     const support::ClusteringTask task(mesh);
-    const auto clustering = cluster_quadric(task.input());
-    ASSERT_TRUE(clustering);
+    const auto clustering = require(cluster_quadric(task.input()));
     const Mesh theirs = simplified_by_meshoptimizer(mesh, triangles, sloppy);
     ASSERT_FALSE(theirs.triangles.empty());
     const Mesh ours = support::simplified_by_deviation(mesh, *clustering, theirs.triangles.size());
@@ -102,8 +96,7 @@ TEST(PeerQuality, Scans) {
         for (const Scan& scan : scans) {
             const std::string name = file.filename().string();
             if (name != scan.file && name != std::string(scan.file) + ".zst") continue;
-            auto mesh = meshio::read_mesh(support::uncompressed(file, scratch.path()));
-            ASSERT_TRUE(mesh) << mesh.error().message;
+            auto mesh = require(meshio::read_mesh(support::uncompressed(file, scratch.path())));
             for (const std::size_t triangles : scan.triangles) compare(scan.file, mesh->mesh, triangles, false);
             ++found;
         }

@@ -1,10 +1,6 @@
 // What holds of trees and cuts whatever the numbers are. ctest asks for a thousand cases of each, and for a hundred thousand in
 // the label slow: RC_PARAMS=max_success=N.
-#include <algorithm>
-#include <cmath>
-#include <vector>
 
-#include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -21,6 +17,7 @@
 #include "exact.h"
 #include "follow_tools.h"
 #include "shapes.h"
+#include "testing.h"
 #include "tree/unit_vector.h"
 #include "tree_checks.h"
 

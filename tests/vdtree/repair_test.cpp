@@ -1,22 +1,15 @@
 // Soups made fit for trees: orientation, cracks, holes.
 #include <unseen/repair/repair.h>
 
-#include <cmath>
-#include <limits>
-#include <set>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/meshio/examine.h>
 #include <unseen/vdtree/builder.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::repair {
 namespace {
 
-using testing::HasSubstr;
 using vdtree::Closedness;
 using vdtree::Index;
 using vdtree::Mesh;
@@ -39,8 +32,7 @@ Mesh with_turned_triangles(Mesh mesh, int one_in) {
 TEST(Repair, LeavesSoundMeshesAlone) {
     for (const Mesh& mesh :
          {shapes::bumpy_sphere(3), shapes::with_attributes(shapes::torus(20, 12)), shapes::grid(5)}) {
-        const auto repaired = repair(mesh);
-        ASSERT_TRUE(repaired) << repaired.error().message;
+        const auto repaired = require(repair(mesh));
         EXPECT_EQ(repaired->mesh.positions, mesh.positions);
         EXPECT_EQ(repaired->mesh.triangles, mesh.triangles);
         EXPECT_EQ(repaired->mesh.normals, mesh.normals);
@@ -54,8 +46,7 @@ TEST(Repair, GivesPartsOneOrientation) {
     const Mesh sphere = shapes::bumpy_sphere(3);
     const Mesh mixed = with_turned_triangles(sphere, 3);
     ASSERT_EQ(closedness(mixed), Closedness::open);
-    const auto repaired = repair(mixed);
-    ASSERT_TRUE(repaired) << repaired.error().message;
+    const auto repaired = require(repair(mixed));
     EXPECT_EQ(closedness(repaired->mesh), Closedness::closed_outward);
     EXPECT_EQ(repaired->report.turned_triangles, (sphere.triangles.size() + 2) / 3);
     EXPECT_EQ(repaired->report.cap_triangles, 0u);
@@ -63,31 +54,26 @@ TEST(Repair, GivesPartsOneOrientation) {
 
 TEST(Repair, AnOpenPartKeepsTheDirectionOfMost) {
     const Mesh sheet = shapes::grid(6);
-    const auto repaired = repair(with_turned_triangles(sheet, 4), {.caps = false});
-    ASSERT_TRUE(repaired);
+    const auto repaired = require(repair(with_turned_triangles(sheet, 4), {.caps = false}));
     EXPECT_EQ(examined(repaired->mesh).inconsistent_edges, 0u);
     EXPECT_EQ(repaired->report.turned_triangles, (sheet.triangles.size() + 3) / 4);
 }
 
 TEST(Repair, ClosedPartsFaceOutwardButForCavities) {
-    const auto turned = repair(shapes::inside_out(shapes::unwelded(shapes::cube(3))));
-    ASSERT_TRUE(turned);
+    const auto turned = require(repair(shapes::inside_out(shapes::unwelded(shapes::cube(3)))));
     EXPECT_EQ(closedness(turned->mesh), Closedness::closed_outward);
     const Mesh outer = shapes::icosphere(2), inner = shapes::placed(shapes::icosphere(2), 0.25);
-    const auto hollow = repair(shapes::together(shapes::inside_out(outer), shapes::inside_out(inner)));
-    ASSERT_TRUE(hollow);
+    const auto hollow = require(repair(shapes::together(shapes::inside_out(outer), shapes::inside_out(inner))));
     EXPECT_EQ(hollow->report.turned_triangles, outer.triangles.size());
     EXPECT_EQ(examined(hollow->mesh).inside_out_components, 1u);
-    const auto eye_in_head = repair(shapes::together(outer, inner));
-    ASSERT_TRUE(eye_in_head);
+    const auto eye_in_head = require(repair(shapes::together(outer, inner)));
     EXPECT_EQ(eye_in_head->report.turned_triangles, 0u);
 }
 
 TEST(Repair, TurnsNormalsThatPointIntoTheSurfaceThen) {
     Mesh mesh = shapes::inside_out(shapes::icosphere(2));
     for (const glm::dvec3& p : mesh.positions) mesh.normals.emplace_back(-glm::normalize(p));
-    const auto repaired = repair(mesh);
-    ASSERT_TRUE(repaired);
+    const auto repaired = require(repair(mesh));
     for (std::size_t v = 0; v < mesh.positions.size(); ++v)
         EXPECT_GT(glm::dot(glm::dvec3(repaired->mesh.normals[v]), mesh.positions[v]), 0);
 }
@@ -106,8 +92,7 @@ TEST(Repair, CapsSmallHolesInTheMaterialBesideThem) {
     mesh.ranges = {{"first", vdtree::MeshRange::Kind::material, 0, half},
                    {"second", vdtree::MeshRange::Kind::material, half, mesh.triangles.size() - half}};
     ASSERT_EQ(closedness(mesh), Closedness::open);
-    const auto repaired = repair(mesh);
-    ASSERT_TRUE(repaired) << repaired.error().message;
+    const auto repaired = require(repair(mesh));
     EXPECT_EQ(repaired->report.holes, 1u);
     EXPECT_EQ(repaired->report.capped_holes, 1u);
     EXPECT_EQ(repaired->report.cap_triangles, 4u); // of a hexagon
@@ -118,8 +103,7 @@ TEST(Repair, CapsSmallHolesInTheMaterialBesideThem) {
     EXPECT_EQ(ranges[1].first_triangle, ranges[0].triangle_count);
     ASSERT_TRUE(vdtree::validate(repaired->mesh.view()));
 
-    const auto large_stay = repair(mesh, {.largest_hole = 0.01});
-    ASSERT_TRUE(large_stay);
+    const auto large_stay = require(repair(mesh, {.largest_hole = 0.01}));
     EXPECT_EQ(large_stay->report.capped_holes, 0u);
     EXPECT_EQ(large_stay->mesh.triangles, mesh.triangles);
     EXPECT_EQ(repair(mesh, {.caps = false})->mesh.triangles, mesh.triangles);
@@ -127,8 +111,7 @@ TEST(Repair, CapsSmallHolesInTheMaterialBesideThem) {
 
 TEST(Repair, GivesSheetsNoBacks) {
     const Mesh leaves = shapes::together(shapes::single_triangle(), shapes::placed(shapes::grid(4), 0.01, {50, 0, 0}));
-    const auto repaired = repair(leaves);
-    ASSERT_TRUE(repaired);
+    const auto repaired = require(repair(leaves));
     EXPECT_EQ(repaired->report.holes, 2u);
     EXPECT_EQ(repaired->mesh.triangles, leaves.triangles);
 }
@@ -140,8 +123,7 @@ TEST(Repair, CapsNoBordersThatNonManifoldEdgesHaveMade) {
     mesh.positions.emplace_back(mesh.positions[t[0]] * 1.05);
     mesh.triangles.push_back({t[0], t[1], static_cast<Index>(mesh.positions.size() - 1)});
     mesh.triangles.push_back({t[0], t[2], t[1]});
-    const auto repaired = repair(mesh);
-    ASSERT_TRUE(repaired);
+    const auto repaired = require(repair(mesh));
     EXPECT_EQ(repaired->report.cap_triangles, 0u);
     EXPECT_EQ(repaired->mesh.triangles.size(), mesh.triangles.size());
 }
@@ -151,12 +133,10 @@ TEST(Repair, ClosesCracksWithinTheGap) {
     std::mt19937_64 random(5);
     for (glm::dvec3& p : mesh.positions) p += 1e-8 * shapes::random_direction(random);
     ASSERT_EQ(closedness(mesh), Closedness::open);
-    const auto repaired = repair(mesh);
-    ASSERT_TRUE(repaired) << repaired.error().message;
+    const auto repaired = require(repair(mesh));
     EXPECT_GT(repaired->report.moved_vertices, 0u);
     EXPECT_EQ(closedness(repaired->mesh), Closedness::closed_outward);
-    const auto too_wide = repair(mesh, {.caps = false, .gap = 1e-13});
-    ASSERT_TRUE(too_wide);
+    const auto too_wide = require(repair(mesh, {.caps = false, .gap = 1e-13}));
     EXPECT_EQ(too_wide->report.moved_vertices, 0u);
     EXPECT_EQ(closedness(too_wide->mesh), Closedness::open);
 }
@@ -167,16 +147,14 @@ TEST(Repair, LeavesOutDuplicatesButNotTheOtherSide) {
     const Triangle t = mesh.triangles[4];
     mesh.triangles.push_back({t[1], t[2], t[0]}); // the same
     mesh.triangles.push_back({t[1], t[0], t[2]}); // its back
-    const auto repaired = repair(mesh, {.caps = false});
-    ASSERT_TRUE(repaired);
+    const auto repaired = require(repair(mesh, {.caps = false}));
     EXPECT_EQ(repaired->report.duplicates, 1u);
     EXPECT_EQ(repaired->mesh.triangles.size(), count + 1);
 }
 
 TEST(Repair, TakesAnySoupAndLosesNoTriangle) {
     for (const shapes::Named& shape : shapes::all()) {
-        const auto repaired = repair(shape.mesh);
-        ASSERT_TRUE(repaired) << shape.name << ": " << repaired.error().message;
+        const auto repaired = require(repair(shape.mesh));
         std::size_t usable = 0;
         for (const Triangle& t : shape.mesh.triangles) usable += t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
         EXPECT_EQ(repaired->mesh.triangles.size() + repaired->report.duplicates,
@@ -184,8 +162,7 @@ TEST(Repair, TakesAnySoupAndLosesNoTriangle) {
             << shape.name;
         EXPECT_EQ(repaired->mesh.positions.size(), shape.mesh.positions.size()) << shape.name;
         EXPECT_LE(examined(repaired->mesh).inconsistent_edges, examined(shape.mesh).inconsistent_edges) << shape.name;
-        const auto again = repair(repaired->mesh);
-        ASSERT_TRUE(again) << shape.name;
+        const auto again = require(repair(repaired->mesh));
         if (shape.name != "random_soup") { // where CGAL cuts non-manifold edges depends on the directions
             EXPECT_EQ(again->report.turned_triangles, 0u) << shape.name;
         }

@@ -4,16 +4,8 @@
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "temp_folder.h"
+#include "testing.h"
 
-#include <array>
-#include <cmath>
-#include <random>
-#include <set>
-#include <stdexcept>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include <unseen/vdtree/builder.h>
@@ -22,8 +14,6 @@ namespace scene_file_test {
 
 using namespace unseen;
 using nlohmann::json;
-using testing::HasSubstr;
-using testing::IsEmpty;
 
 // A triangle in a buffer of its own; the test adds nodes and so on.
 json document(const std::string& rest) {
@@ -71,8 +61,7 @@ TEST(SceneFile, ReadsInstancesOfExtension) {
         "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 0, "SCALE": 0, "_ID": 1}}}},
         {"mesh": 0, "name": "child"}], "scenes": [{"nodes": [0]}],
         "extensionsUsed": ["EXT_mesh_gpu_instancing"], "extensionsRequired": ["EXT_mesh_gpu_instancing"]})");
-    const auto file = open(instanced);
-    ASSERT_TRUE(file) << file.error().message;
+    const auto file = require(open(instanced));
     const meshio::SceneContents& read = file->contents();
     EXPECT_TRUE(read.is_scene);
     ASSERT_EQ(read.nodes.size(), 4u);
@@ -146,8 +135,7 @@ TEST(SceneFile, KnowsWhatIsBackground) {
 }
 
 TEST(SceneFile, ReadsMeshesInTheirOwnFrameOrStretched) {
-    auto file = open(document(R"({"nodes": [{"mesh": 0, "translation": [9, 9, 9]}]})"));
-    ASSERT_TRUE(file);
+    auto file = require(open(document(R"({"nodes": [{"mesh": 0, "translation": [9, 9, 9]}]})")));
     const auto plain = file->mesh(0);
     ASSERT_TRUE(plain && *plain);
     const std::vector<glm::dvec3> own = (*plain)->mesh.positions;
@@ -163,20 +151,17 @@ TEST(SceneFile, ReadsMeshesInTheirOwnFrameOrStretched) {
 TEST(SceneFile, LeavesOutMeshesOfLines) {
     json lines = document(R"({"nodes": [{"mesh": 0}]})");
     lines["meshes"][0]["primitives"][0]["mode"] = 1;
-    auto file = open(lines);
-    ASSERT_TRUE(file);
-    const auto none = file->mesh(0);
-    ASSERT_TRUE(none) << none.error().message;
+    auto file = require(open(lines));
+    const auto none = require(file->mesh(0));
     EXPECT_FALSE(*none);
 }
 
 TEST(SceneFile, KeepsOfAMeshsDocumentWhatItUses) {
-    auto file = open(document(R"({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [
+    auto file = require(open(document(R"({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [
         {"attributes": {"POSITION": 0}, "indices": 1, "material": 1}]}],
         "images": [{"uri": "a.png"}, {"uri": "b.png"}], "textures": [{"source": 0}, {"source": 1}],
         "materials": [{"name": "unused", "normalTexture": {"index": 0}},
-                      {"name": "used", "normalTexture": {"index": 1}}]})"));
-    ASSERT_TRUE(file) << file.error().message;
+                      {"name": "used", "normalTexture": {"index": 1}}]})")));
     const auto read = file->mesh(0);
     ASSERT_TRUE(read && *read) << (read ? "no mesh" : read.error().message);
     const json kept = json::parse((*read)->document->json);
@@ -233,8 +218,7 @@ TEST(SceneFile, NamesWhatIsWrong) {
     json broken = document(R"({"nodes": [{"mesh": 0}]})");
     broken["meshes"][0]["name"] = "sail";
     broken["meshes"][0]["primitives"][0]["indices"] = 0;
-    auto file = open(broken);
-    ASSERT_TRUE(file) << "meshes are read when they are asked for";
+    auto file = require(open(broken));
     const auto read = file->mesh(0);
     ASSERT_FALSE(read);
     EXPECT_THAT(read.error().message, HasSubstr("mesh 0 'sail'"));

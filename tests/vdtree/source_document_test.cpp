@@ -1,8 +1,4 @@
 // What goes with a tree besides triangles: as bytes and back, and bytes that lie.
-#include <random>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
@@ -11,13 +7,13 @@
 
 #include "gltf_scene.h"
 #include "temp_folder.h"
+#include "testing.h"
 
 namespace unseen::vdtree::source_document_test {
 namespace {
 
 using meshio::SourceDocument;
 using support::GltfScene;
-using ::testing::HasSubstr;
 
 const std::array<std::string, 3> images = {"\x89PNG one", "\x89PNG two", "\xFF\xD8\xFF three"};
 
@@ -53,8 +49,7 @@ TEST(SourceDocuments, ComeBackFromBytes) {
     ASSERT_EQ(document.files.size(), 3u);
     ASSERT_EQ(document.channels.size(), 4u);
     const auto bytes = meshio::pack(document);
-    const auto again = meshio::unpack(bytes);
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(meshio::unpack(bytes));
     EXPECT_EQ(meshio::pack(*again), bytes);
     EXPECT_EQ(again->json, document.json);
     EXPECT_EQ(*again->files[2].bytes, images[2]);
@@ -73,8 +68,7 @@ TEST(SourceDocuments, GoWithTreesToFilesAndBack) {
     for (const auto& opened : {read_tree(folder / "t.vdt"), map_tree(folder / "t.vdt")}) {
         ASSERT_TRUE(opened) << opened.error().message;
         EXPECT_TRUE(std::ranges::equal(opened->document(), bytes));
-        const auto relit = opened->relit({});
-        ASSERT_TRUE(relit);
+        const auto relit = require(opened->relit({}));
         EXPECT_EQ(relit->document().size(), bytes.size()) << "another light changes nothing of it";
         ASSERT_TRUE(meshio::write_cut(folder / "out.glb", full_cut(*opened)));
         const auto in = support::read_gltf(folder / "in.glb"), out = support::read_gltf(folder / "out.glb");
@@ -92,8 +86,7 @@ TEST(SourceDocuments, OfTrianglesThatAreDroppedStayInStep) {
     const std::size_t at = scene.document["bufferViews"][view]["byteOffset"];
     scene.data.replace(at, 4, scene.data.substr(at + 4, 4));
     support::write_bytes(folder / "in.glb", scene.glb(images));
-    const auto read = meshio::read_mesh(folder / "in.glb");
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(meshio::read_mesh(folder / "in.glb"));
     ASSERT_EQ(read->dropped_triangles, 1u);
     const std::size_t first = scene.document["accessors"][4]["count"].get<std::size_t>() / 3;
     EXPECT_EQ(read->document->part_of(first - 2), 0u);
@@ -145,8 +138,7 @@ TEST(SourceDocuments, TransformsOfTexturesAreRead) {
     scene.document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"] =
         {{"scale", {2, 4}}, {"rotation", std::numbers::pi / 2}, {"offset", {0.25, 0.5}}};
     support::write_bytes(folder / "in.glb", scene.glb(images));
-    const auto read = meshio::read_mesh(folder / "in.glb");
-    ASSERT_TRUE(read) << read.error().message;
+    const auto read = require(meshio::read_mesh(folder / "in.glb"));
     const glm::dvec2 at = read->materials[0].uv_map(glm::dvec2(0.5, 0.125));
     EXPECT_NEAR(at.x, 0.25 + 0.5, 1e-12);
     EXPECT_NEAR(at.y, 0.5 - 1, 1e-12);

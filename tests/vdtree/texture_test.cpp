@@ -1,13 +1,6 @@
 // Textures: what pyramids say of them against every texel, and what trees with textures promise.
 #include <unseen/vdtree/mesh.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <random>
-
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/conserve_light.h>
@@ -18,6 +11,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 #include "tree_file.h"
 
@@ -171,8 +165,7 @@ TEST(Textures, BoundTheRingsOfAllMeshes) {
             EXPECT_TRUE(sound) << which << ": " << sound.error().message;
             EXPECT_TRUE(tree.is_prelit());
             EXPECT_EQ(tree.ring_texture().size(), tree.interior_count());
-            const auto relit = tree.relit({.direction = {0, 0, 1}, .ambient = 0.1f});
-            ASSERT_TRUE(relit);
+            const auto relit = require(tree.relit({.direction = {0, 0, 1}, .ambient = 0.1f}));
             EXPECT_TRUE(verify(*relit)) << verify(*relit).error().message;
         }
     }
@@ -186,8 +179,7 @@ TEST(Textures, AreKeptInFiles) {
     const VertexTree tree = built(mesh, {.prelit = true});
     ASSERT_TRUE(write_tree(file, tree));
     for (const bool mapped : {false, true}) {
-        const auto again = mapped ? map_tree(file) : read_tree(file);
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(mapped ? map_tree(file) : read_tree(file));
         EXPECT_TRUE(again->is_prelit());
         const TextureView texture = again->texture();
         EXPECT_EQ(texture.width, 33u);
@@ -201,11 +193,9 @@ TEST(Textures, AreKeptInFiles) {
         EXPECT_TRUE(verify(*again));
     }
     // Without it, the file is that of a mesh without texture.
-    const auto plain = tree.untextured();
-    ASSERT_TRUE(plain);
+    const auto plain = require(tree.untextured());
     ASSERT_TRUE(write_tree(file, *plain));
-    const auto again = read_tree(file);
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(read_tree(file));
     EXPECT_TRUE(again->texture().empty());
     EXPECT_FALSE(again->is_prelit());
     EXPECT_TRUE(verify(*again)) << verify(*again).error().message;

@@ -1,25 +1,11 @@
 // Tree files: what is written is read again; what is damaged, cut short or lying is refused.
 #include <unseen/vdtree/tree_io.h>
 
-#include <algorithm>
 #include <csignal>
-#include <filesystem>
-#include <functional>
-#include <iterator>
-#include <limits>
-#include <numeric>
-#include <random>
-#include <stdexcept>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
@@ -28,6 +14,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
+#include "testing.h"
 #include "textures.h"
 #include "tree_checks.h"
 #include "tree_file.h"
@@ -40,7 +27,6 @@ using support::built;
 
 using support::TempFolder;
 using support::TreeFile;
-using testing::HasSubstr;
 
 class TreeIo : public testing::Test {
 protected:
@@ -86,11 +72,9 @@ TEST_F(TreeIo, ReadsWhatWasWritten) {
         SCOPED_TRACE(named.name);
         const VertexTree tree = built(named.mesh);
         ASSERT_TRUE(write_tree(file_, tree));
-        const auto again = read_tree(file_);
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(read_tree(file_));
         EXPECT_EQ(support::difference(tree, *again), "");
-        const auto mapped = map_tree(file_);
-        ASSERT_TRUE(mapped) << mapped.error().message;
+        const auto mapped = require(map_tree(file_));
         EXPECT_EQ(support::difference(tree, *mapped), "");
         EXPECT_TRUE(mapped->check());
         EXPECT_EQ(mapped->first_damaged(), no_node);
@@ -104,16 +88,14 @@ TEST_F(TreeIo, KeepsAnotherLight) {
     const VertexTree tree =
         *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f, .fill = 0.75f});
     ASSERT_TRUE(write_tree(file_, tree));
-    const auto again = read_tree(file_);
-    ASSERT_TRUE(again);
+    const auto again = require(read_tree(file_));
     EXPECT_EQ(support::difference(tree, *again), "");
 }
 
 TEST_F(TreeIo, TakesSectionsOfSeveralPages) {
     const VertexTree tree = built(shapes::bumpy_sphere(6)); // 41k vertices: bounds alone are more than 1 MB
     std::string bytes = bytes_of(tree);
-    const auto again = read_tree(file_);
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(read_tree(file_));
     EXPECT_EQ(support::difference(tree, *again), "");
     // Damage to the second page of the bounds is found there.
     const auto parsed = TreeFile::parse(bytes);
@@ -144,8 +126,7 @@ TEST_F(TreeIo, IgnoresSectionsThatItDoesNotKnow) {
     const VertexTree tree = built(shapes::cube(2));
     TreeFile file = TreeFile::parse(bytes_of(tree));
     file.sections.insert(file.sections.begin() + 3, {"from_the_future", 3, 1, "abcdef"});
-    const auto again = read_bytes(file.bytes());
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(read_bytes(file.bytes()));
     EXPECT_EQ(support::difference(tree, *again), "");
 }
 
@@ -272,8 +253,7 @@ TEST_F(TreeIo, KeepsAttributesOfAnyName) {
             open->with_attribute("more", AttributeDomain::node, std::vector<double>(tree.node_count(), 7));
         ASSERT_TRUE(more) << more.error().message;
         ASSERT_TRUE(write_tree(other, *more));
-        const auto again = read_tree(other);
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(read_tree(other));
         EXPECT_EQ(again->attributes().size(), 3u);
         EXPECT_EQ(again->attribute<double>("more").size(), tree.node_count());
         EXPECT_EQ(support::difference(*again, tree), "");
@@ -288,8 +268,7 @@ TEST_F(TreeIo, GivesAttributesOfOneTypeOnly) {
     EXPECT_TRUE(tree.attribute<double>("mark").empty()) << "of another size";
     EXPECT_TRUE(tree.attribute<float>("marks").empty());
     EXPECT_EQ(tree.positions().data(), plain.positions().data()) << "all else is shared";
-    const auto replaced = tree.with_attribute("mark", AttributeDomain::tree, std::vector<float>{1});
-    ASSERT_TRUE(replaced);
+    const auto replaced = require(tree.with_attribute("mark", AttributeDomain::tree, std::vector<float>{1}));
     EXPECT_EQ(replaced->attribute<float>("mark").size(), 1u);
     EXPECT_EQ(replaced->attributes().size(), 2u);
     for (const char* name : {"", "with space", "a name longer than it may be"})
@@ -521,8 +500,7 @@ TEST_F(TreeIo, LeavesDamagedNodesOfAMappedTreeFolded) {
     support::write_bytes(file_, file.bytes());
     EXPECT_FALSE(read_tree(file_));
 
-    const auto mapped = map_tree(file_);
-    ASSERT_TRUE(mapped) << mapped.error().message;
+    const auto mapped = require(map_tree(file_));
     EXPECT_EQ(mapped->first_damaged(), no_node); // nobody has come there
     Cut cut(*mapped);
     cut.unfold_all();
@@ -556,8 +534,7 @@ TEST_F(TreeIo, FollowsNoParentsIntoTheVoid) {
         TreeFile file = TreeFile::parse(bytes_of(tree));
         file["parents"].set(leaf, parent);
         support::write_bytes(file_, file.bytes());
-        const auto mapped = map_tree(file_);
-        ASSERT_TRUE(mapped);
+        const auto mapped = require(map_tree(file_));
         Cut cut(*mapped);
         EXPECT_FALSE(cut.is_active(leaf));
         cut.unfold_ancestors(leaf);
@@ -569,12 +546,10 @@ TEST_F(TreeIo, FollowsNoParentsIntoTheVoid) {
 TEST_F(TreeIo, KeepsAMappedTreeWhoseFileIsReplaced) {
     const VertexTree tree = built(shapes::bumpy_sphere(4)), other = built(shapes::cube(2));
     ASSERT_TRUE(write_tree(file_, tree));
-    const auto mapped = map_tree(file_);
-    ASSERT_TRUE(mapped);
+    const auto mapped = require(map_tree(file_));
     ASSERT_TRUE(write_tree(file_, other)); // by renaming
     EXPECT_EQ(support::difference(tree, *mapped), "");
-    auto relit = mapped->relit({.direction = {0, 0, 1}});
-    ASSERT_TRUE(relit);
+    auto relit = require(mapped->relit({.direction = {0, 0, 1}}));
     std::filesystem::remove(file_);
     EXPECT_TRUE(verify(*relit));
 }

@@ -1,17 +1,6 @@
 // Values of vertices: read from PLY, kept with a tree, restored in cuts, written again.
 #include <unseen/meshio/mesh_file.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
-#include <map>
-#include <random>
-
-#include <glm/geometric.hpp>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -32,8 +21,6 @@ using meshio::SourceDocument;
 using meshio::ValueType;
 using meshio::VertexArray;
 using support::read;
-using testing::ElementsAre;
-using testing::HasSubstr;
 
 constexpr double infinity = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -190,8 +177,7 @@ TEST(PlyValues, ArraysBecomeProperties) {
                             "uint middle", "double large", "float u", "float x_", "float wind_speed_0_"));
     EXPECT_THAT(notes, ElementsAre(HasSubstr("got a _ behind them: 'x' and 'wind_speed_0'"), HasSubstr("'wind speed'"),
                                    HasSubstr("no integers of 64 bits: 'large' became double")));
-    const auto again = meshio::read_mesh(folder / "a.ply");
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(meshio::read_mesh(folder / "a.ply"));
     const auto& found = again->document->arrays;
     EXPECT_EQ(values_of<float>(named(found, "wind_speed_1")), (std::vector<float>{2, 4, 6}));
     EXPECT_EQ(values_of<std::int32_t>(named(found, "small")), (std::vector<std::int32_t>{-5, 0, 5}));
@@ -222,8 +208,7 @@ TEST(VertexValues, ComeBackFromBytes) {
     SourceDocument document{.format = SourceDocument::Format::table, .arrays = some_arrays(20)};
     document.arrays.push_back({.name = "n", .components = 3, .role = VertexArray::Role::normals});
     const auto bytes = meshio::pack(document);
-    const auto again = meshio::unpack(bytes);
-    ASSERT_TRUE(again) << again.error().message;
+    const auto again = require(meshio::unpack(bytes));
     EXPECT_EQ(again->format, SourceDocument::Format::table);
     ASSERT_EQ(again->arrays.size(), 4u);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -268,8 +253,7 @@ TEST(VertexValues, OfDamagedBytesLeadNobodyAstray) {
         if (!document || i % 50 != 0) continue;
         Mesh with = mesh;
         with.document = bytes;
-        const auto tree = build_tree(with.view());
-        ASSERT_TRUE(tree);
+        const auto tree = require(build_tree(with.view()));
         for (const char* name : {"x.vtp", "x.stl", "x.ply", "x.glb"})
             written += meshio::write_cut(folder / name, part_cut(*tree, 1)).has_value();
     }
@@ -292,14 +276,12 @@ TEST(VertexValues, OfCutsAreThoseOfTheirVertices) {
     const auto vectors = values_of<float>(arrays[1]);
     const auto labels = values_of<std::int64_t>(arrays[2]);
     const VertexTree built = tree_with(mesh, arrays);
-    const auto sound = SoundTree::of(built);
-    ASSERT_TRUE(sound);
+    const auto sound = require(SoundTree::of(built));
     int proxies = 0, unfinite = 0;
     for (unsigned seed = 0; seed < 6; ++seed) {
         const Cut cut = seed == 0 ? full_cut(built) : part_cut(built, seed);
         const ExtractedMesh extracted = extract_with_sources(cut);
-        const auto found = meshio::arrays_of_cut(cut, extracted, arrays);
-        ASSERT_TRUE(found) << found.error().message;
+        const auto found = require(meshio::arrays_of_cut(cut, extracted, arrays));
         const auto found_reals = values_of<double>((*found)[0]);
         const auto found_vectors = values_of<float>((*found)[1]);
         const auto found_labels = values_of<std::int64_t>((*found)[2]);
@@ -347,8 +329,7 @@ TEST(VertexValues, MeansStayWithinTheValues) {
         array_of("huge", ValueType::float64, 1, huge)};
     const VertexTree tree = tree_with(mesh, arrays);
     const Cut cut = part_cut(tree, 3);
-    const auto found = meshio::arrays_of_cut(cut, extract_with_sources(cut), arrays);
-    ASSERT_TRUE(found);
+    const auto found = require(meshio::arrays_of_cut(cut, extract_with_sources(cut), arrays));
     for (const double value : values_of<double>((*found)[0])) EXPECT_EQ(value, 0.1);
     for (const double value : values_of<double>((*found)[1])) EXPECT_TRUE(std::isnan(value));
     for (const float value : values_of<float>((*found)[2])) EXPECT_TRUE(std::isinf(value));
@@ -404,8 +385,7 @@ TEST(VertexValues, ComeOutOfAFullCutAsTheyWentIn) {
     for (const auto& opened : {read_tree(folder / "t.vdt"), map_tree(folder / "t.vdt")}) {
         ASSERT_TRUE(opened) << opened.error().message;
         for (const char* name : {"out.vtp"}) {
-            const auto written = meshio::write_cut(folder / name, full_cut(*opened));
-            ASSERT_TRUE(written) << written.error().message;
+            const auto written = require(meshio::write_cut(folder / name, full_cut(*opened)));
             EXPECT_TRUE(written->empty());
             EXPECT_EQ(by_place(read_file(folder / name), names), in) << name;
         }
@@ -430,8 +410,7 @@ TEST(VertexValues, OtherFormatsSayWhatTheyLeaveOut) {
     const Mesh mesh = shapes::icosphere(1);
     const VertexTree tree = tree_with(mesh, some_arrays(mesh.positions.size()));
     for (const char* name : {"a.obj", "a.glb", "a.gltf"}) {
-        const auto notes = meshio::write_cut(folder / name, full_cut(tree));
-        ASSERT_TRUE(notes) << notes.error().message;
+        const auto notes = require(meshio::write_cut(folder / name, full_cut(tree)));
         EXPECT_THAT(*notes, ElementsAre(HasSubstr("values of vertices were left out: 'real', 'vector' and 'label'")));
         EXPECT_EQ(read_file(folder / name).mesh.triangles.size(), mesh.triangles.size());
     }

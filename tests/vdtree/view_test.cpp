@@ -1,22 +1,12 @@
 // Views: the camera's frame, framing a sphere, and what is no view.
 #include <unseen/vdtree/view.h>
 
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <numbers>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <gtest/gtest.h>
 
 #include <unseen/vdtree/depth_picture.h>
 
 #include "shapes.h"
+#include "testing.h"
 
 namespace unseen::vdtree::view_test {
 namespace {
@@ -218,8 +208,7 @@ TEST(ViewFromMatrices, ShowsPointsWhereTheMatricesDo) {
     int seen = 0;
     for (int i = 0; i < 400; ++i) {
         const Matrices m = random_matrices(random, i % 2 == 1);
-        const auto view = view_from_matrices(m.view, m.projection, 800, 600);
-        ASSERT_TRUE(view) << view.error().message;
+        const auto view = require(view_from_matrices(m.view, m.projection, 800, 600));
         EXPECT_EQ(view->orthographic_height.has_value(), i % 2 == 1);
         for (int k = 0; k < 20; ++k) {
             const glm::dvec3 point = 5.0 * random_direction(random);
@@ -238,8 +227,7 @@ TEST(ViewFromMatrices, ShowsPointsWhereTheMatricesDo) {
 
 TEST(ViewFromMatrices, IsTheViewThatTheyAreOf) {
     const glm::dmat4 view = glm::lookAt(glm::dvec3(1, 2, 3), glm::dvec3(0, 0, 0), glm::dvec3(0, 1, 0));
-    const auto made = view_from_matrices(view, glm::perspective(0.7, 2.0, 0.1, 10.0), 640, 320);
-    ASSERT_TRUE(made) << made.error().message;
+    const auto made = require(view_from_matrices(view, glm::perspective(0.7, 2.0, 0.1, 10.0), 640, 320));
     EXPECT_NEAR(glm::length(made->eye - glm::dvec3(1, 2, 3)), 0, 1e-12);
     EXPECT_NEAR(made->fov_y_degrees, 0.7 * 180 / std::numbers::pi, 1e-12);
     EXPECT_EQ(made->shift, glm::dvec2(0));
@@ -247,8 +235,8 @@ TEST(ViewFromMatrices, IsTheViewThatTheyAreOf) {
     glm::dmat4 reversed(0);
     reversed[0][0] = 1 / (2 * std::tan(0.35)), reversed[1][1] = 1 / std::tan(0.35), reversed[2][3] = -1;
     reversed[3][2] = 0.1;
-    const auto other = view_from_matrices(glm::dmat4(glm::mat4(view)), 3.0 * glm::dmat4(glm::mat4(reversed)), 640, 320);
-    ASSERT_TRUE(other) << other.error().message;
+    const auto other =
+        require(view_from_matrices(glm::dmat4(glm::mat4(view)), 3.0 * glm::dmat4(glm::mat4(reversed)), 640, 320));
     EXPECT_NEAR(glm::length(other->eye - made->eye), 0, 1e-5);
     EXPECT_NEAR(other->fov_y_degrees, made->fov_y_degrees, 1e-4);
 }

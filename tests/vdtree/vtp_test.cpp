@@ -1,14 +1,6 @@
 // VTK's polygons in XML, in every encoding; what VTK itself wrote is in tests/data/vtp.
 #include <unseen/meshio/mesh_file.h>
 
-#include <cmath>
-#include <cstring>
-#include <fstream>
-#include <limits>
-#include <numeric>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <zlib.h>
 
 #include "mesh_readers.h"
@@ -30,8 +22,6 @@ using meshio::ValueType;
 using meshio::VertexArray;
 using support::error_of;
 using support::read;
-using testing::ElementsAre;
-using testing::HasSubstr;
 using vtp_files::Format;
 using vtp_files::Style;
 
@@ -374,11 +364,9 @@ TEST(Vtp, ComesBackAsItWasWritten) {
             const auto arrays = arrays_of_every_type(mesh.positions.size());
             for (const std::string name : {"a.vtp", "A.VTP"}) {
                 std::vector<Message> notes;
-                const auto written = meshio::write_mesh_with(folder / name, mesh.view(), arrays, notes);
-                ASSERT_TRUE(written) << written.error().message;
+                const auto written = require(meshio::write_mesh_with(folder / name, mesh.view(), arrays, notes));
                 EXPECT_TRUE(notes.empty());
-                const auto again = meshio::read_mesh(folder / name);
-                ASSERT_TRUE(again) << again.error().message;
+                const auto again = require(meshio::read_mesh(folder / name));
                 EXPECT_TRUE(again->warnings.empty() && again->notes.empty());
                 EXPECT_EQ(again->mesh.positions, mesh.positions);
                 EXPECT_EQ(again->mesh.triangles, mesh.triangles);
@@ -411,8 +399,7 @@ TEST(Vtp, KeepsTheNamesOfWhatTheMeshHasTaken) {
     for (const std::string name : {"a.vtp"}) {
         std::vector<Message> notes;
         ASSERT_TRUE(meshio::write_mesh_with(folder / name, mesh.view(), roles, notes));
-        const auto again = meshio::read_mesh(folder / name);
-        ASSERT_TRUE(again) << again.error().message;
+        const auto again = require(meshio::read_mesh(folder / name));
         for (const VertexArray& role : roles) {
             ASSERT_NE(find(*again, role.name), nullptr) << name << role.name;
             EXPECT_EQ(find(*again, role.name)->role, role.role) << name << role.name;
