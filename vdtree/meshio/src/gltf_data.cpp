@@ -85,10 +85,9 @@ Buffers::Buffers(const MeshSource& source, const json& document, std::optional<s
             fail(where + " has no data but by the extension " + in_quotes(extensions->begin().key()) +
                  ", which is not read; export it without.");
         else fail(where + " names no file and has no data of its own; correct the JSON.");
-        if (size > bytes.size()) {
+        if (size > bytes.size())
             fail(where + " claims " + std::to_string(size) + " bytes, but there are " + std::to_string(bytes.size()) +
                  "; the data are cut short.");
-        }
         buffers_.push_back(bytes.substr(0, size));
     }
 }
@@ -100,9 +99,8 @@ std::size_t Buffers::add(std::string bytes) {
 
 std::string Buffers::decode_data(std::string_view uri, const std::string& where) {
     const std::size_t comma = uri.find(',');
-    if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) {
+    if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64"))
         fail(where + " has a data URI that is not in base64; correct it.");
-    }
     std::optional<std::string> bytes = decode_base64(uri.substr(comma + 1));
     if (!bytes) fail(where + " has a data URI with characters that are not base64; correct it.");
     return std::move(*bytes);
@@ -211,30 +209,26 @@ struct Accessors::Rows {
 };
 
 const tinygltf::Accessor& Accessors::accessor(int index) const {
-    if (index < 0 || static_cast<std::size_t>(index) >= model_.accessors.size()) {
+    if (index < 0 || static_cast<std::size_t>(index) >= model_.accessors.size())
         fail("accessor " + std::to_string(index) + " is used, but there are " +
              std::to_string(model_.accessors.size()) + "; correct the JSON.");
-    }
     return model_.accessors[static_cast<std::size_t>(index)];
 }
 
 Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
                                    const std::string& where) const {
-    if (static_cast<std::size_t>(view_index) >= model_.bufferViews.size()) {
+    if (static_cast<std::size_t>(view_index) >= model_.bufferViews.size())
         fail(where + " uses buffer view " + std::to_string(view_index) + ", but there are " +
              std::to_string(model_.bufferViews.size()) + "; correct the JSON.");
-    }
     const tinygltf::BufferView& view = model_.bufferViews[static_cast<std::size_t>(view_index)];
-    if (static_cast<std::size_t>(view.buffer) >= buffers_.count()) {
+    if (static_cast<std::size_t>(view.buffer) >= buffers_.count())
         fail(numbered("buffer view", static_cast<std::size_t>(view_index)) + " uses buffer " +
              std::to_string(view.buffer) + ", but there are " + std::to_string(buffers_.count()) +
              "; correct the JSON.");
-    }
     const std::string_view bytes = buffers_[static_cast<std::size_t>(view.buffer)];
-    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset) {
+    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
         fail(numbered("buffer view", static_cast<std::size_t>(view_index)) +
              " ends behind its buffer; the data are cut short or the JSON is wrong.");
-    }
     const std::size_t stride = view.byteStride == 0 ? size : view.byteStride;
     if (stride < size) fail(where + " has a stride smaller than its elements; correct the JSON.");
     const std::size_t room = view.byteLength - std::min(offset, view.byteLength);
@@ -257,10 +251,9 @@ void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, c
         rows_of(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset), count, size, where);
     for (std::size_t i = 0; i < count; ++i) {
         const Index target = index_at(at[i], index_type);
-        if (target >= a.count) {
+        if (target >= a.count)
             fail(where + " replaces element " + std::to_string(target) + " of " + std::to_string(a.count) +
                  "; correct its sparse indices.");
-        }
         put(target, values[i]);
     }
 }
@@ -287,23 +280,20 @@ std::vector<glm::dvec4> Accessors::vectors(int index, int components, const char
     const Rows rows = a.bufferView < 0 ? Rows{} : rows_of(a.bufferView, a.byteOffset, a.count, size, where);
     std::vector<glm::dvec4> values(a.count, glm::dvec4(0.0, 0.0, 0.0, 1.0));
     const auto decode = [&](const char* row, glm::dvec4& value) {
-        for (int i = 0; i < found; ++i) {
+        for (int i = 0; i < found; ++i)
             value[i] = component_at(row + static_cast<std::size_t>(i) * component_size, a.componentType, a.normalized);
-        }
     };
     for (std::size_t i = 0; i < rows.count; ++i) decode(rows[i], values[i]);
-    if (a.sparse.isSparse) {
+    if (a.sparse.isSparse)
         for_each_sparse(a, size, where, [&](std::size_t at, const char* row) { decode(row, values[at]); });
-    }
     return values;
 }
 
 std::vector<Index> Accessors::indices(int index) const {
     const tinygltf::Accessor& a = accessor(index);
     const std::string where = numbered("accessor", static_cast<std::size_t>(index));
-    if (a.type != TINYGLTF_TYPE_SCALAR || !is_index_type(a.componentType) || a.bufferView < 0) {
+    if (a.type != TINYGLTF_TYPE_SCALAR || !is_index_type(a.componentType) || a.bufferView < 0)
         fail(where + " cannot hold indices: they are unsigned integers in a bufferView; correct the JSON.");
-    }
     const std::size_t size = component_bytes(a.componentType);
     const Rows rows = rows_of(a.bufferView, a.byteOffset, a.count, size, where);
     std::vector<Index> values(a.count);

@@ -50,9 +50,8 @@ void check_structure(std::string_view text) {
         } else if (c == '}' || c == ']') {
             --depth;
         }
-        if (!in_string && (c == '{' || c == '[' || c == ',') && ++values > max_json_values) {
+        if (!in_string && (c == '{' || c == '[' || c == ',') && ++values > max_json_values)
             fail("byte " + std::to_string(i) + ": the JSON has too many values; split the scene.");
-        }
     }
 }
 
@@ -64,14 +63,12 @@ std::string numbered(const char* what, std::size_t index) { return std::string(w
 
 Container split_glb(std::string_view bytes) {
     if (bytes.size() < glb_header_bytes + chunk_header_bytes) fail("it is too short for a GLB file; it is cut short.");
-    if (word_at(bytes, 4) != glb_version) {
+    if (word_at(bytes, 4) != glb_version)
         fail("its GLB version is " + std::to_string(word_at(bytes, 4)) + ", and only 2 is read; convert it.");
-    }
     const std::size_t length = word_at(bytes, 8);
-    if (length > bytes.size()) {
+    if (length > bytes.size())
         fail("its header claims " + std::to_string(length) + " bytes, but there are " + std::to_string(bytes.size()) +
              "; the file is cut short.");
-    }
     bytes = bytes.substr(0, length);
     Container container;
     for (std::size_t at = glb_header_bytes; at + chunk_header_bytes <= bytes.size();) {
@@ -142,9 +139,8 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
     const bool is_whole_float = value.is_number_float() && value.get<double>() == std::floor(value.get<double>());
     double as_double = -1.0;
     if (value.is_number_integer() || is_whole_float) as_double = value.get<double>();
-    if (!(as_double >= 0.0 && as_double <= static_cast<double>(largest))) {
+    if (!(as_double >= 0.0 && as_double <= static_cast<double>(largest)))
         fail(where + " should be a whole number from 0 to " + std::to_string(largest) + "; correct it.");
-    }
     return static_cast<std::int64_t>(as_double);
 }
 
@@ -196,20 +192,18 @@ private:
         const json* asset = member(document_, "asset");
         const json* version = asset != nullptr && asset->is_object() ? member(*asset, "version") : nullptr;
         if (version == nullptr || !version->is_string()) fail("it has no asset version; it is no glTF file.");
-        if (!version->get_ref<const std::string&>().starts_with("2.")) {
+        if (!version->get_ref<const std::string&>().starts_with("2."))
             fail("its version is " + in_quotes(version->get_ref<const std::string&>()) +
                  ", and only 2 is read; convert it.");
-        }
         reduced_["asset"]["version"] = "2.0";
     }
 
     template <class Copy>
     void copy_array(const char* key, const char* what, Copy&& copy) {
         const json& array = array_of(document_, key);
-        if (array.size() > max_array_elements) {
+        if (array.size() > max_array_elements)
             fail("it has " + std::to_string(array.size()) + " " + key + ", more than the " +
                  std::to_string(max_array_elements) + " that are read; split the scene.");
-        }
         json& out = reduced_[key] = json::array();
         for (std::size_t i = 0; i < array.size(); ++i) {
             where_ = numbered(what, i);
@@ -268,9 +262,8 @@ private:
         const json* type = member(in, "type");
         if (type == nullptr || !type->is_string()) fail(where_ + " has no type; correct the JSON.");
         out["type"] = *type;
-        if (const json* normalized = member(in, "normalized"); normalized != nullptr && normalized->is_boolean()) {
+        if (const json* normalized = member(in, "normalized"); normalized != nullptr && normalized->is_boolean())
             out["normalized"] = *normalized;
-        }
         if (member(in, "sparse") == nullptr) return;
         const json& sparse = object(in, "sparse");
         json copied;

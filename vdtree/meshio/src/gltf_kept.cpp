@@ -47,9 +47,8 @@ std::set<std::string> unknown_required(const json& document) {
         if (!extension.is_string()) continue;
         const auto& required = extension.get_ref<const std::string&>();
         if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
-            std::end(unsupported_extensions)) {
+            std::end(unsupported_extensions))
             fail("it needs the extension " + required + ", which is not read; export it without.");
-        }
         if (required == meshopt_extension && !has_meshoptimizer())
             fail("it needs the extension " + required +
                  ", and this build is without the library meshoptimizer; install "
@@ -145,11 +144,10 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
         refused += (refused.empty() ? "" : " and ") + std::string(thing.what);
         names += (names.empty() ? "" : ",") + std::string(thing.name);
     }
-    if (!refused.empty()) {
+    if (!refused.empty())
         fail("it has " + refused + ", which a simplified mesh cannot keep" +
              (unknown.empty() || drop.extensions ? "" : " (" + listed({unknown.begin(), unknown.end()}) + ")") +
              "; leave them out with " + Message::of("{read.drop = }") + names + ".");
-    }
 }
 
 json without_geometry(json document, const std::vector<SourceDocument::File>& images, std::vector<Message>& warnings) {

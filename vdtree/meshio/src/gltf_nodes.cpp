@@ -27,34 +27,28 @@ glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where) {
         return m;
     }
     if (node.rotation.size() == 4) m = rotation_matrix(node.rotation, where);
-    if (node.scale.size() == 3) {
+    if (node.scale.size() == 3)
         for (int i = 0; i < 3; ++i) m[i] *= node.scale[static_cast<std::size_t>(i)];
-    }
-    if (node.translation.size() == 3) {
-        m[3] = {node.translation[0], node.translation[1], node.translation[2], 1.0};
-    }
+    if (node.translation.size() == 3) m[3] = {node.translation[0], node.translation[1], node.translation[2], 1.0};
     return m;
 }
 
 std::vector<int> root_nodes(const tinygltf::Model& model) {
     if (!model.scenes.empty()) {
         const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
-        if (scene >= model.scenes.size()) {
+        if (scene >= model.scenes.size())
             fail("scene " + std::to_string(scene) + " is to be shown, but there are " +
                  std::to_string(model.scenes.size()) + "; correct the JSON.");
-        }
         return model.scenes[scene].nodes;
     }
     std::vector<bool> is_child(model.nodes.size());
     for (const tinygltf::Node& node : model.nodes) {
-        for (const int child : node.children) {
+        for (const int child : node.children)
             if (static_cast<std::size_t>(child) < is_child.size()) is_child[static_cast<std::size_t>(child)] = true;
-        }
     }
     std::vector<int> roots;
-    for (std::size_t i = 0; i < is_child.size(); ++i) {
+    for (std::size_t i = 0; i < is_child.size(); ++i)
         if (!is_child[i]) roots.push_back(static_cast<int>(i));
-    }
     if (roots.empty() && !model.nodes.empty())
         fail("its nodes have no root: each is the child of another; correct the JSON.");
     return roots;
@@ -98,9 +92,8 @@ private:
     void push(std::vector<Visit>& stack, int node, std::size_t depth, std::size_t parent) {
         const auto index = static_cast<std::size_t>(node);
         const std::string where = numbered("node", index);
-        if (index >= model_.nodes.size()) {
+        if (index >= model_.nodes.size())
             fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
-        }
         // A second visit means a cycle or two parents; glTF allows neither.
         if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
         reached_[index] = true;
@@ -124,10 +117,9 @@ std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, cons
 std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t node) {
     const int mesh = model.nodes[node].mesh;
     if (mesh < 0) return std::nullopt;
-    if (static_cast<std::size_t>(mesh) >= model.meshes.size()) {
+    if (static_cast<std::size_t>(mesh) >= model.meshes.size())
         fail(numbered("node", node) + " uses mesh " + std::to_string(mesh) + ", but there are " +
              std::to_string(model.meshes.size()) + "; correct the JSON.");
-    }
     return static_cast<std::size_t>(mesh);
 }
 

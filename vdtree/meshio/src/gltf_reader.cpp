@@ -100,10 +100,9 @@ private:
         const json* view_index = member(image, "bufferView");
         if (view_index == nullptr) fail(where + " has no bufferView; correct the JSON.");
         const auto index = static_cast<std::size_t>(to_integer_in_range(*view_index, max_int, where + ": bufferView"));
-        if (index >= views_.size() || !views_[index].is_object()) {
+        if (index >= views_.size() || !views_[index].is_object())
             fail(where + ": its bufferView is " + std::to_string(index) + ", but there are " +
                  std::to_string(views_.size()) + " bufferViews; correct the JSON.");
-        }
         const auto number = [&](const char* key, std::int64_t missing) {
             const json* value = member(views_[index], key);
             if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
@@ -113,10 +112,8 @@ private:
         };
         const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
                           length = number("byteLength", -1);
-        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() ||
-            length > buffers_[buffer].size() - offset) {
+        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() || length > buffers_[buffer].size() - offset)
             fail(where + " ends behind its buffer; the data are cut short or the JSON is wrong.");
-        }
         if (length == 0) fail(where + " is empty; correct the JSON.");
         file.bytes = std::make_shared<const std::string>(buffers_[buffer].substr(offset, length));
         return file;
@@ -343,10 +340,9 @@ public:
 
 private:
     void tell_of_parts() {
-        if (skipped_primitives_ > 0) {
+        if (skipped_primitives_ > 0)
             result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
                                        " left out for having no triangles or no positions.");
-        }
         if (source_.options.images) warn_of_missing_uvs(triangles_without_uvs_, result_);
     }
 
@@ -432,16 +428,14 @@ private:
         const std::size_t first = mesh.positions.size();
         const std::size_t count = accessors_.count_of(from.at("POSITION"));
         for (const auto& [attribute, accessor] : from) {
-            if (accessors_.count_of(accessor) != count) {
+            if (accessors_.count_of(accessor) != count)
                 fail(numbered("accessor", static_cast<std::size_t>(accessor)) + " has " +
                      std::to_string(accessors_.count_of(accessor)) + " elements for " + std::to_string(count) +
                      " positions; correct the JSON.");
-            }
         }
         spend(count, bytes_per_vertex);
-        if (count >= std::numeric_limits<Index>::max() - first) {
+        if (count >= std::numeric_limits<Index>::max() - first)
             fail("it has more vertices than 32-bit indices can number; split the scene.");
-        }
         for (const auto& [attribute, accessor] : from) add_attribute(attribute, accessor, first, uvs, placement);
         if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size(), missing_normal);
         if (!mesh.uvs.empty()) mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0f));
@@ -508,10 +502,9 @@ private:
             return true;
         };
         const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
-        if (is_list && index_count % 3 != 0) {
+        if (is_list && index_count % 3 != 0)
             fail("mesh " + in_quotes(mesh.name) + ": " + std::to_string(index_count) +
                  " indices make no whole number of triangles; correct it.");
-        }
         const std::uint64_t first_triangle = result_.mesh.triangles.size();
         for (std::size_t i = 2; i < index_count; i += is_list ? 3 : 1) {
             ++result_.source_faces;
@@ -539,10 +532,9 @@ private:
 
     std::string material_name(int material) const {
         const auto index = static_cast<std::size_t>(material);
-        if (index >= model_.materials.size()) {
+        if (index >= model_.materials.size())
             fail("material " + std::to_string(material) + " is used, but there are " +
                  std::to_string(model_.materials.size()) + "; correct the JSON.");
-        }
         const std::string& name = model_.materials[index].name;
         if (!name.empty() && first_of_name_.at(name) != index) return name + " (" + numbered("material", index) + ")";
         return name.empty() ? numbered("material", index) : name;

@@ -96,9 +96,7 @@ void repair_attributes(ReadResult& result) {
         uv = glm::vec2(0.0f);
         ++uvs;
     }
-    if (colours > 0) {
-        result.warnings.push_back(counted_were(colours, "vertex colour") + " outside 0..1 and clamped.");
-    }
+    if (colours > 0) result.warnings.push_back(counted_were(colours, "vertex colour") + " outside 0..1 and clamped.");
     if (uvs > 0) result.warnings.push_back(counted_were(uvs, "texture coordinate") + " not finite and set to 0.");
 }
 
@@ -173,19 +171,15 @@ Error too_large(const std::string& name) {
 Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result) {
     if (const Result<void> settled = settle_bad_parts(source, result); !settled) return settled.error();
     // Before the checks: they would accept a mesh without triangles.
-    if (result.mesh.triangles.empty()) {
-        return malformed(source, "it holds no triangles; give a file with faces.");
-    }
-    if (const Result<void> valid = validate(result.mesh.view()); !valid) {
+    if (result.mesh.triangles.empty()) return malformed(source, "it holds no triangles; give a file with faces.");
+    if (const Result<void> valid = validate(result.mesh.view()); !valid)
         return malformed(source, valid.error().message);
-    }
     repair_attributes(result);
     if (result.document) finish_document(*result.document, result.mesh);
     result.dropped_triangles = drop_degenerate_triangles(result.mesh);
-    if (result.mesh.triangles.empty()) {
+    if (result.mesh.triangles.empty())
         return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +
                                      " triangles use a vertex twice, so none is left; give a file with proper faces.");
-    }
     check_normals(result);
     hint_at_unwelded(source, result);
     return result;
@@ -223,16 +217,14 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name,
     if (bytes.starts_with(utf8_mark)) bytes.remove_prefix(utf8_mark.size());
     const MeshSource source{bytes, shown_name, folder, options};
     if (bytes.empty()) return malformed(source, "it is empty; give a file with a mesh in it.");
-    if (const char* compression = compression_of(bytes)) {
+    if (const char* compression = compression_of(bytes))
         return malformed(source, std::string("it is compressed with ") + compression + "; decompress it first.");
-    }
     const Format* const format = find_format(bytes, name);
     if (bytes.starts_with("# vtk DataFile"))
         return malformed(source,
                          "it is a legacy file of VTK, which is not read; save it as .vtp (in ParaView: Save Data).");
-    if (format == nullptr) {
+    if (format == nullptr)
         return malformed(source, "it is neither PLY, OBJ, OFF, STL, glTF nor VTK's VTP; convert it to one of them.");
-    }
     try {
         Result<ReadResult> result = format->read(source);
         if (!result) return result;

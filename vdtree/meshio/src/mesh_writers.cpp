@@ -138,10 +138,9 @@ void write_ply_header(FileOutput& out, const MeshView& mesh, const PlyColumns& c
     out.text("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.positions.size()) + "\n");
     for (const char* name : {"x", "y", "z"}) out.text("property " + real + " " + name + "\n");
     if (!mesh.normals.empty()) out.text("property float nx\nproperty float ny\nproperty float nz\n");
-    if (!mesh.colours.empty()) {
+    if (!mesh.colours.empty())
         for (const char* name : {"red", "green", "blue", "alpha"})
             out.text(std::string("property uchar ") + name + "\n");
-    }
     if (!mesh.uvs.empty()) out.text("property float s\nproperty float t\n");
     columns.write_header(out);
     out.text("element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar " +
@@ -157,17 +156,13 @@ Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumn
     const auto goes_on = [&](double items_done) { return !progress || progress(items_done / item_count, "writing"); };
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         if (i % items_a_report == 0 && !goes_on(static_cast<double>(i))) return cancelled();
-        for (int axis = 0; axis < 3; ++axis) {
+        for (int axis = 0; axis < 3; ++axis)
             if (has_floats) out.binary(static_cast<float>(mesh.positions[i][axis]));
             else out.binary(mesh.positions[i][axis]);
-        }
-        if (!mesh.normals.empty()) {
+        if (!mesh.normals.empty())
             for (int axis = 0; axis < 3; ++axis) out.binary(mesh.normals[i][axis]);
-        }
         if (!mesh.colours.empty()) {
-            for (int channel = 0; channel < 3; ++channel) {
-                out.binary(to_byte(linear_to_srgb(mesh.colours[i][channel])));
-            }
+            for (int channel = 0; channel < 3; ++channel) out.binary(to_byte(linear_to_srgb(mesh.colours[i][channel])));
             out.binary(to_byte(mesh.colours[i].a));
         }
         if (!mesh.uvs.empty()) {
@@ -332,9 +327,8 @@ GltfFrame gltf_frame(const MeshView& mesh) {
     for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] / 2.0 - low[axis] / 2.0);
     // Well inside the range of float, and a power of two so that it costs no digits.
     constexpr double largest_plain = 1e30, smallest_plain = 1e-30;
-    if (extent > largest_plain || (extent > 0.0 && extent < smallest_plain)) {
+    if (extent > largest_plain || (extent > 0.0 && extent < smallest_plain))
         frame.scale = std::ldexp(1.0, std::ilogb(extent));
-    }
     return frame;
 }
 

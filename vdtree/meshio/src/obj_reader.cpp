@@ -176,10 +176,9 @@ public:
     explicit ObjReader(const MeshSource& source) : source_(source) {}
 
     Result<ReadResult> read() {
-        if (const std::size_t nul = source_.bytes.find('\0'); nul != std::string_view::npos) {
+        if (const std::size_t nul = source_.bytes.find('\0'); nul != std::string_view::npos)
             return malformed_line(source_, line_number(source_.bytes, nul),
                                   "a NUL byte, which no OBJ text contains; the file is damaged or no OBJ file.");
-        }
         if (Result<void> done = read_vertices(); !done) return done.error();
         if (Result<void> done = read_faces(); !done) return done.error();
         add_attributes();
@@ -202,10 +201,8 @@ private:
             else if (keyword == "vt") done = add_uv(rest, statements.line());
             else if (keyword == "vn") done = add_normal(rest, statements.line());
             if (!done) return done;
-            if (++statements_ % rows_per_progress == 0 &&
-                !source_.keep_going(statements.position() / 2, "reading OBJ")) {
+            if (++statements_ % rows_per_progress == 0 && !source_.keep_going(statements.position() / 2, "reading OBJ"))
                 return cancelled(source_);
-            }
         }
         if (std::max({positions().size(), uvs_.size(), normals_.size()}) >= none) return too_many_vertices();
         return {};
@@ -215,10 +212,9 @@ private:
     Result<void> add_position(std::string_view rest, std::uint64_t line) {
         std::array<double, 7> n{};
         const int count = parse_numbers(rest, n.data(), 7);
-        if (count != 3 && count != 4 && count != 6 && count != 7) {
+        if (count != 3 && count != 4 && count != 6 && count != 7)
             return bad(line, "vertex " + std::to_string(positions().size() + 1) +
                                  " needs 3 numbers, or 6 with a colour; correct " + in_quotes(trimmed(rest)) + ".");
-        }
         positions().emplace_back(n[0], n[1], n[2]);
         check_position(result_.bad, positions().back(), [&] {
             return "line " + std::to_string(line) + ": vertex " + std::to_string(positions().size());
@@ -233,18 +229,16 @@ private:
 
     Result<void> add_uv(std::string_view rest, std::uint64_t line) {
         std::array<double, 3> n{};
-        if (parse_numbers(rest, n.data(), 3) < 1) {
+        if (parse_numbers(rest, n.data(), 3) < 1)
             return bad(line, "a texture coordinate needs 1 to 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
-        }
         uvs_.emplace_back(n[0], n[1]);
         return {};
     }
 
     Result<void> add_normal(std::string_view rest, std::uint64_t line) {
         std::array<double, 3> n{};
-        if (parse_numbers(rest, n.data(), 3) != 3) {
+        if (parse_numbers(rest, n.data(), 3) != 3)
             return bad(line, "a normal needs 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
-        }
         normals_.emplace_back(n[0], n[1], n[2]);
         return {};
     }
@@ -275,9 +269,8 @@ private:
                 note_unknown(keyword, statements.line());
             }
             if (++statements_ % rows_per_progress == 0 &&
-                !source_.keep_going(source_.bytes.size() / 2 + statements.position() / 2, "reading OBJ")) {
+                !source_.keep_going(source_.bytes.size() / 2 + statements.position() / 2, "reading OBJ"))
                 return cancelled(source_);
-            }
         }
         end_range(group_);
         end_range(material_);
@@ -486,13 +479,9 @@ private:
     }
 
     void note_unknown(std::string_view keyword, std::uint64_t line) {
-        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) !=
-            std::end(ignored_keywords)) {
+        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) != std::end(ignored_keywords))
             return;
-        }
-        if (unknown_++ == 0) {
-            first_unknown_ = in_quotes(keyword) + " in line " + std::to_string(line);
-        }
+        if (unknown_++ == 0) first_unknown_ = in_quotes(keyword) + " in line " + std::to_string(line);
     }
 
     // ---- vertices with attributes ----
@@ -500,13 +489,10 @@ private:
     void add_attributes() {
         Mesh& mesh = result_.mesh;
         mesh.triangles.resize(triangle_corners_.size() / 3);
-        if (!has_uvs_ && !has_normals_) {
-            for (std::size_t i = 0; i < triangle_corners_.size(); ++i) {
+        if (!has_uvs_ && !has_normals_)
+            for (std::size_t i = 0; i < triangle_corners_.size(); ++i)
                 mesh.triangles[i / 3][i % 3] = triangle_corners_[i].position;
-            }
-        } else {
-            split_vertices();
-        }
+        else split_vertices();
         if (!colours_.empty()) colours_.resize(mesh.positions.size(), missing_colour);
         mesh.colours = std::move(colours_);
     }
@@ -514,10 +500,9 @@ private:
     void split_vertices() {
         Mesh& mesh = result_.mesh;
         VertexTable table(mesh.positions.size(), uvs_, normals_);
-        for (std::size_t i = 0; i < triangle_corners_.size(); ++i) {
+        for (std::size_t i = 0; i < triangle_corners_.size(); ++i)
             has_index_overflow_ =
                 !table.find(triangle_corners_[i], mesh.triangles[i / 3][i % 3]) || has_index_overflow_;
-        }
         const std::size_t vertices = mesh.positions.size() + table.added().size();
         if (has_uvs_) mesh.uvs.reserve(vertices);
         if (has_normals_) mesh.normals.reserve(vertices);
@@ -542,16 +527,14 @@ private:
 
     void add_warnings() {
         if (small_faces_ > 0) warn(counted_were(small_faces_, "face") + " left out for having fewer than 3 corners.");
-        if (unknown_ > 0) {
+        if (unknown_ > 0)
             warn(counted_were(unknown_, "line") + " skipped for an unknown keyword, the first " + first_unknown_ + ".");
-        }
         if (lost_attributes_ > 0)
             warn(std::to_string(lost_attributes_) + (lost_attributes_ == 1 ? " corner goes" : " corners go") +
                  " without a normal or texture coordinate that is not there, the first " + first_lost_attribute_ + ".");
         if (has_library_) warn_of_unknown_materials();
-        if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
+        if (const auto fanned = polygons_.fanned_concave(); fanned > 0)
             warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
-        }
     }
 
     void warn_of_unknown_materials() {

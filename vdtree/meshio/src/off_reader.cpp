@@ -72,15 +72,13 @@ private:
 
     Result<void> check_counts() {
         const std::uint64_t left = words_.remaining() + 1; // the last line may lack its newline
-        if (vertex_count_ > left / min_vertex_bytes || face_count_ > left / min_face_bytes) {
+        if (vertex_count_ > left / min_vertex_bytes || face_count_ > left / min_face_bytes)
             return malformed(source_, "it claims " + std::to_string(vertex_count_) + " vertices and " +
                                           std::to_string(face_count_) + " faces, but only " +
                                           std::to_string(words_.remaining()) +
                                           " bytes are left for them; the file is cut short or its counts are wrong.");
-        }
-        if (vertex_count_ > std::numeric_limits<Index>::max()) {
+        if (vertex_count_ > std::numeric_limits<Index>::max())
             return malformed(source_, "it has more vertices than 32-bit indices can number; split the mesh.");
-        }
         return {};
     }
 
@@ -90,9 +88,8 @@ private:
         for (std::uint64_t i = 0; i < vertex_count_; ++i) {
             if (!pulse(i)) return cancelled(source_);
             glm::dvec3 p(0.0);
-            for (int axis = 0; axis < 3; ++axis) {
+            for (int axis = 0; axis < 3; ++axis)
                 if (Result<void> done = to_real(words_.next(), i, p[axis]); !done) return done;
-            }
             mesh.positions.push_back(p);
             check_position(result_.bad, p, [&] { return line() + "vertex " + std::to_string(i); });
             if (keyword_.has_normals || keyword_.has_colours || keyword_.has_uvs) {
@@ -116,18 +113,16 @@ private:
         const std::size_t colour_size = count - std::min(count, normal_size + uv_size);
         const bool has_right_count = count >= normal_size + uv_size &&
                                      (keyword_.has_colours ? colour_size == 3 || colour_size == 4 : colour_size == 0);
-        if (!has_right_count) {
+        if (!has_right_count)
             return malformed_line(source_, words_.line(),
                                   "vertex " + std::to_string(vertex) + " has " + std::to_string(count) +
                                       " numbers behind its coordinates, which is not what the "
                                       "first line of the file announces; correct one of them.");
-        }
         Mesh& mesh = result_.mesh;
         if (keyword_.has_normals) mesh.normals.emplace_back(extra[0], extra[1], extra[2]);
-        if (keyword_.has_colours) {
+        if (keyword_.has_colours)
             mesh.colours.emplace_back(extra[normal_size], extra[normal_size + 1], extra[normal_size + 2],
                                       colour_size == 4 ? extra[normal_size + 3] : -1.0);
-        }
         if (keyword_.has_uvs) mesh.uvs.emplace_back(extra[count - 2], extra[count - 1]);
         return {};
     }
@@ -150,11 +145,10 @@ private:
             if (!pulse(i)) return cancelled(source_);
             std::int64_t size = 0;
             if (Result<void> done = to_index(words_.next(), i, size); !done) return done;
-            if (size < 0 || static_cast<std::uint64_t>(size) > words_.remaining() / 2) {
+            if (size < 0 || static_cast<std::uint64_t>(size) > words_.remaining() / 2)
                 return malformed_line(source_, words_.line(),
                                       "face " + std::to_string(i) + " claims " + std::to_string(size) +
                                           " corners, more than the file can hold; correct it.");
-            }
             corners_.resize(static_cast<std::size_t>(size));
             for (std::int64_t& corner : corners_)
                 if (Result<void> done = to_index(words_.next(), i, corner); !done) return done;
@@ -167,11 +161,10 @@ private:
 
     Result<void> to_count(std::string_view word, const char* what, std::uint64_t& count) {
         std::int64_t value = 0;
-        if (!to_integer(word, value) || value < 0) {
+        if (!to_integer(word, value) || value < 0)
             return malformed_line(source_, words_.line(),
                                   std::string("the number of ") + what + " should stand here, not " + in_quotes(word) +
                                       ".");
-        }
         count = static_cast<std::uint64_t>(value);
         return {};
     }

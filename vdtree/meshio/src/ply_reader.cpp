@@ -57,9 +57,8 @@ std::optional<ValueType> to_type(std::string_view name) {
                                                 {"uint", "uint32", ValueType::uint32},
                                                 {"float", "float32", ValueType::float32},
                                                 {"double", "float64", ValueType::float64}}};
-    for (const Name& candidate : names) {
+    for (const Name& candidate : names)
         if (name == candidate.classic || name == candidate.sized) return candidate.type;
-    }
     return std::nullopt;
 }
 
@@ -72,18 +71,15 @@ Result<Property> parse_property(const MeshSource& source, std::uint64_t line_num
         property.is_list = true;
         word = take_word(line);
         const auto count_type = to_type(word);
-        if (!count_type || !is_integer(*count_type)) {
+        if (!count_type || !is_integer(*count_type))
             return malformed_line(source, line_number,
                                   "a list is counted by an integer type, not by " + in_quotes(word) +
                                       "; correct the header.");
-        }
         property.count_type = *count_type;
         word = take_word(line);
     }
     const auto type = to_type(word);
-    if (!type) {
-        return malformed_line(source, line_number, in_quotes(word) + " is no type of PLY; correct the header.");
-    }
+    if (!type) return malformed_line(source, line_number, in_quotes(word) + " is no type of PLY; correct the header.");
     property.type = *type;
     property.name = take_word(line);
     if (property.name.empty()) return malformed_line(source, line_number, "the property has no name; give it one.");
@@ -96,20 +92,18 @@ Result<Element> parse_element(const MeshSource& source, std::uint64_t line_numbe
     const std::string_view count = take_word(line);
     const char* last = count.data() + count.size();
     const auto [end, error] = std::from_chars(count.data(), last, element.count);
-    if (element.name.empty() || error != std::errc() || end != last) {
+    if (element.name.empty() || error != std::errc() || end != last)
         return malformed_line(source, line_number,
                               "an element needs a name and a count of 0 or more, not " + in_quotes(count) + ".");
-    }
     return element;
 }
 
 Result<Encoding> parse_format(const MeshSource& source, std::uint64_t line_number, std::string_view line) {
     const std::string_view name = take_word(line);
     const std::string_view version = take_word(line);
-    if (version != "1.0") {
+    if (version != "1.0")
         return malformed_line(source, line_number,
                               "version " + in_quotes(version) + " of PLY is unknown; expected 1.0.");
-    }
     if (name == "ascii") return Encoding::ascii;
     if (name == "binary_little_endian") return Encoding::little_endian;
     if (name == "binary_big_endian") return Encoding::big_endian;
@@ -153,9 +147,8 @@ Result<Header> parse_header(const MeshSource& source) {
             if (!element) return element.error();
             header.elements.push_back(std::move(*element));
         } else if (keyword == "property") {
-            if (header.elements.empty()) {
+            if (header.elements.empty())
                 return malformed_line(source, lines.line(), "a property before the first element; correct the header.");
-            }
             Result<Property> property = parse_property(source, lines.line(), line);
             if (!property) return property.error();
             header.elements.back().properties.push_back(std::move(*property));
@@ -201,9 +194,8 @@ public:
         return accept(word, to_integer(word, value));
     }
     bool skip(ValueType, std::uint64_t count) {
-        for (; count > 0; --count) {
+        for (; count > 0; --count)
             if (words_.next().empty()) return accept({}, false);
-        }
         return true;
     }
     // One more than there are, as the last value needs no space behind it.
@@ -260,9 +252,8 @@ private:
         std::memcpy(raw.data(), bytes_.data() + position_, sizeof(Stored));
         if constexpr (order != std::endian::native) std::reverse(raw.begin(), raw.end());
         // Only integers are read as integers; the branch is for the compiler.
-        if constexpr (std::is_floating_point_v<Value> || std::is_integral_v<Stored>) {
+        if constexpr (std::is_floating_point_v<Value> || std::is_integral_v<Stored>)
             value = static_cast<Value>(std::bit_cast<Stored>(raw));
-        }
         position_ += sizeof(Stored);
         return true;
     }
@@ -385,10 +376,9 @@ private:
 // ---- the file ----
 
 const Property* index_list(const Element& element) {
-    for (const Property& property : element.properties) {
+    for (const Property& property : element.properties)
         if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index"))
             return &property;
-    }
     return nullptr;
 }
 
@@ -419,18 +409,16 @@ private:
                 vertices_ = &element;
             }
             if (!is_face_element(element)) continue;
-            if (element.count > 0 && index_list(element) == nullptr) {
+            if (element.count > 0 && index_list(element) == nullptr)
                 return malformed(source_, "its element " + in_quotes(element.name) +
                                               " has no list named vertex_indices; correct the header.");
-            }
             has_faces = has_faces || element.count > 0;
         }
         if (vertices_ == nullptr) return malformed(source_, "it has no element named vertex; it is no mesh.");
         if (!has_faces) return malformed(source_, "it has no faces; give a file with a surface, not only with points.");
-        if (vertices_->count > std::numeric_limits<Index>::max()) {
+        if (vertices_->count > std::numeric_limits<Index>::max())
             return malformed(source_, "it claims " + std::to_string(vertices_->count) +
                                           " vertices, and indices have 32 bits; split the mesh.");
-        }
         return {};
     }
 
@@ -453,26 +441,21 @@ private:
             }
             if (!done) return done;
         }
-        if (body.has_rest()) {
-            warn("data behind the last element were ignored.");
-        }
-        for (auto& [element, start] : waiting) {
+        if (body.has_rest()) warn("data behind the last element were ignored.");
+        for (auto& [element, start] : waiting)
             if (Result<void> done = read_faces(start, *element); !done) return done;
-        }
         return {};
     }
 
     // Before anything is allocated for the element or looped over.
     Result<void> check_count(const Body& body, const Element& element) {
         if (element.count == 0) return {};
-        if (element.properties.empty()) {
+        if (element.properties.empty())
             return malformed(source_,
                              "its element " + in_quotes(element.name) + " has no properties; correct the header.");
-        }
         std::size_t row = 0;
-        for (const Property& property : element.properties) {
+        for (const Property& property : element.properties)
             row += Body::min_size(property.is_list ? property.count_type : property.type);
-        }
         if (element.count <= body.remaining() / row) return {};
         return malformed(source_, "it claims " + std::to_string(element.count) + " rows of element " +
                                       in_quotes(element.name) + ", but only " + std::to_string(body.remaining()) +
@@ -488,9 +471,8 @@ private:
     Result<void> skip_element(Body& body, const Element& element) {
         for (std::uint64_t row = 0; row < element.count; ++row) {
             if (!pulse(body, row)) return cancelled(source_);
-            for (const Property& property : element.properties) {
+            for (const Property& property : element.properties)
                 if (!skip_property(body, property)) return broken(body, element, row);
-            }
         }
         return {};
     }
@@ -577,12 +559,11 @@ private:
     Result<void> read_index_list(Body& body, const Element& element, const Property& property, std::uint64_t row) {
         std::int64_t count = 0;
         if (!body.integer(property.count_type, count)) return broken(body, element, row);
-        if (count < 0 || static_cast<std::uint64_t>(count) > body.remaining() / Body::min_size(property.type)) {
+        if (count < 0 || static_cast<std::uint64_t>(count) > body.remaining() / Body::min_size(property.type))
             return malformed(source_, body.where() + ": face " + std::to_string(row) + " claims " +
                                           std::to_string(count) + " corners, but only " +
                                           std::to_string(body.remaining()) +
                                           " bytes are left; the file is damaged or cut short.");
-        }
         corners_.resize(static_cast<std::size_t>(count));
         for (std::int64_t& corner : corners_)
             if (!body.integer(property.type, corner)) return broken(body, element, row);

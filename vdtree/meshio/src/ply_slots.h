@@ -38,9 +38,8 @@ inline Slot slot_of(std::string_view property) {
                               {"texture_v", v},
                               {"texture_s", u},
                               {"texture_t", v}};
-    for (const Name& candidate : names) {
+    for (const Name& candidate : names)
         if (property == candidate.name) return candidate.slot;
-    }
     return ignored;
 }
 

@@ -35,9 +35,8 @@ std::span<const Triangle> PolygonTriangulator::cut(std::span<const glm::dvec3> p
 // Drops the axis along which the polygon's normal is longest. False where the polygon has no plane.
 bool PolygonTriangulator::project(std::span<const glm::dvec3> positions) {
     glm::dvec3 extent(0.0);
-    for (const glm::dvec3& p : positions) {
+    for (const glm::dvec3& p : positions)
         for (int i = 0; i < 3; ++i) extent[i] = std::max(extent[i], std::abs(p[i] - positions[0][i]));
-    }
     // To the unit box, so that neither 1e-19 nor 1e30 leaves the range of double when multiplied.
     const double size = std::max({extent.x, extent.y, extent.z});
     if (!(size > 0.0) || !std::isfinite(size) || !std::isfinite(1.0 / size)) return false;
@@ -52,9 +51,8 @@ bool PolygonTriangulator::project(std::span<const glm::dvec3> positions) {
         previous = p;
     }
     int axis = 0;
-    for (int i = 1; i < 3; ++i) {
+    for (int i = 1; i < 3; ++i)
         if (std::abs(normal[i]) > std::abs(normal[axis])) axis = i;
-    }
     if (!(std::abs(normal[axis]) > 0.0)) return false;
 
     // Cyclic order of the other two axes keeps the orientation; a normal that points down the axis needs the swap.

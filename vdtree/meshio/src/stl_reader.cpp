@@ -74,10 +74,9 @@ void settle_normals(ReadResult& result) {
         normal = missing_normal;
         ++not_finite;
     }
-    if (not_finite > 0) {
+    if (not_finite > 0)
         result.warnings.push_back(counted_were(not_finite / 3, "facet normal") +
                                   " not finite and computed from the corners.");
-    }
     if (!any) mesh.normals = {};
 }
 
@@ -123,15 +122,13 @@ glm::vec3 vector_at(const char* bytes) {
 
 Result<ReadResult> read_binary(const MeshSource& source) {
     const std::string_view bytes = source.bytes;
-    if (bytes.size() < preamble_bytes) {
+    if (bytes.size() < preamble_bytes)
         return malformed(source, "it is too short for an STL file; it may be cut short.");
-    }
     const std::uint64_t count = claimed_facets(bytes);
     const std::uint64_t room = (bytes.size() - preamble_bytes) / facet_bytes;
-    if (count > room) {
+    if (count > room)
         return malformed(source, "it claims " + std::to_string(count) + " facets, but its bytes hold only " +
                                      std::to_string(room) + "; the file is cut short or its count is wrong.");
-    }
     if (count > max_facets) return too_many_facets(source);
 
     ReadResult result;
@@ -140,16 +137,14 @@ Result<ReadResult> read_binary(const MeshSource& source) {
     result.mesh.triangles.reserve(count);
     for (std::uint64_t i = 0; i < count; ++i) {
         const char* facet = bytes.data() + preamble_bytes + i * facet_bytes;
-        if (i % rows_per_progress == 0 && !source.keep_going(preamble_bytes + i * facet_bytes, "reading STL")) {
+        if (i % rows_per_progress == 0 && !source.keep_going(preamble_bytes + i * facet_bytes, "reading STL"))
             return cancelled(source);
-        }
         add_facet(
             result, vector_at(facet),
             {glm::dvec3(vector_at(facet + 12)), glm::dvec3(vector_at(facet + 24)), glm::dvec3(vector_at(facet + 36))});
     }
-    if (bytes.size() > preamble_bytes + count * facet_bytes) {
+    if (bytes.size() > preamble_bytes + count * facet_bytes)
         result.warnings.push_back("data behind the last facet were ignored.");
-    }
     settle(source, result);
     return result;
 }
@@ -186,9 +181,8 @@ private:
     Result<void> read_facet() {
         const std::uint64_t facet = result_.source_faces;
         if (facet >= max_facets) return too_many_facets(source_);
-        if (facet % rows_per_progress == 0 && !source_.keep_going(words_.position(), "reading STL")) {
+        if (facet % rows_per_progress == 0 && !source_.keep_going(words_.position(), "reading STL"))
             return cancelled(source_);
-        }
         glm::dvec3 normal(0.0);
         std::array<glm::dvec3, 3> corners{};
         if (Result<void> done = expect("normal"); !done) return done;

@@ -88,9 +88,8 @@ inline bool to_integer(std::string_view word, std::int64_t& value) {
 // Lines before `position`, plus one; a lone CR counts as a newline. Linear: for messages only.
 inline std::uint64_t line_number(std::string_view text, std::size_t position) {
     std::uint64_t line = 1;
-    for (std::size_t i = 0; i < position && i < text.size(); ++i) {
+    for (std::size_t i = 0; i < position && i < text.size(); ++i)
         if (text[i] == '\n' || (text[i] == '\r' && !(i + 1 < text.size() && text[i + 1] == '\n'))) ++line;
-    }
     return line;
 }
 
@@ -171,11 +170,10 @@ public:
 
 private:
     void skip_space() {
-        while (position_ < text_.size()) {
+        while (position_ < text_.size())
             if (has_comments_ && text_[position_] == '#') skip_line();
             else if (is_space(text_[position_])) ++position_;
             else break;
-        }
     }
     std::string_view word() {
         const std::size_t first = position_;

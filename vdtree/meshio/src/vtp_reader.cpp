@@ -242,11 +242,10 @@ private:
         piece.scalars = node.attribute("Scalars").value();
         piece.normals = node.attribute("Normals").value();
         piece.uvs = node.attribute("TCoords").value();
-        for (const pugi::xml_node array : node.children()) {
+        for (const pugi::xml_node array : node.children())
             if (std::string_view(array.name()) == "DataArray" && vtp_type(array.attribute("type").value()))
                 piece.data.push_back(read_array(array, points));
             else piece.other_arrays.emplace_back(array.attribute("Name").value());
-        }
     }
 
     const MeshSource& source_;

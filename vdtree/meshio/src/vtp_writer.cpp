@@ -52,13 +52,12 @@ VtkPointData point_data_of(const MeshView& mesh, std::span<const VertexArray> ar
 
 std::string xml_text(std::string_view text) {
     std::string escaped;
-    for (const char c : text) {
+    for (const char c : text)
         if (c == '&') escaped += "&amp;";
         else if (c == '<') escaped += "&lt;";
         else if (c == '>') escaped += "&gt;";
         else if (c == '"') escaped += "&quot;";
         else escaped += static_cast<unsigned char>(c) < 0x20 ? '_' : c; // XML has no place for these
-    }
     return escaped;
 }
 
