@@ -31,15 +31,17 @@ bool is_gltf(const std::string& file) { return has_ending(file, ".glb") || has_e
 // The background goes whole.
 Result<std::vector<Message>> write_scene(const std::string& file, const session::Scene& scene,
                                          const std::vector<vdtree::Cut>& cuts) {
-    std::vector<meshio::SceneCut> all;
+    std::vector<meshio::LevelCuts> all;
     for (std::size_t i = 0; i < cuts.size(); ++i)
-        all.push_back({scene.objects[i].node, scene.objects[i].mesh, &cuts[i]});
+        all.push_back({scene.objects[i].node, scene.objects[i].mesh, {&cuts[i]}, {0}});
     std::deque<vdtree::Cut> whole;
     for (const session::Object& part : scene.backdrop) {
         whole.emplace_back(part.tree).unfold_all();
-        all.push_back({part.node, part.mesh, &whole.back()});
+        all.push_back({part.node, part.mesh, {&whole.back()}, {0}});
     }
-    return meshio::write_scene(file, *scene.source, all);
+    auto written = meshio::write_scene(file, *scene.source, all);
+    if (!written) return written.error();
+    return std::move(written->notes);
 }
 
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();

@@ -11,7 +11,6 @@
 #include "value_types.h"
 #include "vtp_data.h"
 #include "vtp_files.h"
-#include "vtp_polygons.h"
 
 namespace unseen::vdtree::vtp_test {
 namespace {
@@ -298,17 +297,17 @@ TEST(Vtp, WhatIsCompressedMayNotGrowWithoutLimit) {
     try {
         decoder.decode(array, false, million);
         FAIL() << "more than there may be";
-    } catch (const meshio::VtkFault& fault) {
+    } catch (const meshio::Fault& fault) {
         EXPECT_THAT(fault.what, HasSubstr("far more than the file holds"));
     }
     // What zlib cannot make of so few bytes is not even tried.
     const std::string lie = mesh_files::little(1u) + mesh_files::little(4'000'000'000u) + mesh_files::little(0u) +
                             mesh_files::little(size_of(zeros)) + zeros;
     meshio::VtpDecoder generous(zlib, Budget(0, 0, std::uint64_t{1} << 40));
-    EXPECT_THROW(generous.decode(lie, false, 4'000'000'000u), meshio::VtkFault);
+    EXPECT_THROW(generous.decode(lie, false, 4'000'000'000u), meshio::Fault);
     // Nor blocks that are not there.
     const std::string blocks = mesh_files::little(4'000'000'000u) + mesh_files::little(1u) + mesh_files::little(0u);
-    EXPECT_THROW(generous.decode(blocks, false, 4'000'000'000u), meshio::VtkFault);
+    EXPECT_THROW(generous.decode(blocks, false, 4'000'000'000u), meshio::Fault);
 }
 
 TEST(Vtp, ReadingStopsWhenTheCallerSaysSo) {

@@ -42,20 +42,6 @@ private:
     std::vector<Element> parent_;
 };
 
-// By bits, so that NaN is equal to itself.
-template <class Vector>
-bool has_same_bits(std::span<const Vector> values, std::size_t a, std::size_t b) {
-    if (values.empty()) return true;
-    for (int i = 0; i < Vector::length(); ++i)
-        if (std::bit_cast<std::uint32_t>(values[a][i]) != std::bit_cast<std::uint32_t>(values[b][i])) return false;
-    return true;
-}
-template <class Vector>
-void add_bits(SeededHash& hash, std::span<const Vector> values, std::size_t at) {
-    if (values.empty()) return;
-    for (int i = 0; i < Vector::length(); ++i) hash.add(std::bit_cast<std::uint32_t>(values[at][i]));
-}
-
 std::vector<Index> find_first_equal_vertex(const MeshView& mesh) {
     return find_first_same(
         mesh.positions.size(),

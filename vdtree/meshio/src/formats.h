@@ -15,7 +15,7 @@ struct Format {
     std::string_view name; // for people
     std::array<std::string_view, 2> endings;
     bool (*has_signature)(std::string_view bytes); // null: the format has none
-    Result<ReadResult> (*read)(const MeshSource& source);
+    ReadResult (*read)(const MeshSource& source);  // throws Fault
     Result<void> (*write)(const MeshToWrite& mesh);
     bool holds_values;    // of vertices
     bool holds_materials; // and nodes: write_cut() writes such files from source documents

@@ -7,7 +7,6 @@
 #include <limits>
 #include <utility>
 
-#include "base64.h"
 #include "text_scanner.h"
 
 namespace unseen::meshio::gltf {
@@ -54,9 +53,9 @@ Buffers::Buffers(const MeshSource& source, const json& document, std::optional<s
     const json& array = array_of(document, "buffers");
     const auto size_of = [&](std::size_t i) {
         const std::string where = numbered("buffer", i);
-        if (!array[i].is_object()) fail(where + " is no object; correct the JSON.");
+        if (!array[i].is_object()) fail(where, " is no object; correct the JSON.");
         const json* length = member(array[i], "byteLength");
-        if (length == nullptr) fail(where + " has no byteLength; correct the JSON.");
+        if (length == nullptr) fail(where, " has no byteLength; correct the JSON.");
         return static_cast<std::size_t>(to_integer_in_range(*length, max_size, where + ": byteLength"));
     };
     const auto uri_of = [&](std::size_t i) {
@@ -82,12 +81,11 @@ Buffers::Buffers(const MeshSource& source, const json& document, std::optional<s
             continue;
         } else if (const json* extensions = member(array[i], "extensions");
                    extensions && !extensions->empty() && extensions->is_object())
-            fail(where + " has no data but by the extension " + in_quotes(extensions->begin().key()) +
+            fail(where, " has no data but by the extension ", in_quotes(extensions->begin().key()),
                  ", which is not read; export it without.");
-        else fail(where + " names no file and has no data of its own; correct the JSON.");
+        else fail(where, " names no file and has no data of its own; correct the JSON.");
         if (size > bytes.size())
-            fail(where + " claims " + std::to_string(size) + " bytes, but there are " + std::to_string(bytes.size()) +
-                 "; the data are cut short.");
+            fail(where, " claims ", size, " bytes, but there are ", bytes.size(), "; the data are cut short.");
         buffers_.push_back(bytes.substr(0, size));
     }
 }
@@ -100,15 +98,15 @@ std::size_t Buffers::add(std::string bytes) {
 std::string Buffers::decode_data(std::string_view uri, const std::string& where) {
     const std::size_t comma = uri.find(',');
     if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64"))
-        fail(where + " has a data URI that is not in base64; correct it.");
+        fail(where, " has a data URI that is not in base64; correct it.");
     std::optional<std::string> bytes = decode_base64(uri.substr(comma + 1));
-    if (!bytes) fail(where + " has a data URI with characters that are not base64; correct it.");
+    if (!bytes) fail(where, " has a data URI with characters that are not base64; correct it.");
     return std::move(*bytes);
 }
 
 fs::path Buffers::below_folder(const std::string& uri, const std::string& where) {
     const auto path = path_beside(decode_percent(uri));
-    if (!path) fail(where + " is " + in_quotes(uri) + ", and only files beside the mesh are read; move it there.");
+    if (!path) fail(where, " is ", in_quotes(uri), ", and only files beside the mesh are read; move it there.");
     return *path;
 }
 
@@ -137,9 +135,9 @@ fs::path Buffers::place_of(const std::string& uri, const std::string& where) con
 // Only files in the mesh file's folder and below: a mesh must not be able to name any file of the machine.
 std::string Buffers::read_beside(const std::string& uri, const std::string& where, std::uint64_t most_bytes) const {
     const fs::path relative = below_folder(uri, where);
-    if (source_.folder.empty()) fail(where + " lies in another file, which a mesh in memory cannot have.");
+    if (source_.folder.empty()) fail(where, " lies in another file, which a mesh in memory cannot have.");
     Result<std::string> bytes = read_regular_file(source_.folder / relative, most_bytes);
-    if (!bytes) fail(where + ": " + bytes.error().message);
+    if (!bytes) fail(where, ": ", bytes.error().message);
     return std::move(*bytes);
 }
 
@@ -194,7 +192,7 @@ Index index_at(const char* row, int type) { return static_cast<Index>(component_
 
 std::size_t component_size_of(int type, const std::string& where) {
     const std::size_t size = component_bytes(type);
-    if (size == 0) fail(where + " has the unknown component type " + std::to_string(type) + "; correct the JSON.");
+    if (size == 0) fail(where, " has the unknown component type ", type, "; correct the JSON.");
     return size;
 }
 
@@ -210,30 +208,28 @@ struct Accessors::Rows {
 
 const tinygltf::Accessor& Accessors::accessor(int index) const {
     if (index < 0 || static_cast<std::size_t>(index) >= model_.accessors.size())
-        fail("accessor " + std::to_string(index) + " is used, but there are " +
-             std::to_string(model_.accessors.size()) + "; correct the JSON.");
+        fail("accessor ", index, " is used, but there are ", model_.accessors.size(), "; correct the JSON.");
     return model_.accessors[static_cast<std::size_t>(index)];
 }
 
 Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
                                    const std::string& where) const {
     if (static_cast<std::size_t>(view_index) >= model_.bufferViews.size())
-        fail(where + " uses buffer view " + std::to_string(view_index) + ", but there are " +
-             std::to_string(model_.bufferViews.size()) + "; correct the JSON.");
+        fail(where, " uses buffer view ", view_index, ", but there are ", model_.bufferViews.size(),
+             "; correct the JSON.");
     const tinygltf::BufferView& view = model_.bufferViews[static_cast<std::size_t>(view_index)];
     if (static_cast<std::size_t>(view.buffer) >= buffers_.count())
-        fail(numbered("buffer view", static_cast<std::size_t>(view_index)) + " uses buffer " +
-             std::to_string(view.buffer) + ", but there are " + std::to_string(buffers_.count()) +
-             "; correct the JSON.");
+        fail(numbered("buffer view", static_cast<std::size_t>(view_index)), " uses buffer ", view.buffer,
+             ", but there are ", buffers_.count(), "; correct the JSON.");
     const std::string_view bytes = buffers_[static_cast<std::size_t>(view.buffer)];
     if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
-        fail(numbered("buffer view", static_cast<std::size_t>(view_index)) +
+        fail(numbered("buffer view", static_cast<std::size_t>(view_index)),
              " ends behind its buffer; the data are cut short or the JSON is wrong.");
     const std::size_t stride = view.byteStride == 0 ? size : view.byteStride;
-    if (stride < size) fail(where + " has a stride smaller than its elements; correct the JSON.");
+    if (stride < size) fail(where, " has a stride smaller than its elements; correct the JSON.");
     const std::size_t room = view.byteLength - std::min(offset, view.byteLength);
     const bool fits = count == 0 || (room >= size && count - 1 <= (room - size) / stride);
-    if (!fits) fail(where + " ends behind its buffer view; the data are cut short or the JSON is wrong.");
+    if (!fits) fail(where, " ends behind its buffer view; the data are cut short or the JSON is wrong.");
     if (count == 0) return {};
     return {bytes.data() + view.byteOffset + offset, stride, count};
 }
@@ -242,9 +238,9 @@ template <class Put>
 void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where,
                                 Put&& put) const {
     const int index_type = a.sparse.indices.componentType;
-    if (!is_index_type(index_type)) fail(where + " has sparse indices of a wrong type; correct the JSON.");
+    if (!is_index_type(index_type)) fail(where, " has sparse indices of a wrong type; correct the JSON.");
     const auto count = static_cast<std::size_t>(a.sparse.count);
-    if (count > a.count) fail(where + " replaces more elements than it has; correct its sparse count.");
+    if (count > a.count) fail(where, " replaces more elements than it has; correct its sparse count.");
     const Rows at = rows_of(a.sparse.indices.bufferView, static_cast<std::size_t>(a.sparse.indices.byteOffset), count,
                             component_bytes(index_type), where);
     const Rows values =
@@ -252,8 +248,7 @@ void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, c
     for (std::size_t i = 0; i < count; ++i) {
         const Index target = index_at(at[i], index_type);
         if (target >= a.count)
-            fail(where + " replaces element " + std::to_string(target) + " of " + std::to_string(a.count) +
-                 "; correct its sparse indices.");
+            fail(where, " replaces element ", target, " of ", a.count, "; correct its sparse indices.");
         put(target, values[i]);
     }
 }
@@ -272,11 +267,11 @@ std::vector<glm::dvec4> Accessors::vectors(int index, int components, const char
     const std::string where = numbered("accessor", static_cast<std::size_t>(index));
     const int found = components_of(index);
     const bool fits = components == 0 ? found == 3 || found == 4 : found == components;
-    if (!fits) fail(where + " has the wrong type for " + use + "; correct the JSON.");
+    if (!fits) fail(where, " has the wrong type for ", use, "; correct the JSON.");
     const std::size_t component_size = component_size_of(a.componentType, where);
     const std::size_t size = static_cast<std::size_t>(found) * component_size;
 
-    if (a.bufferView < 0 && !a.sparse.isSparse) fail(where + " has no bufferView; correct the JSON.");
+    if (a.bufferView < 0 && !a.sparse.isSparse) fail(where, " has no bufferView; correct the JSON.");
     const Rows rows = a.bufferView < 0 ? Rows{} : rows_of(a.bufferView, a.byteOffset, a.count, size, where);
     std::vector<glm::dvec4> values(a.count, glm::dvec4(0.0, 0.0, 0.0, 1.0));
     const auto decode = [&](const char* row, glm::dvec4& value) {
@@ -293,7 +288,7 @@ std::vector<Index> Accessors::indices(int index) const {
     const tinygltf::Accessor& a = accessor(index);
     const std::string where = numbered("accessor", static_cast<std::size_t>(index));
     if (a.type != TINYGLTF_TYPE_SCALAR || !is_index_type(a.componentType) || a.bufferView < 0)
-        fail(where + " cannot hold indices: they are unsigned integers in a bufferView; correct the JSON.");
+        fail(where, " cannot hold indices: they are unsigned integers in a bufferView; correct the JSON.");
     const std::size_t size = component_bytes(a.componentType);
     const Rows rows = rows_of(a.bufferView, a.byteOffset, a.count, size, where);
     std::vector<Index> values(a.count);

@@ -7,9 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
-#include <new>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,23 +15,16 @@
 #include <glm/vec4.hpp>
 
 #include "gltf_document.h"
-#include "mesh_readers.h"
 
 namespace unseen::meshio::gltf {
 
-// Runs what may find a broken rule.
-template <class Value, class Do>
-Result<Value> guarded(const MeshSource& source, Do&& run) {
+// Runs what believes that values of JSON have the types that glTF asks for.
+template <class Do>
+auto with_types(Do&& run) {
     try {
         return run();
-    } catch (const Broken& broken) {
-        return malformed(source, broken.what);
     } catch (const json::exception&) {
-        return malformed(source, wrong_type);
-    } catch (const std::bad_alloc&) {
-        return too_large(source.name);
-    } catch (const std::length_error&) { // what a vector throws instead beyond its largest size
-        return too_large(source.name);
+        fail(wrong_type);
     }
 }
 
@@ -76,6 +67,11 @@ private:
 // meshoptimizer nothing: files that need the extension have been refused then (check_kept()).
 inline constexpr const char* meshopt_extension = "EXT_meshopt_compression";
 void unpack_views(json& document, Buffers& buffers);
+
+inline constexpr const char* instancing_extension = "EXT_mesh_gpu_instancing";
+// Gives each instance a node of its own below the node that has them, so that all else sees only nodes. Values that
+// instances have beside their places are left out, with a warning.
+void expand_instances(json& document, const Buffers& buffers, std::vector<Message>& warnings);
 
 class Accessors {
 public:

@@ -8,7 +8,6 @@
 #include <limits>
 #include <utility>
 
-#include "mesh_readers.h"
 #include "text_scanner.h"
 
 namespace unseen::meshio::gltf {
@@ -45,38 +44,33 @@ void check_structure(std::string_view text) {
         } else if (c == '"') {
             in_string = true;
         } else if (c == '{' || c == '[') {
-            if (++depth > max_json_depth)
-                fail("byte " + std::to_string(i) + ": the JSON is nested too deeply; simplify it.");
+            if (++depth > max_json_depth) fail("byte ", i, ": the JSON is nested too deeply; simplify it.");
         } else if (c == '}' || c == ']') {
             --depth;
         }
         if (!in_string && (c == '{' || c == '[' || c == ',') && ++values > max_json_values)
-            fail("byte " + std::to_string(i) + ": the JSON has too many values; split the scene.");
+            fail("byte ", i, ": the JSON has too many values; split the scene.");
     }
 }
 
 } // namespace
-
-void fail(Message what) { throw Broken{std::move(what)}; }
 
 std::string numbered(const char* what, std::size_t index) { return std::string(what) + " " + std::to_string(index); }
 
 Container split_glb(std::string_view bytes) {
     if (bytes.size() < glb_header_bytes + chunk_header_bytes) fail("it is too short for a GLB file; it is cut short.");
     if (word_at(bytes, 4) != glb_version)
-        fail("its GLB version is " + std::to_string(word_at(bytes, 4)) + ", and only 2 is read; convert it.");
+        fail("its GLB version is ", word_at(bytes, 4), ", and only 2 is read; convert it.");
     const std::size_t length = word_at(bytes, 8);
     if (length > bytes.size())
-        fail("its header claims " + std::to_string(length) + " bytes, but there are " + std::to_string(bytes.size()) +
-             "; the file is cut short.");
+        fail("its header claims ", length, " bytes, but there are ", bytes.size(), "; the file is cut short.");
     bytes = bytes.substr(0, length);
     Container container;
     for (std::size_t at = glb_header_bytes; at + chunk_header_bytes <= bytes.size();) {
         const std::size_t size = word_at(bytes, at);
         const std::uint32_t type = word_at(bytes, at + 4);
         at += chunk_header_bytes;
-        if (size > bytes.size() - at)
-            fail("byte " + std::to_string(at) + ": a chunk ends behind the file; it is cut short.");
+        if (size > bytes.size() - at) fail("byte ", at, ": a chunk ends behind the file; it is cut short.");
         const std::string_view chunk = bytes.substr(at, size);
         if (type == chunk_json && container.json_text.empty()) container.json_text = chunk;
         else if (type == chunk_bin && !container.bin) container.bin = chunk;
@@ -92,14 +86,14 @@ Container split_glb(std::string_view bytes) {
 json parse_json(std::string_view text) {
     // The parser takes one for the end, whatever follows.
     if (const std::size_t nul = text.find('\0'); nul != std::string_view::npos)
-        fail("byte " + std::to_string(nul) + ": a NUL byte, which no JSON contains; the file is damaged.");
+        fail("byte ", nul, ": a NUL byte, which no JSON contains; the file is damaged.");
     check_structure(text);
     try {
         json document = json::parse(text.begin(), text.end());
         if (!document.is_object()) fail("its JSON is no object; it is no glTF file.");
         return document;
     } catch (const json::parse_error& error) {
-        fail("byte " + std::to_string(error.byte) + ": the JSON cannot be parsed; the file is damaged or cut short.");
+        fail("byte ", error.byte, ": the JSON cannot be parsed; the file is damaged or cut short.");
     } catch (const json::exception&) {
         fail("its JSON has a number that no double can hold; correct it.");
     }
@@ -131,7 +125,7 @@ const json& array_of(const json& object, const char* key) {
     static const json empty = json::array();
     const json* array = member(object, key);
     if (array == nullptr) return empty;
-    if (!array->is_array()) fail(std::string("its ") + key + " are no array; correct the JSON.");
+    if (!array->is_array()) fail("its ", key, " are no array; correct the JSON.");
     return *array;
 }
 
@@ -140,7 +134,7 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
     double as_double = -1.0;
     if (value.is_number_integer() || is_whole_float) as_double = value.get<double>();
     if (!(as_double >= 0.0 && as_double <= static_cast<double>(largest)))
-        fail(where + " should be a whole number from 0 to " + std::to_string(largest) + "; correct it.");
+        fail(where, " should be a whole number from 0 to ", largest, "; correct it.");
     return static_cast<std::int64_t>(as_double);
 }
 
@@ -193,7 +187,7 @@ private:
         const json* version = asset != nullptr && asset->is_object() ? member(*asset, "version") : nullptr;
         if (version == nullptr || !version->is_string()) fail("it has no asset version; it is no glTF file.");
         if (!version->get_ref<const std::string&>().starts_with("2."))
-            fail("its version is " + in_quotes(version->get_ref<const std::string&>()) +
+            fail("its version is ", in_quotes(version->get_ref<const std::string&>()),
                  ", and only 2 is read; convert it.");
         reduced_["asset"]["version"] = "2.0";
     }
@@ -202,12 +196,12 @@ private:
     void copy_array(const char* key, const char* what, Copy&& copy) {
         const json& array = array_of(document_, key);
         if (array.size() > max_array_elements)
-            fail("it has " + std::to_string(array.size()) + " " + key + ", more than the " +
-                 std::to_string(max_array_elements) + " that are read; split the scene.");
+            fail("it has ", array.size(), " ", key, ", more than the ", max_array_elements,
+                 " that are read; split the scene.");
         json& out = reduced_[key] = json::array();
         for (std::size_t i = 0; i < array.size(); ++i) {
             where_ = numbered(what, i);
-            if (!array[i].is_object()) fail(where_ + " is no object; correct the JSON.");
+            if (!array[i].is_object()) fail(where_, " is no object; correct the JSON.");
             json element = json::object();
             copy(array[i], element);
             out.push_back(std::move(element));
@@ -217,7 +211,7 @@ private:
     void integer(const json& in, json& out, const char* key, std::int64_t largest, bool is_required) const {
         const json* value = member(in, key);
         if (value != nullptr) out[key] = to_integer_in_range(*value, largest, where_ + ": " + key);
-        else if (is_required) fail(where_ + " has no " + key + "; correct the JSON.");
+        else if (is_required) fail(where_, " has no ", key, "; correct the JSON.");
     }
 
     void integers(const json& in, json& out, const char* key) const {
@@ -232,7 +226,7 @@ private:
         if (values == nullptr) return;
         const bool is_valid = values->is_array() && values->size() == count &&
                               std::all_of(values->begin(), values->end(), [](const json& v) { return v.is_number(); });
-        if (!is_valid) fail(where_ + ": " + key + " should be " + std::to_string(count) + " numbers; correct it.");
+        if (!is_valid) fail(where_, ": ", key, " should be ", count, " numbers; correct it.");
         out[key] = *values;
     }
 
@@ -250,7 +244,7 @@ private:
 
     const json& object(const json& in, const char* key) const {
         const json* value = member(in, key);
-        if (value == nullptr || !value->is_object()) fail(where_ + " has no " + key + "; correct the JSON.");
+        if (value == nullptr || !value->is_object()) fail(where_, " has no ", key, "; correct the JSON.");
         return *value;
     }
 
@@ -260,7 +254,7 @@ private:
         integer(in, out, "componentType", max_int, true);
         integer(in, out, "count", max_size, true);
         const json* type = member(in, "type");
-        if (type == nullptr || !type->is_string()) fail(where_ + " has no type; correct the JSON.");
+        if (type == nullptr || !type->is_string()) fail(where_, " has no type; correct the JSON.");
         out["type"] = *type;
         if (const json* normalized = member(in, "normalized"); normalized != nullptr && normalized->is_boolean())
             out["normalized"] = *normalized;
@@ -282,7 +276,7 @@ private:
         name(in, out);
         json& primitives = out["primitives"] = json::array();
         for (const json& primitive : array_of(in, "primitives")) {
-            if (!primitive.is_object()) fail(where_ + " has a primitive that is no object; correct the JSON.");
+            if (!primitive.is_object()) fail(where_, " has a primitive that is no object; correct the JSON.");
             json copied = json::object();
             integer(primitive, copied, "indices", max_int, false);
             integer(primitive, copied, "material", max_int, false);
@@ -310,7 +304,7 @@ private:
         const auto index = position->get<std::size_t>();
         if (index < accessors.size() && accessors[index].is_object() && !accessors[index].contains("bufferView") &&
             !accessors[index].contains("sparse"))
-            fail(where_ + " is compressed by " + draco_extension + ", which is not read; export it without.");
+            fail(where_, " is compressed by ", draco_extension, ", which is not read; export it without.");
     }
 
     void node(const json& in, json& out) {

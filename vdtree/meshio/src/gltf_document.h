@@ -15,15 +15,11 @@
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>
 
+#include "mesh_readers.h"
+
 namespace unseen::meshio::gltf {
 
 using nlohmann::json;
-
-// A broken rule of the format, thrown within the glTF reader only: it unwinds from deep inside a document.
-struct Broken {
-    Message what;
-};
-[[noreturn]] void fail(Message what);
 
 // What is said of a document in which the library of JSON does not find what glTF asks for.
 inline constexpr const char* wrong_type =

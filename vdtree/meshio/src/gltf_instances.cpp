@@ -1,4 +1,5 @@
-#include "gltf_instances.h"
+// EXT_mesh_gpu_instancing: nodes that show their mesh many times.
+#include "gltf_data.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,17 +32,15 @@ std::vector<json> read_instances(const json& attributes, const Accessors& access
         const std::string what = where + ": " + place.attribute + " of its instances";
         const int accessor = static_cast<int>(to_integer_in_range(*index, max_int, what));
         const std::size_t count = accessors.count_of(accessor);
-        if (count > most) fail(where + " has more instances than are read; split the scene.");
+        if (count > most) fail(where, " has more instances than are read; split the scene.");
         if (std::exchange(is_first, false)) instances.resize(count, json::object());
         if (count != instances.size())
-            fail(what + " are " + std::to_string(count) + ", and others " + std::to_string(instances.size()) +
-                 "; correct the JSON.");
+            fail(what, " are ", count, ", and others ", instances.size(), "; correct the JSON.");
         const auto values = accessors.vectors(accessor, place.components, "instances");
         for (std::size_t i = 0; i < count; ++i) {
             json& numbers = instances[i][place.key] = json::array();
             for (int k = 0; k < place.components; ++k) {
-                if (!std::isfinite(values[i][k]))
-                    fail(what + ": number " + std::to_string(i) + " is NaN or infinite; correct it.");
+                if (!std::isfinite(values[i][k])) fail(what, ": number ", i, " is NaN or infinite; correct it.");
                 numbers.push_back(values[i][k]);
             }
         }

@@ -8,7 +8,6 @@
 
 #include "gltf_data.h"
 #include "gltf_document.h"
-#include "gltf_instances.h"
 #include "kept_arrays.h"
 #include "mesh_readers.h"
 
@@ -48,9 +47,9 @@ std::set<std::string> unknown_required(const json& document) {
         const auto& required = extension.get_ref<const std::string&>();
         if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
             std::end(unsupported_extensions))
-            fail("it needs the extension " + required + ", which is not read; export it without.");
+            fail("it needs the extension ", required, ", which is not read; export it without.");
         if (required == meshopt_extension && !has_meshoptimizer())
-            fail("it needs the extension " + required +
+            fail("it needs the extension ", required,
                  ", and this build is without the library meshoptimizer; install "
                  "libmeshoptimizer-dev and build again, or export it without.");
         if (!is_kept(required) && required != quantization && required != meshopt_extension &&
@@ -145,9 +144,9 @@ void check_kept(const json& document, const LeftOut& drop, std::vector<Message>&
         names += (names.empty() ? "" : ",") + std::string(thing.name);
     }
     if (!refused.empty())
-        fail("it has " + refused + ", which a simplified mesh cannot keep" +
-             (unknown.empty() || drop.extensions ? "" : " (" + listed({unknown.begin(), unknown.end()}) + ")") +
-             "; leave them out with " + Message::of("{read.drop = }") + names + ".");
+        throw Fault{"it has " + refused + ", which a simplified mesh cannot keep" +
+                    (unknown.empty() || drop.extensions ? "" : " (" + listed({unknown.begin(), unknown.end()}) + ")") +
+                    "; leave them out with " + Message::of("{read.drop = }") + names + "."};
 }
 
 json without_geometry(json document, const std::vector<SourceDocument::File>& images, std::vector<Message>& warnings) {

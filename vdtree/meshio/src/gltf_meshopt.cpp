@@ -49,7 +49,7 @@ Packed packed_in(const json& extension, const Buffers& buffers, const std::strin
     const std::size_t offset = size_of(extension, "byteOffset", 0, where);
     const std::size_t length = size_of(extension, "byteLength", 0, where);
     if (buffer >= buffers.count() || offset > buffers[buffer].size() || length > buffers[buffer].size() - offset)
-        fail(where + ": its compressed bytes end behind their buffer; the data are cut short or the JSON is wrong.");
+        fail(where, ": its compressed bytes end behind their buffer; the data are cut short or the JSON is wrong.");
     packed.bytes = buffers[buffer].substr(offset, length);
     return packed;
 }
@@ -59,12 +59,12 @@ void check(const Packed& packed, const std::string& where) {
     const bool is_vertices = packed.mode == "ATTRIBUTES";
     const bool fits = is_vertices ? packed.stride % 4 == 0 && packed.stride >= 4 && packed.stride <= 256
                                   : packed.stride == 2 || packed.stride == 4;
-    if (!fits) fail(where + ": its byteStride is " + std::to_string(packed.stride) + "; correct the JSON.");
+    if (!fits) fail(where, ": its byteStride is ", packed.stride, "; correct the JSON.");
     if (packed.mode == "TRIANGLES" && packed.count % 3 != 0)
-        fail(where + ": " + std::to_string(packed.count) + " indices make no whole number of triangles; correct it.");
+        fail(where, ": ", packed.count, " indices make no whole number of triangles; correct it.");
     if (packed.count > (least_bound + most_growth * packed.bytes.size()) / packed.stride)
-        fail(where + ": " + std::to_string(packed.bytes.size()) + " bytes cannot hold its " +
-             std::to_string(packed.count) + " elements; the data are cut short or the JSON is wrong.");
+        fail(where, ": ", packed.bytes.size(), " bytes cannot hold its ", packed.count,
+             " elements; the data are cut short or the JSON is wrong.");
 }
 
 void undo_filter(const Packed& packed, std::string& out, const std::string& where) {
@@ -74,7 +74,7 @@ void undo_filter(const Packed& packed, std::string& out, const std::string& wher
                       : packed.filter == "EXPONENTIAL" ? packed.stride % 4 == 0
                                                        : !has_filter;
     if (!fits || (has_filter && packed.mode != "ATTRIBUTES"))
-        fail(where + ": its filter is not known, or does not go with its mode and byteStride; correct the JSON.");
+        fail(where, ": its filter is not known, or does not go with its mode and byteStride; correct the JSON.");
     if (packed.filter == "OCTAHEDRAL") meshopt_decodeFilterOct(out.data(), packed.count, packed.stride);
     if (packed.filter == "QUATERNION") meshopt_decodeFilterQuat(out.data(), packed.count, packed.stride);
     if (packed.filter == "EXPONENTIAL") meshopt_decodeFilterExp(out.data(), packed.count, packed.stride);
@@ -92,8 +92,8 @@ std::string unpacked(const Packed& packed, const std::string& where) {
         failed = meshopt_decodeIndexBuffer(out.data(), packed.count, packed.stride, bytes, size);
     else if (packed.mode == "INDICES")
         failed = meshopt_decodeIndexSequence(out.data(), packed.count, packed.stride, bytes, size);
-    else fail(where + ": its mode is " + in_quotes(packed.mode) + ", which is none; correct the JSON.");
-    if (failed != 0) fail(where + ": its compressed bytes are damaged.");
+    else fail(where, ": its mode is ", in_quotes(packed.mode), ", which is none; correct the JSON.");
+    if (failed != 0) fail(where, ": its compressed bytes are damaged.");
     undo_filter(packed, out, where);
     return out;
 }

@@ -11,7 +11,7 @@ constexpr std::size_t max_node_depth = 512; // deeper trees are found in attacks
 
 glm::dmat4 rotation_matrix(const std::vector<double>& q, const std::string& where) {
     const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(length > 0.0) || !std::isfinite(length)) fail(where + " has a rotation of length 0 or infinity; correct it.");
+    if (!(length > 0.0) || !std::isfinite(length)) fail(where, " has a rotation of length 0 or infinity; correct it.");
     const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
     glm::dmat4 m(1.0);
     m[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0};
@@ -37,8 +37,7 @@ std::vector<int> root_nodes(const tinygltf::Model& model) {
     if (!model.scenes.empty()) {
         const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
         if (scene >= model.scenes.size())
-            fail("scene " + std::to_string(scene) + " is to be shown, but there are " +
-                 std::to_string(model.scenes.size()) + "; correct the JSON.");
+            fail("scene ", scene, " is to be shown, but there are ", model.scenes.size(), "; correct the JSON.");
         return model.scenes[scene].nodes;
     }
     std::vector<bool> is_child(model.nodes.size());
@@ -59,9 +58,8 @@ public:
     Walk(const MeshSource& source, const tinygltf::Model& model)
         : source_(source), model_(model), reached_(model.nodes.size()) {}
 
-    std::optional<std::vector<ShownNode>> run() {
-        for (const int root : root_nodes(model_))
-            if (!visit_tree(root)) return std::nullopt;
+    std::vector<ShownNode> run() {
+        for (const int root : root_nodes(model_)) visit_tree(root);
         return std::move(shown_);
     }
 
@@ -70,13 +68,13 @@ private:
         std::size_t node, depth, parent; // the parent in the list
     };
 
-    bool visit_tree(int root) {
+    void visit_tree(int root) {
         std::vector<Visit> stack;
         push(stack, root, 0, no_parent);
         while (!stack.empty()) {
             const Visit visit = stack.back();
             stack.pop_back();
-            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return false;
+            source_.report(source_.bytes.size() / 2, "reading glTF");
             const tinygltf::Node& node = model_.nodes[visit.node];
             const glm::dmat4 local = local_matrix(node, numbered("node", visit.node));
             const std::size_t number = shown_.size();
@@ -86,18 +84,17 @@ private:
             for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
                 push(stack, *child, visit.depth + 1, number);
         }
-        return true;
     }
 
     void push(std::vector<Visit>& stack, int node, std::size_t depth, std::size_t parent) {
         const auto index = static_cast<std::size_t>(node);
         const std::string where = numbered("node", index);
         if (index >= model_.nodes.size())
-            fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
+            fail(where, " is used, but there are ", model_.nodes.size(), "; correct the JSON.");
         // A second visit means a cycle or two parents; glTF allows neither.
-        if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
+        if (reached_[index]) fail(where, " is reached twice, but the nodes must form trees; correct the JSON.");
         reached_[index] = true;
-        if (depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
+        if (depth > max_node_depth) fail(where, " is nested too deeply; flatten the scene.");
         stack.push_back({index, depth, parent});
     }
 
@@ -109,8 +106,8 @@ private:
 
 } // namespace
 
-std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, const tinygltf::Model& model) {
-    if (model.nodes.empty()) return std::vector<ShownNode>(); // its meshes are shown as they are
+std::vector<ShownNode> shown_nodes(const MeshSource& source, const tinygltf::Model& model) {
+    if (model.nodes.empty()) return {}; // its meshes are shown as they are
     return Walk(source, model).run();
 }
 
@@ -118,8 +115,8 @@ std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t nod
     const int mesh = model.nodes[node].mesh;
     if (mesh < 0) return std::nullopt;
     if (static_cast<std::size_t>(mesh) >= model.meshes.size())
-        fail(numbered("node", node) + " uses mesh " + std::to_string(mesh) + ", but there are " +
-             std::to_string(model.meshes.size()) + "; correct the JSON.");
+        fail(numbered("node", node), " uses mesh ", mesh, ", but there are ", model.meshes.size(),
+             "; correct the JSON.");
     return static_cast<std::size_t>(mesh);
 }
 

@@ -9,7 +9,6 @@
 #include <glm/mat4x4.hpp>
 
 #include "gltf_document.h"
-#include "mesh_readers.h"
 
 namespace unseen::meshio::gltf {
 
@@ -21,9 +20,9 @@ struct ShownNode {
     glm::dmat4 to_world = glm::dmat4(1);
 };
 
-// Those of the scene that is shown, parents before their children, each once; nothing where the caller cancelled.
+// Those of the scene that is shown, parents before their children, each once.
 // Fails on cycles, nodes that are not there, and transforms that are none.
-std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, const tinygltf::Model& model);
+std::vector<ShownNode> shown_nodes(const MeshSource& source, const tinygltf::Model& model);
 
 // The mesh of a node; fails where there is no such mesh.
 std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t node);

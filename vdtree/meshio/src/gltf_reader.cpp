@@ -18,13 +18,9 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 
-#include "gltf_data.h"
-#include "gltf_document.h"
-#include "gltf_instances.h"
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"
 #include "gltf_writer.h"
-#include "mesh_readers.h"
 #include "named_files.h"
 
 namespace unseen::meshio {
@@ -59,8 +55,8 @@ public:
         if (image) return *image;
         try {
             image = read_anew(images_[index], numbered("image", index));
-        } catch (const Broken& broken) {
-            image = NamedFile{.why = broken.what.substr(0, broken.what.size() - 1)};
+        } catch (const Fault& fault) {
+            image = NamedFile{.why = fault.what.substr(0, fault.what.size() - 1)};
         }
         if (!image->bytes) return *image;
         const auto [known, is_new] = known_.try_emplace(*image->bytes, image->bytes);
@@ -82,10 +78,10 @@ public:
 
 private:
     NamedFile read_anew(const json& image, const std::string& where) {
-        if (!image.is_object()) fail(where + " is no object; correct the JSON.");
+        if (!image.is_object()) fail(where, " is no object; correct the JSON.");
         NamedFile file;
         if (const json* uri = member(image, "uri")) {
-            if (!uri->is_string()) fail(where + ": its uri is no text; correct the JSON.");
+            if (!uri->is_string()) fail(where, ": its uri is no text; correct the JSON.");
             const auto& text = uri->get_ref<const std::string&>();
             if (text.starts_with("data:")) {
                 file.bytes = std::make_shared<const std::string>(Buffers::decode_data(text, where));
@@ -98,23 +94,23 @@ private:
             return file;
         }
         const json* view_index = member(image, "bufferView");
-        if (view_index == nullptr) fail(where + " has no bufferView; correct the JSON.");
+        if (view_index == nullptr) fail(where, " has no bufferView; correct the JSON.");
         const auto index = static_cast<std::size_t>(to_integer_in_range(*view_index, max_int, where + ": bufferView"));
         if (index >= views_.size() || !views_[index].is_object())
-            fail(where + ": its bufferView is " + std::to_string(index) + ", but there are " +
-                 std::to_string(views_.size()) + " bufferViews; correct the JSON.");
+            fail(where, ": its bufferView is ", index, ", but there are ", views_.size(),
+                 " bufferViews; correct the JSON.");
         const auto number = [&](const char* key, std::int64_t missing) {
             const json* value = member(views_[index], key);
             if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
             const std::string view = numbered("bufferViews", index);
-            if (value == nullptr) fail(view + " has no " + key + "; correct the JSON.");
+            if (value == nullptr) fail(view, " has no ", key, "; correct the JSON.");
             return static_cast<std::size_t>(to_integer_in_range(*value, max_size, view + ": " + key));
         };
         const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
                           length = number("byteLength", -1);
         if (buffer >= buffers_.count() || offset > buffers_[buffer].size() || length > buffers_[buffer].size() - offset)
-            fail(where + " ends behind its buffer; the data are cut short or the JSON is wrong.");
-        if (length == 0) fail(where + " is empty; correct the JSON.");
+            fail(where, " ends behind its buffer; the data are cut short or the JSON is wrong.");
+        if (length == 0) fail(where, " is empty; correct the JSON.");
         file.bytes = std::make_shared<const std::string>(buffers_[buffer].substr(offset, length));
         return file;
     }
@@ -150,11 +146,11 @@ public:
             const json* texture = optional_object(*surface, "baseColorTexture");
             if (images_ == nullptr || texture == nullptr) return material;
             if (!colour_uv_set(of_file))
-                fail(where_ + ": its texture lies by texture coordinates that are not read, which are 0 to " +
-                     std::to_string(last_uv_set) + ".");
+                fail(where_, ": its texture lies by texture coordinates that are not read, which are 0 to ",
+                     last_uv_set, ".");
             add_texture(*texture, material, lost);
-        } catch (const Broken& broken) {
-            warnings.push_back(broken.what + " Material " + in_quotes(material.name) + " is drawn without that.");
+        } catch (const Fault& fault) {
+            warnings.push_back(fault.what + " Material " + in_quotes(material.name) + " is drawn without that.");
         }
         return material;
     }
@@ -162,7 +158,7 @@ public:
 private:
     const json* optional_object(const json& in, const char* key) const {
         const json* value = member(in, key);
-        if (value != nullptr && !value->is_object()) fail(where_ + ": its " + key + " is no object; correct the JSON.");
+        if (value != nullptr && !value->is_object()) fail(where_, ": its ", key, " is no object; correct the JSON.");
         return value;
     }
 
@@ -173,19 +169,19 @@ private:
             is_valid = values[i].is_number() && values[i].get<double>() >= 0 && values[i].get<double>() <= 1;
             if (is_valid) colour[static_cast<int>(i)] = values[i].get<float>();
         }
-        if (!is_valid) fail(where_ + ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
+        if (!is_valid) fail(where_, ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
         return colour;
     }
 
     const json& element(const char* key, const json& in, const char* of) {
         const json& array = array_of(document_, key);
         const json* value = member(in, of);
-        if (value == nullptr) fail(where_ + " has no " + of + "; correct the JSON.");
+        if (value == nullptr) fail(where_, " has no ", of, "; correct the JSON.");
         const auto index = static_cast<std::size_t>(to_integer_in_range(*value, max_int, where_ + ": " + of));
         if (index >= array.size())
-            fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " +
-                 std::to_string(array.size()) + " " + key + "; correct the JSON.");
-        if (!array[index].is_object()) fail(where_ + ": its " + of + " is no object; correct the JSON.");
+            fail(where_, ": its ", of, " is ", index, ", but there are ", array.size(), " ", key,
+                 "; correct the JSON.");
+        if (!array[index].is_object()) fail(where_, ": its ", of, " is no object; correct the JSON.");
         where_ = numbered(std::string(key, std::string_view(key).size() - 1).c_str(), index); // "texture 3"
         return array[index];
     }
@@ -226,12 +222,12 @@ private:
             const json* values = member(transform, key);
             if (values == nullptr) return missing;
             if (!values->is_array() || values->size() != 2 || !(*values)[0].is_number() || !(*values)[1].is_number())
-                fail(where_ + ": the " + key + " of its texture should be 2 numbers; correct it.");
+                fail(where_, ": the ", key, " of its texture should be 2 numbers; correct it.");
             return glm::dvec2((*values)[0].get<double>(), (*values)[1].get<double>());
         };
         const json* rotation = member(transform, "rotation");
         if (rotation != nullptr && !rotation->is_number())
-            fail(where_ + ": the rotation of its texture should be a number; correct it.");
+            fail(where_, ": the rotation of its texture should be a number; correct it.");
         const double angle = rotation != nullptr ? rotation->get<double>() : 0.0;
         const glm::dvec2 scale = numbers("scale", glm::dvec2(1));
         const double c = std::cos(angle), s = std::sin(angle);
@@ -295,19 +291,17 @@ public:
         }
     }
 
-    // Empty where the caller cancelled.
-    std::optional<ReadResult> read() {
-        const auto shown = shown_nodes(source_, model_);
-        if (!shown) return std::nullopt;
+    ReadResult read() {
+        const std::vector<ShownNode> shown = shown_nodes(source_, model_);
         if (model_.nodes.empty())
             for (std::size_t i = 0; i < model_.meshes.size(); ++i) add_mesh(i, -1, Placement{});
-        for (const ShownNode& node : *shown) {
-            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return std::nullopt;
+        for (const ShownNode& node : shown) {
+            source_.report(source_.bytes.size() / 2, "reading glTF");
             if (const auto mesh = mesh_of(model_, node.node))
                 add_mesh(*mesh, static_cast<std::int32_t>(node.node), placement_of(node.to_world));
         }
         tell_of_parts();
-        if (const std::uint64_t hidden = hidden_meshes(whole_, model_, *shown); hidden > 0)
+        if (const std::uint64_t hidden = hidden_meshes(whole_, model_, shown); hidden > 0)
             result_.warnings.push_back(counted_were(hidden, "node") + " not in the scene that is shown and left out.");
         keep_channels();
         return std::move(result_);
@@ -429,9 +423,8 @@ private:
         const std::size_t count = accessors_.count_of(from.at("POSITION"));
         for (const auto& [attribute, accessor] : from) {
             if (accessors_.count_of(accessor) != count)
-                fail(numbered("accessor", static_cast<std::size_t>(accessor)) + " has " +
-                     std::to_string(accessors_.count_of(accessor)) + " elements for " + std::to_string(count) +
-                     " positions; correct the JSON.");
+                fail(numbered("accessor", static_cast<std::size_t>(accessor)), " has ", accessors_.count_of(accessor),
+                     " elements for ", count, " positions; correct the JSON.");
         }
         spend(count, bytes_per_vertex);
         if (count >= std::numeric_limits<Index>::max() - first)
@@ -503,7 +496,7 @@ private:
         };
         const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
         if (is_list && index_count % 3 != 0)
-            fail("mesh " + in_quotes(mesh.name) + ": " + std::to_string(index_count) +
+            fail("mesh ", in_quotes(mesh.name), ": ", index_count,
                  " indices make no whole number of triangles; correct it.");
         const std::uint64_t first_triangle = result_.mesh.triangles.size();
         for (std::size_t i = 2; i < index_count; i += is_list ? 3 : 1) {
@@ -533,8 +526,7 @@ private:
     std::string material_name(int material) const {
         const auto index = static_cast<std::size_t>(material);
         if (index >= model_.materials.size())
-            fail("material " + std::to_string(material) + " is used, but there are " +
-                 std::to_string(model_.materials.size()) + "; correct the JSON.");
+            fail("material ", material, " is used, but there are ", model_.materials.size(), "; correct the JSON.");
         const std::string& name = model_.materials[index].name;
         if (!name.empty() && first_of_name_.at(name) != index) return name + " (" + numbered("material", index) + ")";
         return name.empty() ? numbered("material", index) : name;
@@ -554,76 +546,78 @@ private:
     std::uint64_t skipped_primitives_ = 0, triangles_without_uvs_ = 0;
 };
 
-Result<ReadResult> read_document(const MeshSource& source) {
-    Container container{source.bytes, std::nullopt};
-    if (source.bytes.starts_with("glTF")) container = split_glb(source.bytes);
-    json document = parse_json(container.json_text);
-    if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
-
-    std::vector<Message> warnings;
-    check_kept(document, source.options.drop, warnings);
-    Buffers buffers(source, document, container.bin);
-    unpack_views(document, buffers);
-    expand_instances(document, buffers, warnings);
-    const Reduced reduced = reduce(document);
-    if (reduced.has_tangents) warnings.push_back("tangents were left out; they follow from normals and coordinates.");
-    if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
-    SceneReader scene(source, document, reduced.model, buffers);
-    std::optional<ReadResult> result = scene.read();
-    if (!result) return cancelled(source);
-    result->uvs_from_top = true;
-    ImageReader images(source, document, buffers, [&](std::uint64_t bytes) { scene.spend(1, bytes); });
-    MaterialReader materials(document, source.options.images ? &images : nullptr);
-    LostImages lost;
-    result->document->files = images.read_all(lost);
-    scene.read_materials(materials, *result, lost);
-    if (source.options.images) warn_of_lost_images(lost, *result);
-    result->document->json = to_text(without_geometry(document, result->document->files, warnings));
-    result->warnings.insert(result->warnings.end(), warnings.begin(), warnings.end());
-    return std::move(*result);
-}
-
 } // namespace
 
-// ---- meshes one by one
+struct File::Impl {
+    explicit Impl(const MeshSource& from) : source(from) {
+        Container container{source.bytes, std::nullopt};
+        if (source.bytes.starts_with("glTF")) container = split_glb(source.bytes);
+        document = parse_json(container.json_text);
+        source.report(source.bytes.size() / 4, "reading glTF");
+        check_kept(document, source.options.drop, warnings);
+        buffers.emplace(source, document, container.bin);
+        unpack_views(document, *buffers);
+        expand_instances(document, *buffers, warnings);
+        reduced = reduce(document);
+        if (reduced.has_tangents)
+            warnings.push_back("tangents were left out; they follow from normals and coordinates.");
+        if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
+        scene.emplace(source, document, reduced.model, *buffers);
+        images.emplace(source, document, *buffers, [this](std::uint64_t bytes) { scene->spend(1, bytes); });
+        materials.emplace(document, source.options.images ? &*images : nullptr);
+    }
 
-struct Meshes::Impl {
-    Impl(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
-        : scene(source, document, model, buffers),
-          images(source, document, buffers, [this](std::uint64_t bytes) { scene.spend(1, bytes); }),
-          materials(document, source.options.images ? &images : nullptr) {}
-
-    SceneReader scene;
-    ImageReader images;
-    MaterialReader materials;
+    // In the order in which they refer to each other.
+    const MeshSource& source;
+    json document;
+    std::vector<Message> warnings; // of the document
+    std::optional<Buffers> buffers;
+    Reduced reduced;
+    std::optional<SceneReader> scene;
+    std::optional<ImageReader> images;
+    std::optional<MaterialReader> materials;
 };
 
-Meshes::Meshes(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
-    : impl_(std::make_unique<Impl>(source, document, model, buffers)) {}
-Meshes::~Meshes() = default;
+File::File(const MeshSource& source) : impl_(std::make_unique<Impl>(source)) {}
+File::~File() = default;
 
-ReadResult Meshes::read(std::size_t mesh, const glm::dmat3& stretch) {
-    ReadResult result = impl_->scene.read_mesh(mesh, stretch);
+const json& File::document() const { return impl_->document; }
+const tinygltf::Model& File::model() const { return impl_->reduced.model; }
+std::uint64_t File::bytes() const { return impl_->source.bytes.size() + impl_->buffers->external_bytes(); }
+
+ReadResult File::read_all() {
+    ReadResult result = impl_->scene->read();
     result.uvs_from_top = true;
     LostImages lost;
-    impl_->scene.read_materials(impl_->materials, result, lost);
-    warn_of_lost_images(lost, result);
+    result.document->files = impl_->images->read_all(lost);
+    impl_->scene->read_materials(*impl_->materials, result, lost);
+    if (impl_->source.options.images) warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
+    result.warnings.insert(result.warnings.end(), impl_->warnings.begin(), impl_->warnings.end());
+    result.document->json = to_text(without_geometry(impl_->document, result.document->files, result.warnings));
     return result;
 }
 
-std::vector<SourceDocument::File> Meshes::files(std::vector<Message>& warnings) {
+ReadResult File::read_mesh(std::size_t mesh, const glm::dmat3& stretch) {
+    ReadResult result = impl_->scene->read_mesh(mesh, stretch);
+    result.uvs_from_top = true;
     LostImages lost;
-    auto files = impl_->images.read_all(lost);
-    ReadResult result;
-    warn_of_lost_images(lost, result);
-    warnings.insert(warnings.end(), result.warnings.begin(), result.warnings.end());
-    return files;
+    impl_->scene->read_materials(*impl_->materials, result, lost);
+    warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
+    return result;
+}
+
+json File::kept(std::vector<SourceDocument::File>& images, std::vector<Message>& warnings) {
+    warnings.insert(warnings.end(), impl_->warnings.begin(), impl_->warnings.end());
+    LostImages lost;
+    images = impl_->images->read_all(lost);
+    warn_of_lost_images(lost, {}, warnings);
+    return without_geometry(impl_->document, images, warnings);
 }
 
 } // namespace gltf
 
-Result<ReadResult> read_gltf(const MeshSource& source) {
-    return gltf::guarded<ReadResult>(source, [&] { return gltf::read_document(source); });
+ReadResult read_gltf(const MeshSource& source) {
+    return gltf::with_types([&] { return gltf::File(source).read_all(); });
 }
 
 } // namespace unseen::meshio

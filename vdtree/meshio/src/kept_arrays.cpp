@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include "mesh_readers.h"
 #include "restore.h"
+#include "text_scanner.h"
 #include "value_types.h"
 
 namespace unseen::meshio {
@@ -141,10 +141,7 @@ std::vector<std::string> names_of(std::span<const VertexArray> arrays) {
 
 bool is_colour_name(std::string_view name) {
     constexpr std::string_view usual[] = {"rgb", "rgba", "color", "colors", "colour", "colours"};
-    std::string lower(name);
-    std::transform(lower.begin(), lower.end(), lower.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return std::find(std::begin(usual), std::end(usual), lower) != std::end(usual);
+    return std::ranges::any_of(usual, [&](std::string_view one) { return equals_ignoring_case(name, one); });
 }
 
 Result<std::vector<VertexArray>> arrays_of_cut(const Cut& cut, const ExtractedMesh& extracted,

@@ -79,7 +79,7 @@ json gltf_material(const Material& material, json& document, std::vector<File>& 
 
 } // namespace
 
-Result<SourceDocument> as_gltf(SourceDocument document, std::vector<Message>& notes) {
+SourceDocument as_gltf(SourceDocument document, std::vector<Message>& notes) {
     if (document.format == SourceDocument::Format::gltf) return document;
     MtlContents contents;
     for (const File& file : document.files) {
@@ -244,7 +244,7 @@ std::vector<std::string> material_names(const json& document) {
 
 } // namespace
 
-Result<SourceDocument> as_obj(SourceDocument document, const std::string& library, std::vector<Message>& notes) {
+SourceDocument as_obj(SourceDocument document, const std::string& library, std::vector<Message>& notes) {
     if (document.format == SourceDocument::Format::obj) return document;
     const json source = gltf::parse_json(document.json);
     const std::vector<std::string> names = material_names(source);

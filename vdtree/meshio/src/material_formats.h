@@ -9,10 +9,10 @@
 namespace unseen::meshio {
 
 // The materials of OBJ libraries as glTF materials, objects as nodes. What got lost is told in the notes.
-Result<SourceDocument> as_gltf(SourceDocument document, std::vector<Message>& notes);
+SourceDocument as_gltf(SourceDocument document, std::vector<Message>& notes);
 
 // The materials of glTF as a library LIBRARY.mtl, its nodes as objects, all in the world's frame; images that lay in
 // the file become files beside it. May throw what nlohmann::json and the glTF reader throw.
-Result<SourceDocument> as_obj(SourceDocument document, const std::string& library, std::vector<Message>& notes);
+SourceDocument as_obj(SourceDocument document, const std::string& library, std::vector<Message>& notes);
 
 } // namespace unseen::meshio

@@ -124,7 +124,7 @@ void finish_document(SourceDocument& document, const Mesh& mesh) {
 }
 
 // "vertex 3 has a NaN or infinite coordinate (the first of 7 such vertices); face 9 uses ...".
-std::string text_of(const BadParts& bad) {
+std::string described(const BadParts& bad) {
     const auto first_of = [](const std::string& first, std::uint64_t count, const char* such) {
         return first + (count > 1 ? " (the first of " + std::to_string(count) + " such " + such + ")" : "");
     };
@@ -135,24 +135,22 @@ std::string text_of(const BadParts& bad) {
 
 // Faces without a shape are an error unless they are to be left out; bad vertices that no face uses do no harm. Bad
 // vertices get a place that does not stretch the mesh.
-Result<void> settle_bad_parts(const MeshSource& source, ReadResult& result) {
-    if (!result.bad.any()) return {};
-    const std::string text = text_of(result.bad);
+void settle_bad_parts(const MeshSource& source, ReadResult& result) {
+    if (!result.bad.any()) return;
+    const std::string text = described(result.bad);
     if (result.bad.left_out == 0) {
         result.warnings.push_back(text + "; no face uses " + (result.bad.vertices == 1 ? "it." : "them."));
     } else {
         if (!source.options.skip_bad)
-            return malformed(source, text + ". Correct it, or leave out the faces concerned with " +
-                                         Message::of("{read.skip_bad}."));
-        if (result.mesh.triangles.empty())
-            return malformed(source, "no face is left without the bad ones: " + text + ".");
+            throw Fault{text + ". Correct it, or leave out the faces concerned with " +
+                        Message::of("{read.skip_bad}.")};
+        if (result.mesh.triangles.empty()) fail("no face is left without the bad ones: ", text, ".");
         result.warnings.push_back(counted_were(result.bad.left_out, "face") + " left out: " + text + ".");
     }
-    if (result.mesh.triangles.empty()) return {};
+    if (result.mesh.triangles.empty()) return;
     const glm::dvec3 place = result.mesh.positions[result.mesh.triangles.front().front()];
     for (glm::dvec3& position : result.mesh.positions)
         if (!is_finite(position)) position = place;
-    return {};
 }
 
 // STL files are welded where they are read.
@@ -164,43 +162,27 @@ void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
 
 } // namespace
 
-Error too_large(const std::string& name) {
-    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
-}
-
-Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result) {
-    if (const Result<void> settled = settle_bad_parts(source, result); !settled) return settled.error();
+ReadResult finish_reading(const MeshSource& source, ReadResult result) {
+    settle_bad_parts(source, result);
     // Before the checks: they would accept a mesh without triangles.
-    if (result.mesh.triangles.empty()) return malformed(source, "it holds no triangles; give a file with faces.");
-    if (const Result<void> valid = validate(result.mesh.view()); !valid)
-        return malformed(source, valid.error().message);
+    if (result.mesh.triangles.empty()) fail("it holds no triangles; give a file with faces.");
+    if (const Result<void> valid = validate(result.mesh.view()); !valid) throw Fault{valid.error().message};
     repair_attributes(result);
     if (result.document) finish_document(*result.document, result.mesh);
     result.dropped_triangles = drop_degenerate_triangles(result.mesh);
     if (result.mesh.triangles.empty())
-        return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +
-                                     " triangles use a vertex twice, so none is left; give a file with proper faces.");
+        fail("all of its ", result.dropped_triangles,
+             " triangles use a vertex twice, so none is left; give a file with proper faces.");
     check_normals(result);
     hint_at_unwelded(source, result);
     return result;
 }
 
-bool MeshSource::keep_going(std::uint64_t bytes_done, const char* stage) const {
-    if (!options.progress) return true;
+void MeshSource::report(std::uint64_t bytes_done, const char* stage) const {
     const double total = static_cast<double>(std::max<std::size_t>(bytes.size(), 1));
-    return options.progress(std::min(1.0, static_cast<double>(bytes_done) / total), stage);
+    if (options.progress && !options.progress(std::min(1.0, static_cast<double>(bytes_done) / total), stage))
+        throw Fault{"reading was cancelled.", ErrorCode::cancelled};
 }
-
-Error malformed(const MeshSource& source, const Message& what) {
-    return {ErrorCode::malformed_data, source.name + ": " + what};
-}
-Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what) {
-    return malformed(source, "line " + std::to_string(line) + ": " + what);
-}
-Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what) {
-    return malformed(source, "byte " + std::to_string(byte) + ": " + what);
-}
-Error cancelled(const MeshSource& source) { return {ErrorCode::cancelled, source.name + ": reading was cancelled."}; }
 
 std::string counted_were(std::uint64_t count, const std::string& noun) {
     return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");
@@ -213,27 +195,18 @@ glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding) {
 
 Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name, const ReadOptions& options,
                                    const fs::path& folder) {
-    const std::string shown_name = name.string();
     if (bytes.starts_with(utf8_mark)) bytes.remove_prefix(utf8_mark.size());
-    const MeshSource source{bytes, shown_name, folder, options};
-    if (bytes.empty()) return malformed(source, "it is empty; give a file with a mesh in it.");
-    if (const char* compression = compression_of(bytes))
-        return malformed(source, std::string("it is compressed with ") + compression + "; decompress it first.");
-    const Format* const format = find_format(bytes, name);
-    if (bytes.starts_with("# vtk DataFile"))
-        return malformed(source,
-                         "it is a legacy file of VTK, which is not read; save it as .vtp (in ParaView: Save Data).");
-    if (format == nullptr)
-        return malformed(source, "it is neither PLY, OBJ, OFF, STL, glTF nor VTK's VTP; convert it to one of them.");
-    try {
-        Result<ReadResult> result = format->read(source);
-        if (!result) return result;
-        return finish_reading(source, std::move(result).value());
-    } catch (const std::bad_alloc&) {
-        return too_large(shown_name);
-    } catch (const std::length_error&) { // what a vector throws instead beyond its largest size
-        return too_large(shown_name);
-    }
+    const MeshSource source{bytes, name.string(), folder, options};
+    return reported<ReadResult>(source, [&] {
+        if (bytes.empty()) fail("it is empty; give a file with a mesh in it.");
+        if (const char* compression = compression_of(bytes))
+            fail("it is compressed with ", compression, "; decompress it first.");
+        const Format* const format = find_format(bytes, name);
+        if (bytes.starts_with("# vtk DataFile"))
+            fail("it is a legacy file of VTK, which is not read; save it as .vtp (in ParaView: Save Data).");
+        if (format == nullptr) fail("it is neither PLY, OBJ, OFF, STL, glTF nor VTK's VTP; convert it to one of them.");
+        return finish_reading(source, format->read(source));
+    });
 }
 
 Result<ReadResult> read_mesh(const fs::path& file, const ReadOptions& options) {

@@ -72,10 +72,8 @@ public:
     }
 
     void write_header(FileOutput& out) const {
-        constexpr const char* names[] = {"char", "uchar", "short", "ushort", "int", "uint", "", "", "float", "double"};
         for (const PlyColumn& column : columns_)
-            out.text(std::string("property ") + names[static_cast<std::size_t>(column.type) - 1] + " " + column.name +
-                     "\n");
+            out.text(text_of("property ", ply::classic_name(column.type), " ", column.name, "\n"));
     }
     void write_row(FileOutput& out, std::size_t vertex) const {
         for (const PlyColumn& column : columns_) {

@@ -40,7 +40,8 @@ Result<void> write_file(const std::filesystem::path& file, Write&& write) {
     Result<vdtree::AtomicFile> target = vdtree::AtomicFile::create(file);
     if (!target) return target.error();
     FileOutput out(std::move(*target));
-    if (const Result<void> written = write(out); !written) return written;
+    if constexpr (std::is_void_v<decltype(write(out))>) write(out);
+    else if (const Result<void> written = write(out); !written) return written;
     return out.finish();
 }
 

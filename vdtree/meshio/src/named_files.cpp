@@ -99,17 +99,17 @@ void LostImages::add(const Message& why) {
     if (std::find(whys.begin(), whys.end(), why) == whys.end()) whys.push_back(why);
 }
 
-void warn_of_lost_images(const LostImages& lost, ReadResult& result) {
+void warn_of_lost_images(const LostImages& lost, std::span<const MeshRange> ranges, std::vector<Message>& warnings) {
     if (lost.whys.empty()) return;
     std::uint64_t triangles = 0;
-    for (const MeshRange& range : result.mesh.ranges)
+    for (const MeshRange& range : ranges)
         if (range.kind == MeshRange::Kind::material && lost.materials.contains(range.name))
             triangles += range.triangle_count;
     std::string warning = counted_were(lost.whys.size(), "image") + " not read";
     if (!lost.materials.empty())
-        warning += ", so " + std::to_string(triangles) + (triangles == 1 ? " triangle shows" : " triangles show") +
-                   " the colour of the material alone";
-    result.warnings.push_back(warning + (lost.whys.size() == 1 ? ": " : "; the first: ") + lost.whys.front() + ".");
+        warning += text_of(", so ", triangles, triangles == 1 ? " triangle shows" : " triangles show",
+                           " the colour of the material alone");
+    warnings.push_back(warning + (lost.whys.size() == 1 ? ": " : "; the first: ") + lost.whys.front() + ".");
 }
 
 } // namespace unseen::meshio

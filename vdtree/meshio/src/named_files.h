@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,6 +57,6 @@ struct LostImages {
 void warn_of_missing_uvs(std::uint64_t triangles, ReadResult& result);
 
 // Warns of lost images, with the number of triangles that are drawn without.
-void warn_of_lost_images(const LostImages& lost, ReadResult& result);
+void warn_of_lost_images(const LostImages& lost, std::span<const MeshRange> ranges, std::vector<Message>& warnings);
 
 } // namespace unseen::meshio

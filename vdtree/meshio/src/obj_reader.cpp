@@ -4,17 +4,13 @@
 #include "mtl_reader.h"
 #include "polygon_triangulator.h"
 #include "text_scanner.h"
-#include <unseen/vdtree/internal/finite.h>
+#include "weld.h"
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <memory>
-#include <numeric>
-#include <random>
 #include <set>
 #include <unordered_map>
 #include <vector>
@@ -26,6 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr Index none = std::numeric_limits<Index>::max(); // a corner without UV or normal
+constexpr const char* too_many_vertices = "it has more vertices than 32-bit indices can number; split the mesh.";
 // Statements of surfaces, curves, display and grouping that change no triangle.
 constexpr std::string_view ignored_keywords[] = {
     "s",          "l",         "p",      "vp",     "mg",     "lod",  "bevel", "c_interp", "d_interp",
@@ -41,43 +38,20 @@ struct Corner {
 };
 
 // Seeded, because a file could be made to have all its corners in one bucket.
-class CornerHash {
-public:
-    explicit CornerHash(std::uint64_t seed) : seed_(seed) {}
-    std::size_t operator()(const Corner& c) const noexcept {
-        std::uint64_t h = mix(seed_ ^ c.position);
-        h = mix(h ^ c.uv);
-        return static_cast<std::size_t>(mix(h ^ c.normal));
+struct CornerHash {
+    SeededHash seeded = SeededHash::random();
+    std::size_t operator()(const Corner& c) const {
+        return static_cast<std::size_t>(SeededHash(seeded).add(c.position).add(c.uv).add(c.normal).value());
     }
-
-private:
-    // Finaliser of SplitMix64 (S. Vigna, public domain).
-    static std::uint64_t mix(std::uint64_t x) {
-        x += 0x9E3779B97F4A7C15u;
-        x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
-        x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
-        return x ^ (x >> 31);
-    }
-    std::uint64_t seed_;
 };
 
 // For each value the number of the first equal one, so that equal attributes are not told apart by their numbers.
 template <class Vector>
 std::vector<Index> first_equal(const std::vector<Vector>& values) {
-    std::vector<Index> order(values.size());
-    std::iota(order.begin(), order.end(), Index{0});
-    // By bits: NaN has no place in an order of values.
-    const auto compare = [&](Index a, Index b) { return std::memcmp(&values[a], &values[b], sizeof(Vector)); };
-    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-        const int c = compare(a, b);
-        return c != 0 ? c < 0 : a < b;
-    });
-    std::vector<Index> first(values.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        const bool is_repeated = i > 0 && compare(order[i - 1], order[i]) == 0;
-        first[order[i]] = is_repeated ? first[order[i - 1]] : order[i];
-    }
-    return first;
+    const std::span<const Vector> all(values);
+    return find_first_same(
+        values.size(), [&](SeededHash& hash, std::size_t i) { add_bits(hash, all, i); },
+        [&](std::size_t a, std::size_t b) { return has_same_bits(all, a, b); });
 }
 
 // Gives every combination of position, UV and normal a vertex: the first one of a position its own number, so that
@@ -86,25 +60,21 @@ class VertexTable {
 public:
     VertexTable(std::size_t position_count, const std::vector<glm::vec2>& uvs, const std::vector<glm::vec3>& normals)
         : first_(position_count), first_uv_(first_equal(uvs)), first_normal_(first_equal(normals)),
-          others_(16, CornerHash(std::random_device{}())), next_(position_count) {}
+          next_(position_count) {}
 
-    // The vertex of a corner. False where 32 bits do not suffice.
-    bool find(Corner corner, Index& vertex) {
+    // The vertex of a corner.
+    Index find(Corner corner) {
         if (corner.uv != none) corner.uv = first_uv_[corner.uv];
         if (corner.normal != none) corner.normal = first_normal_[corner.normal];
         Corner& first = first_[corner.position];
         if (first.position == none) first = corner;
-        vertex = corner.position;
-        if (first == corner) return true;
-
+        if (first == corner) return corner.position;
         const auto [found, is_new] = others_.try_emplace(corner, static_cast<Index>(next_));
         if (is_new) {
-            if (next_ >= none) return false;
+            if (next_++ >= none) fail_unsupported(too_many_vertices);
             added_.push_back(corner);
-            ++next_;
         }
-        vertex = found->second;
-        return true;
+        return found->second;
     }
 
     const std::vector<Corner>& first() const { return first_; } // position none: in no face
@@ -175,14 +145,13 @@ class ObjReader {
 public:
     explicit ObjReader(const MeshSource& source) : source_(source) {}
 
-    Result<ReadResult> read() {
+    ReadResult read() {
         if (const std::size_t nul = source_.bytes.find('\0'); nul != std::string_view::npos)
-            return malformed_line(source_, line_number(source_.bytes, nul),
-                                  "a NUL byte, which no OBJ text contains; the file is damaged or no OBJ file.");
-        if (Result<void> done = read_vertices(); !done) return done.error();
-        if (Result<void> done = read_faces(); !done) return done.error();
+            fail("line ", line_number(source_.bytes, nul),
+                 ": a NUL byte, which no OBJ text contains; the file is damaged or no OBJ file.");
+        read_vertices();
+        read_faces();
         add_attributes();
-        if (has_index_overflow_) return too_many_vertices();
         add_warnings();
         keep_materials();
         keep_document();
@@ -190,65 +159,68 @@ public:
     }
 
 private:
-    // ---- first pass ----
-
-    Result<void> read_vertices() {
+    // Calls read(keyword, rest) for each statement of the file. `done`: bytes that were read before.
+    template <class Read>
+    void for_each_statement(std::size_t done, Read&& read) {
         StatementScanner statements(source_.bytes);
         std::string_view keyword, rest;
         while (statements.next(keyword, rest)) {
-            Result<void> done;
-            if (keyword == "v") done = add_position(rest, statements.line());
-            else if (keyword == "vt") done = add_uv(rest, statements.line());
-            else if (keyword == "vn") done = add_normal(rest, statements.line());
-            if (!done) return done;
-            if (++statements_ % rows_per_progress == 0 && !source_.keep_going(statements.position() / 2, "reading OBJ"))
-                return cancelled(source_);
+            line_ = statements.line();
+            read(keyword, rest);
+            source_.report_row(++statements_, done + statements.position() / 2, "reading OBJ");
         }
-        if (std::max({positions().size(), uvs_.size(), normals_.size()}) >= none) return too_many_vertices();
-        return {};
+    }
+
+    template <class... Parts>
+    [[noreturn]] void fail_here(const Parts&... parts) const {
+        fail("line ", line_, ": ", parts...);
+    }
+
+    // ---- first pass ----
+
+    void read_vertices() {
+        for_each_statement(0, [&](std::string_view keyword, std::string_view rest) {
+            if (keyword == "v") add_position(rest);
+            else if (keyword == "vt") add_uv(rest);
+            else if (keyword == "vn") add_normal(rest);
+        });
+        if (std::max({positions().size(), uvs_.size(), normals_.size()}) >= none) fail_unsupported(too_many_vertices);
     }
 
     // v X Y Z [W], v X Y Z R G B or v X Y Z R G B A. W weighs control points of curves and is of no use here.
-    Result<void> add_position(std::string_view rest, std::uint64_t line) {
+    void add_position(std::string_view rest) {
         std::array<double, 7> n{};
         const int count = parse_numbers(rest, n.data(), 7);
         if (count != 3 && count != 4 && count != 6 && count != 7)
-            return bad(line, "vertex " + std::to_string(positions().size() + 1) +
-                                 " needs 3 numbers, or 6 with a colour; correct " + in_quotes(trimmed(rest)) + ".");
+            fail_here("vertex ", positions().size() + 1, " needs 3 numbers, or 6 with a colour; correct ",
+                      in_quotes(trimmed(rest)), ".");
         positions().emplace_back(n[0], n[1], n[2]);
-        check_position(result_.bad, positions().back(), [&] {
-            return "line " + std::to_string(line) + ": vertex " + std::to_string(positions().size());
-        });
-        if (count >= 6) {
-            colours_.resize(positions().size() - 1, missing_colour);
-            colours_.push_back(
-                decode_colour(glm::vec4(n[3], n[4], n[5], count == 7 ? n[6] : 1.0), source_.options.colours));
-        }
-        return {};
+        check_position(result_.bad, positions().back(),
+                       [&] { return text_of("line ", line_, ": vertex ", positions().size()); });
+        if (count < 6) return;
+        colours_.resize(positions().size() - 1, missing_colour);
+        colours_.push_back(
+            decode_colour(glm::vec4(n[3], n[4], n[5], count == 7 ? n[6] : 1.0), source_.options.colours));
     }
 
-    Result<void> add_uv(std::string_view rest, std::uint64_t line) {
+    void add_uv(std::string_view rest) {
         std::array<double, 3> n{};
         if (parse_numbers(rest, n.data(), 3) < 1)
-            return bad(line, "a texture coordinate needs 1 to 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
+            fail_here("a texture coordinate needs 1 to 3 numbers; correct ", in_quotes(trimmed(rest)), ".");
         uvs_.emplace_back(n[0], n[1]);
-        return {};
     }
 
-    Result<void> add_normal(std::string_view rest, std::uint64_t line) {
+    void add_normal(std::string_view rest) {
         std::array<double, 3> n{};
         if (parse_numbers(rest, n.data(), 3) != 3)
-            return bad(line, "a normal needs 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
+            fail_here("a normal needs 3 numbers; correct ", in_quotes(trimmed(rest)), ".");
         normals_.emplace_back(n[0], n[1], n[2]);
-        return {};
     }
 
     // ---- second pass ----
 
-    Result<void> read_faces() {
-        StatementScanner statements(source_.bytes);
-        std::string_view keyword, rest;
-        while (statements.next(keyword, rest)) {
+    void read_faces() {
+        for_each_statement(source_.bytes.size() / 2, [&](std::string_view keyword, std::string_view rest) {
             if (keyword == "v") {
                 ++positions_seen_;
             } else if (keyword == "vt") {
@@ -256,30 +228,26 @@ private:
             } else if (keyword == "vn") {
                 ++normals_seen_;
             } else if (keyword == "f" || keyword == "fo") { // fo: what f was called before version 3
-                if (Result<void> done = add_face(rest, statements.line()); !done) return done;
+                add_face(rest);
             } else if (keyword == "g" || keyword == "o") {
                 start_range(group_, rest, MeshRange::Kind::group);
                 change_part(keyword == "g" ? &SourceDocument::Part::group : &SourceDocument::Part::object, rest);
             } else if (keyword == "mtllib") {
-                read_materials(rest, statements.line());
+                read_materials(rest);
             } else if (keyword == "usemtl") {
                 start_range(material_, rest, MeshRange::Kind::material);
                 change_part(&SourceDocument::Part::material, rest);
-            } else {
-                note_unknown(keyword, statements.line());
+            } else if (std::ranges::find(ignored_keywords, keyword) == std::end(ignored_keywords) && unknown_++ == 0) {
+                first_unknown_ = text_of(in_quotes(keyword), " in line ", line_);
             }
-            if (++statements_ % rows_per_progress == 0 &&
-                !source_.keep_going(source_.bytes.size() / 2 + statements.position() / 2, "reading OBJ"))
-                return cancelled(source_);
-        }
+        });
         end_range(group_);
         end_range(material_);
         std::stable_sort(ranges().begin(), ranges().end(),
                          [](const MeshRange& a, const MeshRange& b) { return a.first_triangle < b.first_triangle; });
-        return {};
     }
 
-    Result<void> add_face(std::string_view rest, std::uint64_t line) {
+    void add_face(std::string_view rest) {
         corners_.clear();
         is_whole_ = true;
         const char* at = rest.data();
@@ -287,21 +255,19 @@ private:
         for (;;) {
             while (at != end && is_blank(*at)) ++at;
             if (at == end || *at == '#') break;
-            Corner corner;
-            if (Result<void> done = parse_corner(at, end, line, corner); !done) return done;
-            corners_.push_back(corner);
+            corners_.push_back(parse_corner(at, end));
         }
         ++result_.source_faces;
-        if (!is_whole_) return {};
+        if (!is_whole_) return;
         if (corners_.size() < 3) {
             ++small_faces_;
-            return {};
+            return;
         }
         points_.clear();
         for (const Corner& corner : corners_) points_.push_back(positions()[corner.position]);
         if (result_.bad.vertices > 0 && !std::all_of(points_.begin(), points_.end(), is_finite<double>)) {
             ++result_.bad.left_out;
-            return {};
+            return;
         }
         begin_triangle();
         auto& [has_normals, has_uvs] = part_attributes_[document_.runs.back().part];
@@ -309,51 +275,48 @@ private:
             has_normals = has_normals || corner.normal != none;
             has_uvs = has_uvs || corner.uv != none;
         }
-        polygons_.triangulate(points_, [&](const Triangle& t) {
-            triangle_corners_.push_back(corners_[t[0]]);
-            triangle_corners_.push_back(corners_[t[1]]);
-            triangle_corners_.push_back(corners_[t[2]]);
-        });
-        return {};
+        for (const Triangle& triangle : polygons_.cut(points_))
+            for (const Index corner : triangle) triangle_corners_.push_back(corners_[corner]);
     }
 
     // V, V/T, V//N or V/T/N; the numbers may be left out after a slash.
-    Result<void> parse_corner(const char*& at, const char* end, std::uint64_t line, Corner& corner) {
+    Corner parse_corner(const char*& at, const char* end) {
         const char* const start = at;
         const char* const word_end = std::find_if(at, end, is_blank);
-        const auto bad_corner = [&] {
-            return bad(line, "a corner of the face is " + in_quotes({start, word_end}) +
-                                 " and should be like 1, 1/2, 1//3 or 1/2/3; correct it.");
+        const auto check = [&](bool is_corner) {
+            if (!is_corner)
+                fail_here("a corner of the face is ", in_quotes({start, word_end}),
+                          " and should be like 1, 1/2, 1//3 or 1/2/3; correct it.");
         };
+        Corner corner;
         std::int64_t number = 0;
         at = parse_integer(at, word_end, number);
-        if (at == nullptr) return bad_corner();
+        check(at != nullptr);
         if (!resolve(number, positions_seen_, positions().size(), corner.position) && is_whole_) {
             is_whole_ = false;
             leave_out_face(result_.bad, [&] {
-                return "line " + std::to_string(line) + ": face " + std::to_string(result_.source_faces + 1) +
-                       " uses vertex " + std::to_string(number) + ", but there are " +
-                       std::to_string(number < 0 ? positions_seen_ : positions().size()) +
-                       (number == 0  ? ", numbered from 1"
-                        : number < 0 ? " before it"
-                                     : "");
+                return text_of("line ", line_, ": face ", result_.source_faces + 1, " uses vertex ", number,
+                               ", but there are ", number < 0 ? positions_seen_ : positions().size(),
+                               number == 0  ? ", numbered from 1"
+                               : number < 0 ? " before it"
+                                            : "");
             });
         }
         for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
             ++at;
             if (at == word_end || *at == '/') continue;
             at = parse_integer(at, word_end, number);
-            if (at == nullptr) return bad_corner();
+            check(at != nullptr);
             const bool is_there = slash == 0 ? resolve(number, uvs_seen_, uvs_.size(), corner.uv)
                                              : resolve(number, normals_seen_, normals_.size(), corner.normal);
             if (!is_there && lost_attributes_++ == 0)
-                first_lost_attribute_ = std::string(slash == 0 ? "texture coordinate " : "normal ") +
-                                        std::to_string(number) + " in line " + std::to_string(line);
+                first_lost_attribute_ =
+                    text_of(slash == 0 ? "texture coordinate " : "normal ", number, " in line ", line_);
         }
-        if (at != word_end) return bad_corner();
+        check(at == word_end);
         has_uvs_ = has_uvs_ || corner.uv != none;
         has_normals_ = has_normals_ || corner.normal != none;
-        return {};
+        return corner;
     }
 
     // Positive numbers count from 1 in the file, negative ones back from the last that came before the face. False if
@@ -368,21 +331,20 @@ private:
     // ---- groups and materials ----
 
     // One name with blanks in it, or several.
-    void read_materials(std::string_view rest, std::uint64_t line) {
+    void read_materials(std::string_view rest) {
         rest = trimmed(rest);
-        if (rest.empty()) return;
-        if (read_library(rest, line, rest.find_first_of(" \t") == rest.npos)) return;
-        while (!(rest = trimmed(rest)).empty()) read_library(take_word(rest), line, true);
+        if (rest.empty() || read_library(rest, rest.find_first_of(" \t") == rest.npos)) return;
+        while (!(rest = trimmed(rest)).empty()) read_library(take_word(rest), true);
     }
 
     // False if it is not there; warns of that only if it must be.
-    bool read_library(std::string_view name, std::uint64_t line, bool must_be_there) {
+    bool read_library(std::string_view name, bool must_be_there) {
         if (libraries_.contains(std::string(name))) return true; // it is often named again and again
         const NamedFile library = files_.find(name);
         if (!library.bytes && !must_be_there) return false;
         libraries_.emplace(name);
         if (!library.bytes)
-            warn("line " + std::to_string(line) + ": the materials of a library were left out: " + library.why + ".");
+            warn(text_of("line ", line_, ": the materials of a library were left out: ") + library.why + ".");
         else has_library_ = true;
         if (library.uri.empty()) return true;
         const fs::path folder = fs::path(library.uri).parent_path();
@@ -422,7 +384,7 @@ private:
             for (Material& material : result_.materials) material.image.clear(), material.image_bytes.reset();
             return;
         }
-        warn_of_lost_images(library_.lost, result_);
+        warn_of_lost_images(library_.lost, ranges(), result_.warnings);
         std::set<std::string> textured;
         for (const Material& material : result_.materials)
             if (material.has_image()) textured.insert(material.name);
@@ -478,12 +440,6 @@ private:
         open.is_open = false;
     }
 
-    void note_unknown(std::string_view keyword, std::uint64_t line) {
-        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) != std::end(ignored_keywords))
-            return;
-        if (unknown_++ == 0) first_unknown_ = in_quotes(keyword) + " in line " + std::to_string(line);
-    }
-
     // ---- vertices with attributes ----
 
     void add_attributes() {
@@ -501,8 +457,7 @@ private:
         Mesh& mesh = result_.mesh;
         VertexTable table(mesh.positions.size(), uvs_, normals_);
         for (std::size_t i = 0; i < triangle_corners_.size(); ++i)
-            has_index_overflow_ =
-                !table.find(triangle_corners_[i], mesh.triangles[i / 3][i % 3]) || has_index_overflow_;
+            mesh.triangles[i / 3][i % 3] = table.find(triangle_corners_[i]);
         const std::size_t vertices = mesh.positions.size() + table.added().size();
         if (has_uvs_) mesh.uvs.reserve(vertices);
         if (has_normals_) mesh.normals.reserve(vertices);
@@ -530,8 +485,9 @@ private:
         if (unknown_ > 0)
             warn(counted_were(unknown_, "line") + " skipped for an unknown keyword, the first " + first_unknown_ + ".");
         if (lost_attributes_ > 0)
-            warn(std::to_string(lost_attributes_) + (lost_attributes_ == 1 ? " corner goes" : " corners go") +
-                 " without a normal or texture coordinate that is not there, the first " + first_lost_attribute_ + ".");
+            warn(text_of(lost_attributes_, lost_attributes_ == 1 ? " corner goes" : " corners go",
+                         " without a normal or texture coordinate that is not there, the first ", first_lost_attribute_,
+                         "."));
         if (has_library_) warn_of_unknown_materials();
         if (const auto fanned = polygons_.fanned_concave(); fanned > 0)
             warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
@@ -543,17 +499,12 @@ private:
         for (const MeshRange& range : ranges())
             if (range.kind == MeshRange::Kind::material && !known.contains(range.name)) unknown.insert(range.name);
         if (!unknown.empty())
-            warn(std::to_string(unknown.size()) + (unknown.size() == 1 ? " material is" : " materials are") +
-                 " in no library that was read, the first " + in_quotes(*unknown.begin()) +
-                 "; its faces are left as they are.");
+            warn(text_of(unknown.size(), unknown.size() == 1 ? " material is" : " materials are",
+                         " in no library that was read, the first ", in_quotes(*unknown.begin()),
+                         "; its faces are left as they are."));
     }
 
-    Error too_many_vertices() const {
-        return {ErrorCode::unsupported,
-                source_.name + ": it has more vertices than 32-bit indices can number; split the mesh."};
-    }
     void warn(Message sentence) { result_.warnings.push_back(std::move(sentence)); }
-    Error bad(std::uint64_t line, const std::string& what) const { return malformed_line(source_, line, what); }
     std::vector<glm::dvec3>& positions() { return result_.mesh.positions; }
     std::vector<MeshRange>& ranges() { return result_.mesh.ranges; }
 
@@ -571,7 +522,6 @@ private:
     bool is_whole_ = true;                 // all that the face uses is there
     bool has_uvs_ = false;
     bool has_normals_ = false;
-    bool has_index_overflow_ = false;
     OpenRange group_, material_;
     NamedFiles files_{source_};
     std::set<std::string> libraries_; // that were asked for
@@ -587,7 +537,7 @@ private:
     bool part_changes_ = true; // since the last triangle
     bool has_parts_ = false;   // by objects or materials
     PolygonTriangulator polygons_;
-    std::uint64_t statements_ = 0;
+    std::uint64_t statements_ = 0, line_ = 0;
     std::uint64_t small_faces_ = 0;
     std::uint64_t unknown_ = 0, lost_attributes_ = 0;
     std::string first_unknown_, first_lost_attribute_;
@@ -595,6 +545,6 @@ private:
 
 } // namespace
 
-Result<ReadResult> read_obj(const MeshSource& source) { return ObjReader(source).read(); }
+ReadResult read_obj(const MeshSource& source) { return ObjReader(source).read(); }
 
 } // namespace unseen::meshio

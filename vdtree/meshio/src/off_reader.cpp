@@ -46,66 +46,56 @@ class OffReader {
 public:
     explicit OffReader(const MeshSource& source) : source_(source), words_(source.bytes, true) {}
 
-    Result<ReadResult> read() {
-        if (Result<void> header = read_header(); !header) return header.error();
-        if (Result<void> vertices = read_vertices(); !vertices) return vertices.error();
-        if (Result<void> faces = read_faces(); !faces) return faces.error();
+    ReadResult read() {
+        read_header();
+        read_vertices();
+        decode_colours();
+        read_faces();
         return std::move(result_);
     }
 
 private:
-    Result<void> read_header() {
+    void read_header() {
         std::string_view word = words_.next();
         if (const Keyword keyword = parse_keyword(word); keyword.is_off) {
             keyword_ = keyword;
             word = words_.next();
         }
-        if (word == "BINARY") return unsupported("binary OFF is not read; convert it to ASCII OFF or PLY.");
+        if (word == "BINARY") fail_unsupported("binary OFF is not read; convert it to ASCII OFF or PLY.");
         if (keyword_.is_other_dimension)
-            return unsupported("4OFF and nOFF are not read; project it to three dimensions.");
-        if (Result<void> done = to_count(word, "vertices", vertex_count_); !done) return done;
-        if (Result<void> done = to_count(words_.next(), "faces", face_count_); !done) return done;
+            fail_unsupported("4OFF and nOFF are not read; project it to three dimensions.");
+        vertex_count_ = to_count(word, "vertices");
+        face_count_ = to_count(words_.next(), "faces");
         // The number of edges is there in most files, and nobody needs it.
         words_.next_in_line();
-        return check_counts();
-    }
-
-    Result<void> check_counts() {
         const std::uint64_t left = words_.remaining() + 1; // the last line may lack its newline
         if (vertex_count_ > left / min_vertex_bytes || face_count_ > left / min_face_bytes)
-            return malformed(source_, "it claims " + std::to_string(vertex_count_) + " vertices and " +
-                                          std::to_string(face_count_) + " faces, but only " +
-                                          std::to_string(words_.remaining()) +
-                                          " bytes are left for them; the file is cut short or its counts are wrong.");
+            fail("it claims ", vertex_count_, " vertices and ", face_count_, " faces, but only ", words_.remaining(),
+                 " bytes are left for them; the file is cut short or its counts are wrong.");
         if (vertex_count_ > std::numeric_limits<Index>::max())
-            return malformed(source_, "it has more vertices than 32-bit indices can number; split the mesh.");
-        return {};
+            fail("it has more vertices than 32-bit indices can number; split the mesh.");
     }
 
-    Result<void> read_vertices() {
+    void read_vertices() {
         Mesh& mesh = result_.mesh;
         mesh.positions.reserve(vertex_count_);
         for (std::uint64_t i = 0; i < vertex_count_; ++i) {
-            if (!pulse(i)) return cancelled(source_);
+            source_.report_row(i, words_.position(), "reading OFF");
             glm::dvec3 p(0.0);
-            for (int axis = 0; axis < 3; ++axis)
-                if (Result<void> done = to_real(words_.next(), i, p[axis]); !done) return done;
+            for (int axis = 0; axis < 3; ++axis) p[axis] = to_real(words_.next(), i);
             mesh.positions.push_back(p);
-            check_position(result_.bad, p, [&] { return line() + "vertex " + std::to_string(i); });
-            if (keyword_.has_normals || keyword_.has_colours || keyword_.has_uvs) {
-                if (Result<void> done = read_attributes(i); !done) return done;
-            }
+            check_position(result_.bad, p, [&] { return text_of(line(), "vertex ", i); });
+            if (keyword_.has_normals || keyword_.has_colours || keyword_.has_uvs) read_attributes(i);
         }
-        return {};
     }
 
     // What follows the coordinates on their line: normal, then colour (3 or 4 numbers), then UV.
-    Result<void> read_attributes(std::uint64_t vertex) {
+    void read_attributes(std::uint64_t vertex) {
         std::array<double, max_extras> extra{};
         std::size_t count = 0;
         for (std::string_view word = words_.next_in_line(); !word.empty(); word = words_.next_in_line()) {
             if (count == max_extras) break;
-            if (Result<void> done = to_real(word, vertex, extra[count++]); !done) return done;
+            extra[count++] = to_real(word, vertex);
         }
         words_.skip_line();
         const std::size_t normal_size = keyword_.has_normals ? 3 : 0;
@@ -114,17 +104,14 @@ private:
         const bool has_right_count = count >= normal_size + uv_size &&
                                      (keyword_.has_colours ? colour_size == 3 || colour_size == 4 : colour_size == 0);
         if (!has_right_count)
-            return malformed_line(source_, words_.line(),
-                                  "vertex " + std::to_string(vertex) + " has " + std::to_string(count) +
-                                      " numbers behind its coordinates, which is not what the "
-                                      "first line of the file announces; correct one of them.");
+            fail(line(), "vertex ", vertex, " has ", count, " numbers behind its coordinates, which is not what the ",
+                 "first line of the file announces; correct one of them.");
         Mesh& mesh = result_.mesh;
         if (keyword_.has_normals) mesh.normals.emplace_back(extra[0], extra[1], extra[2]);
         if (keyword_.has_colours)
             mesh.colours.emplace_back(extra[normal_size], extra[normal_size + 1], extra[normal_size + 2],
                                       colour_size == 4 ? extra[normal_size + 3] : -1.0);
         if (keyword_.has_uvs) mesh.uvs.emplace_back(extra[count - 2], extra[count - 1]);
-        return {};
     }
 
     // Colours are 0..1 or 0..255, and only all of them together tell which.
@@ -139,59 +126,47 @@ private:
         }
     }
 
-    Result<void> read_faces() {
-        decode_colours();
+    void read_faces() {
         for (std::uint64_t i = 0; i < face_count_; ++i) {
-            if (!pulse(i)) return cancelled(source_);
-            std::int64_t size = 0;
-            if (Result<void> done = to_index(words_.next(), i, size); !done) return done;
+            source_.report_row(i, words_.position(), "reading OFF");
+            const std::int64_t size = to_index(words_.next(), i);
             if (size < 0 || static_cast<std::uint64_t>(size) > words_.remaining() / 2)
-                return malformed_line(source_, words_.line(),
-                                      "face " + std::to_string(i) + " claims " + std::to_string(size) +
-                                          " corners, more than the file can hold; correct it.");
+                fail(line(), "face ", i, " claims ", size, " corners, more than the file can hold; correct it.");
             corners_.resize(static_cast<std::size_t>(size));
-            for (std::int64_t& corner : corners_)
-                if (Result<void> done = to_index(words_.next(), i, corner); !done) return done;
-            faces_.add_polygon(corners_, {0, vertex_count_}, [&] { return line() + "face " + std::to_string(i); });
+            for (std::int64_t& corner : corners_) corner = to_index(words_.next(), i);
+            faces_.add_polygon(corners_, {0, vertex_count_}, [&] { return text_of(line(), "face ", i); });
             words_.skip_line(); // a colour may follow
         }
         faces_.warn();
-        return {};
     }
 
-    Result<void> to_count(std::string_view word, const char* what, std::uint64_t& count) {
+    std::uint64_t to_count(std::string_view word, const char* what) const {
         std::int64_t value = 0;
         if (!to_integer(word, value) || value < 0)
-            return malformed_line(source_, words_.line(),
-                                  std::string("the number of ") + what + " should stand here, not " + in_quotes(word) +
-                                      ".");
-        count = static_cast<std::uint64_t>(value);
-        return {};
+            fail(line(), "the number of ", what, " should stand here, not ", in_quotes(word), ".");
+        return static_cast<std::uint64_t>(value);
     }
 
-    Result<void> to_real(std::string_view word, std::uint64_t vertex, double& value) {
-        if (to_number(word, value)) return {};
-        return not_a_number("vertex " + std::to_string(vertex) + " of " + std::to_string(vertex_count_), word);
+    double to_real(std::string_view word, std::uint64_t vertex) const {
+        double value = 0;
+        if (!to_number(word, value)) fail_number(word, "vertex ", vertex, vertex_count_);
+        return value;
     }
 
-    Result<void> to_index(std::string_view word, std::uint64_t face, std::int64_t& value) {
-        if (to_integer(word, value)) return {};
-        return not_a_number("face " + std::to_string(face) + " of " + std::to_string(face_count_), word);
+    std::int64_t to_index(std::string_view word, std::uint64_t face) const {
+        std::int64_t value = 0;
+        if (!to_integer(word, value)) fail_number(word, "face ", face, face_count_);
+        return value;
     }
 
-    std::string line() const { return "line " + std::to_string(words_.line()) + ": "; }
-
-    Error not_a_number(const std::string& where, std::string_view word) const {
-        if (word.empty()) return malformed(source_, "it ends within " + where + "; the file is cut short.");
-        return malformed_line(source_, words_.line(),
-                              where + " has " + in_quotes(word) + " where a number should be; correct it.");
+    [[noreturn]] void fail_number(std::string_view word, const char* what, std::uint64_t number,
+                                  std::uint64_t count) const {
+        const std::string where = text_of(what, number, " of ", count);
+        if (word.empty()) fail("it ends within ", where, "; the file is cut short.");
+        fail(line(), where, " has ", in_quotes(word), " where a number should be; correct it.");
     }
 
-    Error unsupported(const std::string& what) const { return {ErrorCode::unsupported, source_.name + ": " + what}; }
-
-    bool pulse(std::uint64_t row) const {
-        return row % rows_per_progress != 0 || source_.keep_going(words_.position(), "reading OFF");
-    }
+    std::string line() const { return text_of("line ", words_.line(), ": "); }
 
     const MeshSource& source_;
     WordScanner words_;
@@ -207,6 +182,6 @@ private:
 
 bool starts_with_off_keyword(std::string_view bytes) { return parse_keyword(WordScanner(bytes, true).next()).is_off; }
 
-Result<ReadResult> read_off(const MeshSource& source) { return OffReader(source).read(); }
+ReadResult read_off(const MeshSource& source) { return OffReader(source).read(); }
 
 } // namespace unseen::meshio

@@ -10,10 +10,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
-#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -22,8 +20,6 @@ namespace unseen::meshio {
 using namespace ply;
 
 namespace {
-
-enum class Encoding : std::uint8_t { ascii, little_endian, big_endian };
 
 struct Property {
     std::string name;
@@ -39,232 +35,201 @@ struct Element {
 };
 
 struct Header {
-    Encoding encoding = Encoding::ascii;
+    std::optional<std::endian> order; // nothing: ASCII
     std::vector<Element> elements;
     std::size_t body = 0; // where the data start
 };
 
 std::optional<ValueType> to_type(std::string_view name) {
-    struct Name {
-        std::string_view classic, sized;
-        ValueType type;
-    };
-    static constexpr std::array<Name, 8> names{{{"char", "int8", ValueType::int8},
-                                                {"uchar", "uint8", ValueType::uint8},
-                                                {"short", "int16", ValueType::int16},
-                                                {"ushort", "uint16", ValueType::uint16},
-                                                {"int", "int32", ValueType::int32},
-                                                {"uint", "uint32", ValueType::uint32},
-                                                {"float", "float32", ValueType::float32},
-                                                {"double", "float64", ValueType::float64}}};
-    for (const Name& candidate : names)
-        if (name == candidate.classic || name == candidate.sized) return candidate.type;
+    for (const ValueType type : {ValueType::int8, ValueType::uint8, ValueType::int16, ValueType::uint16,
+                                 ValueType::int32, ValueType::uint32, ValueType::float32, ValueType::float64})
+        if (name == classic_name(type) || name == name_of(type)) return type;
     return std::nullopt;
 }
 
 // ---- header ----
 
-Result<Property> parse_property(const MeshSource& source, std::uint64_t line_number, std::string_view line) {
-    Property property;
-    std::string_view word = take_word(line);
-    if (word == "list") {
-        property.is_list = true;
-        word = take_word(line);
-        const auto count_type = to_type(word);
-        if (!count_type || !is_integer(*count_type))
-            return malformed_line(source, line_number,
-                                  "a list is counted by an integer type, not by " + in_quotes(word) +
-                                      "; correct the header.");
-        property.count_type = *count_type;
-        word = take_word(line);
-    }
-    const auto type = to_type(word);
-    if (!type) return malformed_line(source, line_number, in_quotes(word) + " is no type of PLY; correct the header.");
-    property.type = *type;
-    property.name = take_word(line);
-    if (property.name.empty()) return malformed_line(source, line_number, "the property has no name; give it one.");
-    return property;
-}
+class HeaderReader {
+public:
+    explicit HeaderReader(const MeshSource& source) : bytes_(source.bytes), lines_(bytes_) {}
 
-Result<Element> parse_element(const MeshSource& source, std::uint64_t line_number, std::string_view line) {
-    Element element;
-    element.name = take_word(line);
-    const std::string_view count = take_word(line);
-    const char* last = count.data() + count.size();
-    const auto [end, error] = std::from_chars(count.data(), last, element.count);
-    if (element.name.empty() || error != std::errc() || end != last)
-        return malformed_line(source, line_number,
-                              "an element needs a name and a count of 0 or more, not " + in_quotes(count) + ".");
-    return element;
-}
-
-Result<Encoding> parse_format(const MeshSource& source, std::uint64_t line_number, std::string_view line) {
-    const std::string_view name = take_word(line);
-    const std::string_view version = take_word(line);
-    if (version != "1.0")
-        return malformed_line(source, line_number,
-                              "version " + in_quotes(version) + " of PLY is unknown; expected 1.0.");
-    if (name == "ascii") return Encoding::ascii;
-    if (name == "binary_little_endian") return Encoding::little_endian;
-    if (name == "binary_big_endian") return Encoding::big_endian;
-    return malformed_line(source, line_number,
-                          "the format " + in_quotes(name) +
-                              " is unknown; expected ascii, "
-                              "binary_little_endian or binary_big_endian.");
-}
-
-// The byte after end_header's newline. A CR before an LF belongs to it unless the header's lines end in a lone CR: then
-// the LF is already data.
-std::size_t body_start(std::string_view bytes, std::size_t line_end) {
-    const std::size_t first_newline = bytes.find_first_of("\r\n");
-    const bool has_lone_cr = bytes[first_newline] == '\r' && bytes.substr(first_newline, 2) != "\r\n";
-    if (!has_lone_cr && bytes.substr(line_end, 2) == "\r\n") return line_end + 2;
-    return std::min(line_end + 1, bytes.size());
-}
-
-Result<Header> parse_header(const MeshSource& source) {
-    Header header;
-    bool has_format = false;
-    LineScanner lines(source.bytes);
-    std::string_view line;
-    lines.next(line); // "ply"
-    while (lines.next(line)) {
-        const std::string_view whole_line = line;
-        const std::string_view keyword = take_word(line);
-        if (keyword == "end_header") {
-            if (!has_format) return malformed(source, "its header has no format line; add one.");
-            const auto line_end = static_cast<std::size_t>(whole_line.data() - source.bytes.data()) + whole_line.size();
-            header.body = body_start(source.bytes, line_end);
-            return header;
+    Header read() {
+        bool has_format = false;
+        std::string_view line;
+        lines_.next(line); // "ply"
+        while (lines_.next(line)) {
+            const std::string_view whole_line = line;
+            const std::string_view keyword = take_word(line);
+            if (keyword == "end_header") {
+                if (!has_format) fail("its header has no format line; add one.");
+                header_.body =
+                    body_start(static_cast<std::size_t>(whole_line.data() - bytes_.data()) + whole_line.size());
+                return std::move(header_);
+            }
+            if (keyword == "format") {
+                read_format(line);
+                has_format = true;
+            } else if (keyword == "element") {
+                read_element(line);
+            } else if (keyword == "property") {
+                if (header_.elements.empty()) fail_here("a property before the first element; correct the header.");
+                read_property(line);
+            } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
+                fail_here(in_quotes(keyword), " is no keyword of a PLY header; the file may be damaged.");
+            }
         }
-        if (keyword == "format") {
-            const Result<Encoding> encoding = parse_format(source, lines.line(), line);
-            if (!encoding) return encoding.error();
-            header.encoding = *encoding;
-            has_format = true;
-        } else if (keyword == "element") {
-            Result<Element> element = parse_element(source, lines.line(), line);
-            if (!element) return element.error();
-            header.elements.push_back(std::move(*element));
-        } else if (keyword == "property") {
-            if (header.elements.empty())
-                return malformed_line(source, lines.line(), "a property before the first element; correct the header.");
-            Result<Property> property = parse_property(source, lines.line(), line);
-            if (!property) return property.error();
-            header.elements.back().properties.push_back(std::move(*property));
-        } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
-            return malformed_line(source, lines.line(),
-                                  in_quotes(keyword) + " is no keyword of a PLY header; the file may be damaged.");
-        }
+        fail("its header has no end_header line; the file may be cut short.");
     }
-    return malformed(source, "its header has no end_header line; the file may be cut short.");
-}
+
+private:
+    template <class... Parts>
+    [[noreturn]] void fail_here(const Parts&... parts) const {
+        fail("line ", lines_.line(), ": ", parts...);
+    }
+
+    void read_property(std::string_view line) {
+        Property property;
+        std::string_view word = take_word(line);
+        if (word == "list") {
+            property.is_list = true;
+            word = take_word(line);
+            const auto count_type = to_type(word);
+            if (!count_type || !is_integer(*count_type))
+                fail_here("a list is counted by an integer type, not by ", in_quotes(word), "; correct the header.");
+            property.count_type = *count_type;
+            word = take_word(line);
+        }
+        const auto type = to_type(word);
+        if (!type) fail_here(in_quotes(word), " is no type of PLY; correct the header.");
+        property.type = *type;
+        property.name = take_word(line);
+        if (property.name.empty()) fail_here("the property has no name; give it one.");
+        header_.elements.back().properties.push_back(std::move(property));
+    }
+
+    void read_element(std::string_view line) {
+        Element element;
+        element.name = take_word(line);
+        const std::string_view count = take_word(line);
+        const char* last = count.data() + count.size();
+        const auto [end, error] = std::from_chars(count.data(), last, element.count);
+        if (element.name.empty() || error != std::errc() || end != last)
+            fail_here("an element needs a name and a count of 0 or more, not ", in_quotes(count), ".");
+        header_.elements.push_back(std::move(element));
+    }
+
+    void read_format(std::string_view line) {
+        const std::string_view name = take_word(line), version = take_word(line);
+        if (version != "1.0") fail_here("version ", in_quotes(version), " of PLY is unknown; expected 1.0.");
+        if (name == "ascii") header_.order = std::nullopt;
+        else if (name == "binary_little_endian") header_.order = std::endian::little;
+        else if (name == "binary_big_endian") header_.order = std::endian::big;
+        else
+            fail_here("the format ", in_quotes(name),
+                      " is unknown; expected ascii, binary_little_endian or binary_big_endian.");
+    }
+
+    // The byte after end_header's newline. A CR before an LF belongs to it unless the header's lines end in a lone CR:
+    // then the LF is already data.
+    std::size_t body_start(std::size_t line_end) const {
+        const std::size_t first_newline = bytes_.find_first_of("\r\n");
+        const bool has_lone_cr = bytes_[first_newline] == '\r' && bytes_.substr(first_newline, 2) != "\r\n";
+        if (!has_lone_cr && bytes_.substr(line_end, 2) == "\r\n") return line_end + 2;
+        return std::min(line_end + 1, bytes_.size());
+    }
+
+    std::string_view bytes_;
+    LineScanner lines_;
+    Header header_;
+};
 
 // ---- bodies: the same few operations on text and on bytes ----
 
-bool to_index(double number, std::int64_t& value, std::string& why) {
+// Why a value cannot be read.
+struct BadValue {
+    std::string why;
+};
+
+std::int64_t to_index(double number) {
     constexpr double largest = 9.0e15; // beyond this no index is valid, and the conversion would be undefined
-    if (!(std::abs(number) <= largest) || number != std::floor(number)) {
-        why = "an index is not a whole number";
-        return false;
-    }
-    value = static_cast<std::int64_t>(number);
-    return true;
+    if (!(std::abs(number) <= largest) || number != std::floor(number))
+        throw BadValue{"an index is not a whole number"};
+    return static_cast<std::int64_t>(number);
 }
 
-// Every operation returns false where the data end or are no number; why() then says so.
 class AsciiBody {
 public:
-    AsciiBody(std::string_view bytes, std::size_t position) : bytes_(bytes), words_(bytes, false, position) {}
+    AsciiBody(std::string_view bytes, const Header& header) : words_(bytes, false, header.body) {}
 
     // The fewest bytes a value can take: a digit and the space before the next.
     static std::size_t min_size(ValueType) { return 2; }
 
-    bool real(ValueType, double& value) {
-        const std::string_view word = words_.next();
-        return accept(word, to_number(word, value));
+    double real(ValueType) {
+        double value = 0;
+        return parsed(value, to_number);
     }
-    bool integer(ValueType type, std::int64_t& value) {
-        if (!is_integer(type)) {
-            double number = 0.0;
-            if (!real(type, number)) return false;
-            return to_index(number, value, why_);
-        }
-        const std::string_view word = words_.next();
-        return accept(word, to_integer(word, value));
+    std::int64_t integer(ValueType type) {
+        if (!is_integer(type)) return to_index(real(type));
+        std::int64_t value = 0;
+        return parsed(value, to_integer);
     }
-    bool skip(ValueType, std::uint64_t count) {
-        for (; count > 0; --count)
-            if (words_.next().empty()) return accept({}, false);
-        return true;
+    void skip(ValueType, std::uint64_t count) {
+        for (; count > 0; --count) word();
     }
     // One more than there are, as the last value needs no space behind it.
     std::size_t remaining() const { return words_.remaining() + 1; }
     std::size_t position() const { return words_.position(); }
-    std::string where() const { return "line " + std::to_string(line_number(bytes_, words_.position())); }
-    const std::string& why() const { return why_; }
+    std::string where() const { return text_of("line ", words_.line()); }
     bool has_rest() { return !words_.next().empty(); }
 
 private:
-    bool accept(std::string_view word, bool is_number) {
-        if (!is_number) why_ = word.empty() ? "the file ends there" : in_quotes(word) + " is no number of its type";
-        return is_number;
+    std::string_view word() {
+        const std::string_view word = words_.next();
+        if (word.empty()) throw BadValue{"the file ends there"};
+        return word;
     }
-    std::string_view bytes_;
+    template <class Value>
+    Value parsed(Value value, bool (*parse)(std::string_view, Value&)) {
+        const std::string_view number = word();
+        if (!parse(number, value)) throw BadValue{in_quotes(number) + " is no number of its type"};
+        return value;
+    }
+
     WordScanner words_;
-    std::string why_;
 };
 
-template <std::endian order>
 class BinaryBody {
 public:
-    BinaryBody(std::string_view bytes, std::size_t position) : bytes_(bytes), position_(position) {}
+    BinaryBody(std::string_view bytes, const Header& header)
+        : bytes_(bytes), position_(header.body), order_(*header.order) {}
 
     static std::size_t min_size(ValueType type) { return byte_size(type); }
 
-    bool real(ValueType type, double& value) { return any(type, value); }
-    bool integer(ValueType type, std::int64_t& value) {
-        if (is_integer(type)) return any(type, value);
-        double number = 0.0;
-        if (!any(type, number)) return false;
-        return to_index(number, value, why_);
+    double real(ValueType type) { return get<double>(type); }
+    std::int64_t integer(ValueType type) {
+        return is_integer(type) ? get<std::int64_t>(type) : to_index(get<double>(type));
     }
-    bool skip(ValueType type, std::uint64_t count) {
-        if (count > remaining() / byte_size(type)) return ended();
+    void skip(ValueType type, std::uint64_t count) {
+        if (count > remaining() / byte_size(type)) throw BadValue{"the file ends there"};
         position_ += count * byte_size(type);
-        return true;
     }
     std::size_t remaining() const { return bytes_.size() - position_; }
     std::size_t position() const { return position_; }
-    std::string where() const { return "byte " + std::to_string(position_); }
-    const std::string& why() const { return why_; }
+    std::string where() const { return text_of("byte ", position_); }
     bool has_rest() const { return remaining() > 0; }
 
 private:
     template <class Value>
-    bool any(ValueType type, Value& value) {
-        return with_type(type, [&](auto tag) { return this->template get<typename decltype(tag)::type>(value); });
-    }
-    template <class Stored, class Value>
-    bool get(Value& value) {
-        if (remaining() < sizeof(Stored)) return ended();
-        std::array<char, sizeof(Stored)> raw;
-        std::memcpy(raw.data(), bytes_.data() + position_, sizeof(Stored));
-        if constexpr (order != std::endian::native) std::reverse(raw.begin(), raw.end());
-        // Only integers are read as integers; the branch is for the compiler.
-        if constexpr (std::is_floating_point_v<Value> || std::is_integral_v<Stored>)
-            value = static_cast<Value>(std::bit_cast<Stored>(raw));
-        position_ += sizeof(Stored);
-        return true;
-    }
-    bool ended() {
-        why_ = "the file ends there";
-        return false;
+    Value get(ValueType type) {
+        const char* const from = bytes_.data() + position_;
+        skip(type, 1);
+        return with_type(
+            type, [&](auto tag) { return static_cast<Value>(load_value<typename decltype(tag)::type>(from, order_)); });
     }
 
     std::string_view bytes_;
     std::size_t position_;
-    std::string why_;
+    std::endian order_;
 };
 
 // ---- vertices ----
@@ -357,9 +322,9 @@ public:
                 kept.push_back(std::move(arrays_[i]));
                 continue;
             }
-            result.warnings.push_back("the property " + in_quotes(arrays_[i].name) + " was left out: that of vertex " +
-                                      std::to_string(*misfits_[i]) + " is no " + name_of(arrays_[i].type) +
-                                      ", as the header says.");
+            result.warnings.push_back(text_of("the property ", in_quotes(arrays_[i].name),
+                                              " was left out: that of vertex ", *misfits_[i], " is no ",
+                                              name_of(arrays_[i].type), ", as the header says."));
         }
         if (!lists_.empty())
             result.notes.push_back("lists of vertices were left out: " + listed(lists_) + "; single values are kept.");
@@ -390,9 +355,9 @@ class BodyReader {
 public:
     BodyReader(const MeshSource& source, const Header& header) : source_(source), header_(header) {}
 
-    Result<ReadResult> read() {
-        if (Result<void> plan = check_elements(); !plan) return plan.error();
-        if (Result<void> done = read_elements(); !done) return done.error();
+    ReadResult read() {
+        check_elements();
+        read_elements();
         faces_.warn();
         if (!face_values_.empty())
             result_.notes.push_back("values of faces were left out: " + listed(face_values_) +
@@ -401,92 +366,86 @@ public:
     }
 
 private:
-    Result<void> check_elements() {
+    void check_elements() {
         bool has_faces = false;
         for (const Element& element : header_.elements) {
             if (element.name == "vertex") {
-                if (vertices_ != nullptr) return malformed(source_, "it has two elements named vertex; remove one.");
+                if (vertices_ != nullptr) fail("it has two elements named vertex; remove one.");
                 vertices_ = &element;
             }
             if (!is_face_element(element)) continue;
             if (element.count > 0 && index_list(element) == nullptr)
-                return malformed(source_, "its element " + in_quotes(element.name) +
-                                              " has no list named vertex_indices; correct the header.");
+                fail("its element ", in_quotes(element.name), " has no list named vertex_indices; correct the header.");
             has_faces = has_faces || element.count > 0;
         }
-        if (vertices_ == nullptr) return malformed(source_, "it has no element named vertex; it is no mesh.");
-        if (!has_faces) return malformed(source_, "it has no faces; give a file with a surface, not only with points.");
+        if (vertices_ == nullptr) fail("it has no element named vertex; it is no mesh.");
+        if (!has_faces) fail("it has no faces; give a file with a surface, not only with points.");
         if (vertices_->count > std::numeric_limits<Index>::max())
-            return malformed(source_, "it claims " + std::to_string(vertices_->count) +
-                                          " vertices, and indices have 32 bits; split the mesh.");
-        return {};
+            fail("it claims ", vertices_->count, " vertices, and indices have 32 bits; split the mesh.");
     }
 
-    Result<void> read_elements() {
-        Body body(source_.bytes, header_.body);
+    void read_elements() {
+        Body body(source_.bytes, header_);
         bool has_vertices = false;
         // Faces in front of the vertices wait: polygons are cut by their corners' positions.
         std::vector<std::pair<const Element*, Body>> waiting;
         for (const Element& element : header_.elements) {
-            if (Result<void> fits = check_count(body, element); !fits) return fits;
-            Result<void> done;
+            check_count(body, element);
             if (&element == vertices_) {
-                done = read_vertices(body, element);
+                read_vertices(body, element);
                 has_vertices = true;
             } else if (is_face_element(element) && has_vertices) {
-                done = read_faces(body, element);
+                read_faces(body, element);
             } else {
                 if (is_face_element(element)) waiting.emplace_back(&element, body);
-                done = skip_element(body, element);
+                skip_element(body, element);
             }
-            if (!done) return done;
         }
-        if (body.has_rest()) warn("data behind the last element were ignored.");
-        for (auto& [element, start] : waiting)
-            if (Result<void> done = read_faces(start, *element); !done) return done;
-        return {};
+        if (body.has_rest()) result_.warnings.push_back("data behind the last element were ignored.");
+        for (auto& [element, start] : waiting) read_faces(start, *element);
     }
 
     // Before anything is allocated for the element or looped over.
-    Result<void> check_count(const Body& body, const Element& element) {
-        if (element.count == 0) return {};
+    void check_count(const Body& body, const Element& element) {
+        if (element.count == 0) return;
         if (element.properties.empty())
-            return malformed(source_,
-                             "its element " + in_quotes(element.name) + " has no properties; correct the header.");
+            fail("its element ", in_quotes(element.name), " has no properties; correct the header.");
         std::size_t row = 0;
         for (const Property& property : element.properties)
             row += Body::min_size(property.is_list ? property.count_type : property.type);
-        if (element.count <= body.remaining() / row) return {};
-        return malformed(source_, "it claims " + std::to_string(element.count) + " rows of element " +
-                                      in_quotes(element.name) + ", but only " + std::to_string(body.remaining()) +
-                                      " bytes are left for them; the file is cut short or its header is wrong.");
+        if (element.count > body.remaining() / row)
+            fail("it claims ", element.count, " rows of element ", in_quotes(element.name), ", but only ",
+                 body.remaining(), " bytes are left for them; the file is cut short or its header is wrong.");
     }
 
-    Error broken(const Body& body, const Element& element, std::uint64_t row) const {
-        return malformed(source_, body.where() + ": row " + std::to_string(row) + " of " +
-                                      std::to_string(element.count) + " of element " + in_quotes(element.name) +
-                                      " cannot be read: " + body.why() + ".");
-    }
-
-    Result<void> skip_element(Body& body, const Element& element) {
+    template <class ReadRow>
+    void for_each_row(Body& body, const Element& element, ReadRow&& read_row) {
         for (std::uint64_t row = 0; row < element.count; ++row) {
-            if (!pulse(body, row)) return cancelled(source_);
-            for (const Property& property : element.properties)
-                if (!skip_property(body, property)) return broken(body, element, row);
+            source_.report_row(row, body.position(), "reading PLY");
+            try {
+                read_row(row);
+            } catch (const BadValue& bad) {
+                fail(body.where(), ": row ", row, " of ", element.count, " of element ", in_quotes(element.name),
+                     " cannot be read: ", bad.why, ".");
+            }
         }
-        return {};
     }
 
-    bool skip_property(Body& body, const Property& property) {
-        if (!property.is_list) return body.skip(property.type, 1);
-        std::int64_t count = 0;
-        return body.integer(property.count_type, count) && count >= 0 &&
-               body.skip(property.type, static_cast<std::uint64_t>(count));
+    void skip_element(Body& body, const Element& element) {
+        for_each_row(body, element, [&](std::uint64_t) {
+            for (const Property& property : element.properties) skip_property(body, property);
+        });
     }
 
-    Result<void> read_vertices(Body& body, const Element& element) {
+    void skip_property(Body& body, const Property& property) {
+        const std::int64_t count = property.is_list ? body.integer(property.count_type) : 1;
+        if (count < 0) throw BadValue{"a list has less than 0 values"};
+        body.skip(property.type, static_cast<std::uint64_t>(count));
+    }
+
+    void read_vertices(Body& body, const Element& element) {
         const VertexLayout layout = vertex_layout(element);
-        if (!layout.has({x, y, z})) return malformed(source_, "its vertices have no x, y and z; it is no mesh.");
+        if (!layout.has({x, y, z})) fail("its vertices have no x, y and z; it is no mesh.");
         const bool has_normals = layout.has({nx, ny, nz});
         const bool has_colours = layout.has({red, green, blue});
         const bool has_uvs = layout.has({u, v});
@@ -498,24 +457,23 @@ private:
         if (has_uvs) mesh.uvs.reserve(element.count);
         PlyArrays arrays(element, layout);
         std::array<double, slot_count> value{};
-        for (std::uint64_t row = 0; row < element.count; ++row) {
-            if (!pulse(body, row)) return cancelled(source_);
+        for_each_row(body, element, [&](std::uint64_t row) {
             for (std::size_t i = 0; i < layout.slots.size(); ++i) {
                 const Property& property = element.properties[i];
-                const bool read =
-                    property.is_list ? skip_property(body, property) : body.real(property.type, value[layout.slots[i]]);
-                if (!read) return broken(body, element, row);
-                if (layout.slots[i] == ignored && !property.is_list) arrays.add(i, value[ignored]);
+                if (property.is_list) {
+                    skip_property(body, property);
+                    continue;
+                }
+                value[layout.slots[i]] = body.real(property.type);
+                if (layout.slots[i] == ignored) arrays.add(i, value[ignored]);
             }
             mesh.positions.emplace_back(value[x], value[y], value[z]);
-            check_position(result_.bad, mesh.positions.back(),
-                           [&] { return body.where() + ": vertex " + std::to_string(row); });
+            check_position(result_.bad, mesh.positions.back(), [&] { return text_of(body.where(), ": vertex ", row); });
             if (has_normals) mesh.normals.emplace_back(value[nx], value[ny], value[nz]);
             if (has_colours) mesh.colours.push_back(colour(layout, value));
             if (has_uvs) mesh.uvs.emplace_back(value[u], value[v]);
-        }
+        });
         arrays.hand_over(result_);
-        return {};
     }
 
     glm::vec4 colour(const VertexLayout& layout, const std::array<double, slot_count>& value) const {
@@ -527,7 +485,7 @@ private:
         return decode_colour(encoded, source_.options.colours);
     }
 
-    Result<void> read_faces(Body& body, const Element& element) {
+    void read_faces(Body& body, const Element& element) {
         const Property* indices = index_list(element);
         if (indices == nullptr) return skip_element(body, element); // only where there are no rows
         // Room for the rows that the bytes left can hold as triangles, whatever the count says.
@@ -537,44 +495,29 @@ private:
         for (const Property& property : element.properties)
             if (&property != indices) face_values_.push_back(property.name);
         const FaceVertices vertices{0, vertices_->count};
-        for (std::uint64_t row = 0; row < element.count; ++row) {
-            if (!pulse(body, row)) return cancelled(source_);
+        const bool is_strip = is_strip_element(element);
+        for_each_row(body, element, [&](std::uint64_t row) {
             for (const Property& property : element.properties) {
                 if (&property != indices) {
-                    if (!skip_property(body, property)) return broken(body, element, row);
+                    skip_property(body, property);
                     continue;
                 }
-                if (Result<void> list = read_index_list(body, element, property, row); !list) return list;
-                const bool is_strip = is_strip_element(element);
-                const auto where = [&] {
-                    return body.where() + ": " + (is_strip ? "strip " : "face ") + std::to_string(row);
-                };
+                read_index_list(body, property, row);
+                const auto where = [&] { return text_of(body.where(), is_strip ? ": strip " : ": face ", row); };
                 if (is_strip) faces_.add_strip(corners_, vertices, true, where);
                 else faces_.add_polygon(corners_, vertices, where);
             }
-        }
-        return {};
+        });
     }
 
-    Result<void> read_index_list(Body& body, const Element& element, const Property& property, std::uint64_t row) {
-        std::int64_t count = 0;
-        if (!body.integer(property.count_type, count)) return broken(body, element, row);
+    void read_index_list(Body& body, const Property& property, std::uint64_t row) {
+        const std::int64_t count = body.integer(property.count_type);
         if (count < 0 || static_cast<std::uint64_t>(count) > body.remaining() / Body::min_size(property.type))
-            return malformed(source_, body.where() + ": face " + std::to_string(row) + " claims " +
-                                          std::to_string(count) + " corners, but only " +
-                                          std::to_string(body.remaining()) +
-                                          " bytes are left; the file is damaged or cut short.");
+            fail(body.where(), ": face ", row, " claims ", count, " corners, but only ", body.remaining(),
+                 " bytes are left; the file is damaged or cut short.");
         corners_.resize(static_cast<std::size_t>(count));
-        for (std::int64_t& corner : corners_)
-            if (!body.integer(property.type, corner)) return broken(body, element, row);
-        return {};
+        for (std::int64_t& corner : corners_) corner = body.integer(property.type);
     }
-
-    bool pulse(const Body& body, std::uint64_t row) const {
-        return row % rows_per_progress != 0 || source_.keep_going(body.position(), "reading PLY");
-    }
-
-    void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
 
     const MeshSource& source_;
     const Header& header_;
@@ -587,15 +530,10 @@ private:
 
 } // namespace
 
-Result<ReadResult> read_ply(const MeshSource& source) {
-    const Result<Header> header = parse_header(source);
-    if (!header) return header.error();
-    switch (header->encoding) {
-    case Encoding::ascii: return BodyReader<AsciiBody>(source, *header).read();
-    case Encoding::little_endian: return BodyReader<BinaryBody<std::endian::little>>(source, *header).read();
-    case Encoding::big_endian: return BodyReader<BinaryBody<std::endian::big>>(source, *header).read();
-    }
-    return malformed(source, "unknown encoding.");
+ReadResult read_ply(const MeshSource& source) {
+    const Header header = HeaderReader(source).read();
+    if (header.order) return BodyReader<BinaryBody>(source, header).read();
+    return BodyReader<AsciiBody>(source, header).read();
 }
 
 } // namespace unseen::meshio

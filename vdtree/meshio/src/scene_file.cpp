@@ -12,18 +12,12 @@
 #include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
-#include "gltf_data.h"
-#include "gltf_document.h"
-#include "gltf_instances.h"
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"
-#include "gltf_subset.h"
-#include "mesh_readers.h"
 
 namespace unseen::meshio {
 
 namespace fs = std::filesystem;
-using gltf::fail;
 using gltf::json;
 using gltf::member;
 using gltf::numbered;
@@ -64,7 +58,7 @@ bool is_marked(const json& node, const std::string& where) {
     const json* mark = object_at(object_at(&node, "extras"), "unseen");
     const json* value = mark != nullptr ? member(*mark, "background") : nullptr;
     if (value == nullptr) return false;
-    if (!value->is_boolean()) fail(where + ": extras.unseen.background should be true or false; correct it.");
+    if (!value->is_boolean()) fail(where, ": extras.unseen.background should be true or false; correct it.");
     return value->get<bool>();
 }
 
@@ -74,13 +68,13 @@ double number_in(const json& object, const char* key, double missing, double low
     if (value == nullptr) return missing;
     const double number = value->is_number() ? value->get<double>() : std::nan("");
     if (!(number >= low && number <= high))
-        fail(where + ": its " + key + " is no number in the range that it may have; correct it.");
+        fail(where, ": its ", key, " is no number in the range that it may have; correct it.");
     return number;
 }
 
 glm::dvec3 unit(glm::dvec3 v, const std::string& where) {
     const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-    if (!(largest > 0) || !std::isfinite(largest)) fail(where + ": its transform leaves it no direction; correct it.");
+    if (!(largest > 0) || !std::isfinite(largest)) fail(where, ": its transform leaves it no direction; correct it.");
     return glm::normalize(v / largest);
 }
 
@@ -90,14 +84,12 @@ public:
     Contents(const MeshSource& source, const json& document, const tinygltf::Model& model)
         : source_(source), document_(document), model_(model) {}
 
-    // Nothing where the caller cancelled.
-    std::optional<SceneContents> read() {
-        const auto shown = gltf::shown_nodes(source_, model_);
-        if (!shown) return std::nullopt;
-        std::vector<bool> is_background(shown->size());
+    SceneContents read() {
+        const std::vector<gltf::ShownNode> shown = gltf::shown_nodes(source_, model_);
+        std::vector<bool> is_background(shown.size());
         std::map<std::int32_t, int> uses;
-        for (std::size_t i = 0; i < shown->size(); ++i) {
-            const gltf::ShownNode& placed = (*shown)[i];
+        for (std::size_t i = 0; i < shown.size(); ++i) {
+            const gltf::ShownNode& placed = shown[i];
             const json& node = gltf::array_of(document_, "nodes")[placed.node];
             const std::string where = quoted(numbered("node", placed.node), name_in(node));
             is_background[i] = (placed.parent != gltf::no_parent && is_background[placed.parent]) ||
@@ -105,7 +97,7 @@ public:
             contents_.is_scene = contents_.is_scene || is_background[i];
             const auto mesh = gltf::mesh_of(model_, placed.node);
             if ((mesh || has_camera(node) || light_of(node)) && !is_finite_matrix(placed.to_world))
-                fail(where + ": its transform, with those above it, is NaN or infinite; correct it.");
+                fail(where, ": its transform, with those above it, is NaN or infinite; correct it.");
             if (mesh) {
                 add(placed, *mesh, name_in(node), is_background[i]);
                 contents_.is_scene = contents_.is_scene || ++uses[static_cast<std::int32_t>(*mesh)] > 1;
@@ -117,7 +109,7 @@ public:
             for (std::size_t i = 0; i < model_.meshes.size(); ++i)
                 contents_.nodes.push_back({model_.meshes[i].name.empty() ? numbered("mesh", i) : model_.meshes[i].name,
                                            -1, static_cast<std::int32_t>(i), glm::dmat4(1), false});
-        if (const std::uint64_t hidden = gltf::hidden_meshes(document_, model_, *shown); hidden > 0)
+        if (const std::uint64_t hidden = gltf::hidden_meshes(document_, model_, shown); hidden > 0)
             contents_.warnings.push_back(counted_were(hidden, "node") +
                                          " not in the scene that is shown and left out.");
         contents_.is_scene = contents_.is_scene || contents_.camera || !contents_.lights.empty();
@@ -148,10 +140,8 @@ private:
     const json& element(const json& array, const json& index, const char* what, const std::string& where) const {
         const auto i = static_cast<std::size_t>(gltf::to_integer_in_range(index, gltf::max_int, where + ": " + what));
         if (i >= array.size())
-            fail(where + " uses " + numbered(what, i) + ", but there are " + std::to_string(array.size()) +
-                 "; correct the JSON.");
-        if (!array[i].is_object())
-            fail(where + " uses " + numbered(what, i) + ", which is no object; correct the JSON.");
+            fail(where, " uses ", numbered(what, i), ", but there are ", array.size(), "; correct the JSON.");
+        if (!array[i].is_object()) fail(where, " uses ", numbered(what, i), ", which is no object; correct the JSON.");
         return array[i];
     }
 
@@ -159,7 +149,7 @@ private:
         const json* extras = object_at(&of, "extras");
         const json* said = extras != nullptr ? member(*extras, "casts_shadow") : nullptr;
         if (said == nullptr) return false;
-        if (!said->is_boolean()) fail(where + ": extras.casts_shadow should be true or false; correct it.");
+        if (!said->is_boolean()) fail(where, ": extras.casts_shadow should be true or false; correct it.");
         return said->get<bool>();
     }
 
@@ -177,7 +167,7 @@ private:
         const std::string kind = type != nullptr && type->is_string() ? type->get<std::string>() : std::string();
         if (kind == "point") read.kind = SceneLight::Kind::point;
         else if (kind == "spot") read.kind = SceneLight::Kind::spot;
-        else if (kind != "directional") fail(where + " is neither directional, point nor spot; correct its type.");
+        else if (kind != "directional") fail(where, " is neither directional, point nor spot; correct its type.");
         read.intensity = number_in(light, "intensity", 1, 0, brightest, where);
         if (const json* colour = member(light, "color")) {
             bool is_valid = colour->is_array() && colour->size() == 3;
@@ -187,7 +177,7 @@ private:
                            (*colour)[i].get<double>() <= brightest;
                 if (is_valid) rgb[static_cast<int>(i)] = (*colour)[i].get<float>();
             }
-            if (!is_valid) fail(where + ": its color should be 3 numbers from 0 on; correct it.");
+            if (!is_valid) fail(where, ": its color should be 3 numbers from 0 on; correct it.");
             has_coloured_ = has_coloured_ || rgb.r != rgb.g || rgb.g != rgb.b;
             read.intensity *= static_cast<double>(rec709_luminance(rgb));
         }
@@ -203,7 +193,7 @@ private:
                 number_in(spot ? *spot : usual, "outerConeAngle", usual_outer_radians, 0, right_angle, where);
             read.outer_radians = std::min(read.outer_radians, std::numbers::pi / 2);
             if (!(read.inner_radians < read.outer_radians))
-                fail(where + ": its innerConeAngle should be less than its outerConeAngle; correct it.");
+                fail(where, ": its innerConeAngle should be less than its outerConeAngle; correct it.");
         }
         read.casts_shadow = says_casts_shadow(light, where) || says_casts_shadow(node, of_node);
         contents_.lights.push_back(std::move(read));
@@ -221,7 +211,7 @@ private:
         }
         const json* perspective = object_at(&camera, "perspective");
         if (perspective == nullptr || member(*perspective, "yfov") == nullptr)
-            fail(where + " has no perspective with a yfov; correct it.");
+            fail(where, " has no perspective with a yfov; correct it.");
         constexpr double least = 1e-5, most = std::numbers::pi - 1e-3; // radians
         SceneCamera read;
         read.name = name_in(camera).empty() ? name_in(node) : name_in(camera);
@@ -231,7 +221,7 @@ private:
         const glm::dvec3 up = unit(glm::dvec3(to_world[1]), where);
         constexpr double least_sine = 1e-6;
         if (!(glm::length(glm::cross(read.forward, up)) > least_sine))
-            fail(where + ": its transform is flat, so that up is along its sight; correct it.");
+            fail(where, ": its transform is flat, so that up is along its sight; correct it.");
         read.up = up;
         contents_.is_scene = true;
         if (contents_.camera) ++further_cameras_;
@@ -275,6 +265,98 @@ private:
     int further_cameras_ = 0, orthographic_ = 0;
 };
 
+// ---- a document cut down to one of its meshes
+
+struct Subset {
+    json document;                           // one mesh, and the materials, textures, samplers and images that it uses
+    std::vector<SourceDocument::File> files; // of these images
+};
+
+// Elements of one of the document's arrays that are taken over, in the order in which they are first named.
+class Taken {
+public:
+    Taken(const json& document, const char* key) : all_(gltf::array_of(document, key)) {}
+
+    // The new number. What is not there stays what it was: nobody can take it for another one.
+    template <class Change>
+    json number(const json& index, Change&& change) {
+        const bool is_index = index.is_number_unsigned() && index.get<std::size_t>() < all_.size();
+        if (!is_index) return index;
+        const auto [entry, is_new] = numbers_.try_emplace(index.get<std::size_t>(), taken_.size());
+        if (is_new) {
+            taken_.push_back(all_[index.get<std::size_t>()]);
+            from_.push_back(index.get<std::size_t>());
+            json changed = taken_[entry->second];
+            change(changed);
+            taken_[entry->second] = std::move(changed);
+        }
+        return entry->second;
+    }
+
+    void put(json& out, const char* key) const {
+        if (!taken_.empty()) out[key] = taken_;
+    }
+    const std::vector<std::size_t>& from() const { return from_; }
+
+private:
+    const json& all_;
+    json taken_ = json::array();
+    std::vector<std::size_t> from_;
+    std::map<std::size_t, std::size_t> numbers_;
+};
+
+class Subsetter {
+public:
+    explicit Subsetter(const json& kept)
+        : kept_(kept), materials_(kept, "materials"), textures_(kept, "textures"), samplers_(kept, "samplers"),
+          images_(kept, "images") {}
+
+    Subset run(const std::vector<SourceDocument::File>& files, std::size_t number) {
+        json mesh = gltf::array_of(kept_, "meshes").at(number);
+        for (json& primitive : mesh["primitives"])
+            if (const auto material = primitive.find("material"); material != primitive.end())
+                *material = materials_.number(*material, [&](json& of) { renumber_textures(of); });
+        Subset subset;
+        json& out = subset.document = json::object();
+        for (const char* key : {"asset", "extensionsUsed", "extensionsRequired"})
+            if (const json* value = member(kept_, key)) out[key] = *value;
+        out["meshes"] = json::array({std::move(mesh)});
+        materials_.put(out, "materials");
+        textures_.put(out, "textures");
+        samplers_.put(out, "samplers");
+        images_.put(out, "images");
+        for (const std::size_t from : images_.from())
+            subset.files.push_back(from < files.size() ? files[from] : SourceDocument::File());
+        return subset;
+    }
+
+private:
+    // A material's textures are objects under keys that end so, with an index; extensions have such ones, too.
+    void renumber_textures(json& value) {
+        if (!value.is_structured()) return;
+        for (auto& [key, inner] : value.items()) {
+            if (key == "extras") continue;
+            if (std::string_view(key).ends_with("Texture") && inner.is_object() && inner.contains("index"))
+                inner["index"] = textures_.number(inner["index"], [&](json& texture) { renumber_sources(texture); });
+            renumber_textures(inner);
+        }
+    }
+    void renumber_sources(json& texture) {
+        if (!texture.is_object()) return;
+        const auto keep = [](json&) {};
+        if (texture.contains("sampler")) texture["sampler"] = samplers_.number(texture["sampler"], keep);
+        if (texture.contains("source")) texture["source"] = images_.number(texture["source"], keep);
+        const auto extensions = texture.find("extensions");
+        if (extensions == texture.end() || !extensions->is_object()) return;
+        for (json& extension : *extensions)
+            if (extension.is_object() && extension.contains("source"))
+                extension["source"] = images_.number(extension["source"], keep);
+    }
+
+    const json& kept_;
+    Taken materials_, textures_, samplers_, images_;
+};
+
 } // namespace
 
 // In the order in which they refer to each other.
@@ -282,39 +364,19 @@ struct SceneFile::Impl {
     std::string bytes;
     ReadOptions options;
     MeshSource source;
-    json document, kept; // whole, and without geometry
-    gltf::Reduced reduced;
-    std::optional<gltf::Buffers> buffers;
-    std::optional<gltf::Meshes> meshes;
+    std::optional<gltf::File> file;
     SceneContents contents;
+    json kept; // the document without geometry
 
     Impl(std::string bytes_, const fs::path& name, const ReadOptions& options_, const fs::path& folder)
         : bytes(std::move(bytes_)), options(options_), source{bytes, name.string(), folder, options} {}
 
-    Result<void> read() {
-        gltf::Container container{source.bytes, std::nullopt};
-        if (source.bytes.starts_with("glTF")) container = gltf::split_glb(source.bytes);
-        document = gltf::parse_json(container.json_text);
-        if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
-        std::vector<Message> warnings;
-        gltf::check_kept(document, options.drop, warnings);
-        buffers.emplace(source, document, container.bin);
-        gltf::unpack_views(document, *buffers);
-        gltf::expand_instances(document, *buffers, warnings);
-        reduced = gltf::reduce(document);
-        if (reduced.has_tangents)
-            warnings.push_back("tangents were left out; they follow from normals and coordinates.");
-        if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
-        auto read = Contents(source, document, reduced.model).read();
-        if (!read) return cancelled(source);
-        contents = std::move(*read);
-        contents.file_bytes = source.bytes.size() + buffers->external_bytes();
-        meshes.emplace(source, document, reduced.model, *buffers);
-        contents.source.files = meshes->files(warnings);
-        kept = gltf::without_geometry(document, contents.source.files, warnings);
+    void read() {
+        file.emplace(source);
+        contents = Contents(source, file->document(), file->model()).read();
+        contents.file_bytes = file->bytes();
+        kept = file->kept(contents.source.files, contents.warnings);
         contents.source.json = gltf::to_text(kept);
-        contents.warnings.insert(contents.warnings.end(), warnings.begin(), warnings.end());
-        return {};
     }
 };
 
@@ -335,26 +397,27 @@ Result<SceneFile> SceneFile::from_bytes(std::string bytes, const fs::path& name,
     constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
     if (bytes.starts_with(utf8_mark)) bytes.erase(0, utf8_mark.size());
     auto impl = std::make_unique<Impl>(std::move(bytes), name, options, folder);
-    const auto read = gltf::guarded<void>(impl->source, [&] { return impl->read(); });
-    if (!read) return read.error();
-    return SceneFile(std::move(impl));
+    return reported<SceneFile>(impl->source, [&] {
+        gltf::with_types([&] { impl->read(); });
+        return SceneFile(std::move(impl));
+    });
 }
 
 Result<std::optional<ReadResult>> SceneFile::mesh(std::size_t mesh, const glm::dmat3& stretch) {
     using Read = std::optional<ReadResult>;
-    const std::string& name = impl_->reduced.model.meshes[mesh].name;
+    const std::string& name = impl_->file->model().meshes[mesh].name;
     MeshSource source = impl_->source;
     source.name += ": " + numbered("mesh", mesh) + (name.empty() ? "" : " " + in_quotes(name));
-    return gltf::guarded<Read>(source, [&]() -> Result<Read> {
-        if (!impl_->source.keep_going(impl_->source.bytes.size() / 2, "reading glTF")) return cancelled(source);
-        ReadResult read = impl_->meshes->read(mesh, stretch);
-        if (read.mesh.triangles.empty() && !read.bad.any()) return Read();
-        gltf::Subset subset = gltf::subset_of(impl_->kept, impl_->contents.source.files, mesh);
-        read.document->json = gltf::to_text(subset.document);
-        read.document->files = std::move(subset.files);
-        auto finished = finish_reading(source, std::move(read));
-        if (!finished) return finished.error();
-        return Read(std::move(*finished));
+    return reported<Read>(source, [&] {
+        return gltf::with_types([&]() -> Read {
+            source.report(source.bytes.size() / 2, "reading glTF");
+            ReadResult read = impl_->file->read_mesh(mesh, stretch);
+            if (read.mesh.triangles.empty() && !read.bad.any()) return std::nullopt;
+            Subset subset = Subsetter(impl_->kept).run(impl_->contents.source.files, mesh);
+            read.document->json = gltf::to_text(subset.document);
+            read.document->files = std::move(subset.files);
+            return finish_reading(source, std::move(read));
+        });
     });
 }
 

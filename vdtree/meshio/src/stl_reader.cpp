@@ -1,14 +1,12 @@
 // STL, ASCII and binary. Facets have three vertices of their own, which are welded unless the options say no.
 #include "mesh_readers.h"
 #include "text_scanner.h"
+#include "value_types.h"
 #include "weld.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cctype>
-#include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace unseen::meshio {
@@ -20,21 +18,8 @@ constexpr std::size_t preamble_bytes = header_bytes + 4; // and the facet count
 constexpr std::size_t facet_bytes = 50;                  // normal, 3 corners, 2 bytes that nobody agrees about
 constexpr std::uint64_t max_facets = std::numeric_limits<Index>::max() / 3;
 
-template <class Value>
-Value little_endian(const char* bytes) {
-    std::array<char, sizeof(Value)> raw;
-    std::memcpy(raw.data(), bytes, sizeof(Value));
-    if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-    return std::bit_cast<Value>(raw);
-}
-
 std::uint64_t claimed_facets(std::string_view bytes) {
-    return little_endian<std::uint32_t>(bytes.data() + header_bytes);
-}
-
-bool equals_ignoring_case(std::string_view word, std::string_view lower) {
-    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
-                      [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; });
+    return load_value<std::uint32_t>(bytes.data() + header_bytes, std::endian::little);
 }
 
 // "solid" and a name, then a facet or the end: some binary files start with "solid" too.
@@ -111,34 +96,33 @@ void settle(const MeshSource& source, ReadResult& result) {
     if (source.options.weld) weld(result);
 }
 
-Error too_many_facets(const MeshSource& source) {
-    return {ErrorCode::unsupported,
-            source.name + ": it has more facets than 32-bit indices can number; split the mesh."};
+[[noreturn]] void fail_facets() {
+    fail_unsupported("it has more facets than 32-bit indices can number; split the mesh.");
 }
 
 glm::vec3 vector_at(const char* bytes) {
-    return {little_endian<float>(bytes), little_endian<float>(bytes + 4), little_endian<float>(bytes + 8)};
+    const auto number = [&](std::size_t i) { return load_value<float>(bytes + 4 * i, std::endian::little); };
+    return {number(0), number(1), number(2)};
 }
 
-Result<ReadResult> read_binary(const MeshSource& source) {
+ReadResult read_binary(const MeshSource& source) {
     const std::string_view bytes = source.bytes;
-    if (bytes.size() < preamble_bytes)
-        return malformed(source, "it is too short for an STL file; it may be cut short.");
+    if (bytes.size() < preamble_bytes) fail("it is too short for an STL file; it may be cut short.");
     const std::uint64_t count = claimed_facets(bytes);
     const std::uint64_t room = (bytes.size() - preamble_bytes) / facet_bytes;
     if (count > room)
-        return malformed(source, "it claims " + std::to_string(count) + " facets, but its bytes hold only " +
-                                     std::to_string(room) + "; the file is cut short or its count is wrong.");
-    if (count > max_facets) return too_many_facets(source);
+        fail("it claims ", count, " facets, but its bytes hold only ", room,
+             "; the file is cut short or its count is wrong.");
+    if (count > max_facets) fail_facets();
 
     ReadResult result;
     result.mesh.positions.reserve(3 * count);
     result.mesh.normals.reserve(3 * count);
     result.mesh.triangles.reserve(count);
     for (std::uint64_t i = 0; i < count; ++i) {
-        const char* facet = bytes.data() + preamble_bytes + i * facet_bytes;
-        if (i % rows_per_progress == 0 && !source.keep_going(preamble_bytes + i * facet_bytes, "reading STL"))
-            return cancelled(source);
+        const std::uint64_t at = preamble_bytes + i * facet_bytes;
+        source.report_row(i, at, "reading STL");
+        const char* facet = bytes.data() + at;
         add_facet(
             result, vector_at(facet),
             {glm::dvec3(vector_at(facet + 12)), glm::dvec3(vector_at(facet + 24)), glm::dvec3(vector_at(facet + 36))});
@@ -154,64 +138,58 @@ class AsciiReader {
 public:
     explicit AsciiReader(const MeshSource& source) : source_(source), words_(source.bytes, false) {}
 
-    Result<ReadResult> read() {
+    ReadResult read() {
         for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
-            if (!equals_ignoring_case(word, "solid")) return unexpected("solid", word);
-            if (Result<void> solid = read_solid(); !solid) return solid.error();
+            if (!equals_ignoring_case(word, "solid")) fail_at("solid", word);
+            read_solid();
         }
         settle(source_, result_);
         return std::move(result_);
     }
 
 private:
-    Result<void> read_solid() {
+    void read_solid() {
         MeshRange range{rest_of_line(), MeshRange::Kind::group, result_.mesh.triangles.size(), 0};
-        for (;;) {
-            const std::string_view word = words_.next();
-            if (ends(word, "solid")) break;
-            if (!equals_ignoring_case(word, "facet")) return unexpected("facet or endsolid", word);
-            if (Result<void> facet = read_facet(); !facet) return facet;
+        for (std::string_view word = words_.next(); !ends(word, "solid"); word = words_.next()) {
+            if (!equals_ignoring_case(word, "facet")) fail_at("facet or endsolid", word);
+            read_facet();
         }
         words_.skip_line();
         range.triangle_count = result_.mesh.triangles.size() - range.first_triangle;
         if (range.triangle_count > 0) result_.mesh.ranges.push_back(std::move(range));
-        return {};
     }
 
-    Result<void> read_facet() {
+    void read_facet() {
         const std::uint64_t facet = result_.source_faces;
-        if (facet >= max_facets) return too_many_facets(source_);
-        if (facet % rows_per_progress == 0 && !source_.keep_going(words_.position(), "reading STL"))
-            return cancelled(source_);
-        glm::dvec3 normal(0.0);
+        if (facet >= max_facets) fail_facets();
+        source_.report_row(facet, words_.position(), "reading STL");
+        expect("normal");
+        const glm::dvec3 normal = read_vector();
+        expect("outer");
+        expect("loop");
         std::array<glm::dvec3, 3> corners{};
-        if (Result<void> done = expect("normal"); !done) return done;
-        if (Result<void> done = read_vector(normal); !done) return done;
-        if (Result<void> done = expect("outer"); !done) return done;
-        if (Result<void> done = expect("loop"); !done) return done;
         for (glm::dvec3& corner : corners) {
-            if (Result<void> done = expect("vertex"); !done) return done;
-            if (Result<void> done = read_vector(corner); !done) return done;
+            expect("vertex");
+            corner = read_vector();
         }
         for (const char* what : {"loop", "facet"})
             if (const std::string_view word = words_.next(); !ends(word, what))
-                return unexpected(std::string("end") + what, word);
+                fail_at(std::string("end") + what, word);
         add_facet(result_, glm::vec3(normal), corners);
-        return {};
     }
 
-    Result<void> read_vector(glm::dvec3& vector) {
+    glm::dvec3 read_vector() {
+        glm::dvec3 vector(0.0);
         for (int axis = 0; axis < 3; ++axis) {
             const std::string_view word = words_.next();
-            if (!to_number(word, vector[axis])) return unexpected("a number", word);
+            if (!to_number(word, vector[axis])) fail_at("a number", word);
         }
-        return {};
+        return vector;
     }
 
-    Result<void> expect(std::string_view keyword) {
+    void expect(std::string_view keyword) {
         const std::string_view word = words_.next();
-        if (equals_ignoring_case(word, keyword)) return {};
-        return unexpected(std::string(keyword), word);
+        if (!equals_ignoring_case(word, keyword)) fail_at(keyword, word);
     }
 
     // "endsolid", or "end solid" as some programs write it.
@@ -228,12 +206,11 @@ private:
         return std::string(trimmed(source_.bytes.substr(first, words_.position() - first)));
     }
 
-    Error unexpected(const std::string& wanted, std::string_view word) const {
-        const std::string where = "facet " + std::to_string(result_.source_faces);
-        if (word.empty())
-            return malformed(source_, "it ends at " + where + " without " + wanted + "; it is cut short.");
-        return malformed_line(source_, words_.line(),
-                              where + " has " + in_quotes(word) + " where " + wanted + " should be; correct it.");
+    [[noreturn]] void fail_at(std::string_view wanted, std::string_view word) const {
+        const std::string where = text_of("facet ", result_.source_faces);
+        if (word.empty()) fail("it ends at ", where, " without ", wanted, "; it is cut short.");
+        fail("line ", words_.line(), ": ", where, " has ", in_quotes(word), " where ", wanted,
+             " should be; correct it.");
     }
 
     const MeshSource& source_;
@@ -247,7 +224,7 @@ bool is_binary_stl(std::string_view bytes) {
     return bytes.size() >= preamble_bytes && bytes.size() - preamble_bytes == claimed_facets(bytes) * facet_bytes;
 }
 
-Result<ReadResult> read_stl(const MeshSource& source) {
+ReadResult read_stl(const MeshSource& source) {
     if (!is_binary_stl(source.bytes) && is_ascii_stl(source.bytes)) return AsciiReader(source).read();
     return read_binary(source);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -14,6 +15,21 @@ namespace unseen::meshio {
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 inline bool is_newline(char c) { return c == '\n' || c == '\r'; }
 inline bool is_space(char c) { return is_blank(c) || is_newline(c); }
+
+inline bool equals_ignoring_case(std::string_view word, std::string_view lower) {
+    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                      [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; });
+}
+
+// A digit of base64 as 0 to 63, or -1.
+constexpr int base64_value(char c) {
+    if (c >= 'A' && c <= 'Z') return c - 'A';
+    if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+    if (c >= '0' && c <= '9') return c - '0' + 52;
+    if (c == '+' || c == '-') return 62; // the second of each pair: RFC 4648's alphabet for URLs
+    if (c == '/' || c == '_') return 63;
+    return -1;
+}
 
 // What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign. (Not
 // strtod, which obeys the locale.)

@@ -40,10 +40,11 @@ decltype(auto) with_type(ValueType type, F&& f) {
 }
 
 template <class T>
-T load_value(const std::byte* from) {
-    T value;
-    std::memcpy(&value, from, sizeof value);
-    return value;
+T load_value(const void* from, std::endian order = std::endian::native) {
+    std::array<std::byte, sizeof(T)> raw;
+    std::memcpy(raw.data(), from, raw.size());
+    if (order != std::endian::native) std::reverse(raw.begin(), raw.end());
+    return std::bit_cast<T>(raw);
 }
 
 template <class T>

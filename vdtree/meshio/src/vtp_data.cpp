@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <new>
 #include <span>
 
 #include <zlib.h>
 
-#include "base64.h"
+#include "mesh_readers.h"
 #include "text_scanner.h"
 #include "value_types.h"
-#include "vtp_polygons.h"
 
 namespace unseen::meshio {
 
@@ -19,11 +17,10 @@ namespace {
 
 constexpr std::uint64_t most_inflated = 1032; // bytes that zlib makes of one, at most
 
-[[noreturn]] void fail_short() { throw VtkFault{"its data end early; the file is cut short or damaged."}; }
+[[noreturn]] void fail_short() { fail("its data end early; the file is cut short or damaged."); }
 
 [[noreturn]] void fail_length(std::uint64_t found, std::uint64_t expected) {
-    throw VtkFault{"it holds " + std::to_string(found) + " bytes of data where " + std::to_string(expected) +
-                   " are needed; the file is damaged."};
+    fail("it holds ", found, " bytes of data where ", expected, " are needed; the file is damaged.");
 }
 
 } // namespace
@@ -62,8 +59,7 @@ private:
             data_.remove_prefix(1);
             if (c == '=' && i >= 2) continue;
             values[i] = base64_value(c);
-            if (values[i] < 0 || digits != i)
-                throw VtkFault{"its data are no base64; the file is cut short or damaged."};
+            if (values[i] < 0 || digits != i) fail("its data are no base64; the file is cut short or damaged.");
             ++digits;
         }
         const unsigned bits = static_cast<unsigned>(values[0] << 18 | values[1] << 12 | values[2] << 6 | values[3]);
@@ -88,8 +84,7 @@ std::uint64_t VtpDecoder::header(Stream& stream) const {
 
 void VtpDecoder::spend(std::uint64_t bytes) {
     if (!budget_.spend(bytes))
-        throw VtkFault{"with it the arrays become far more than the file holds; save the file without compression.",
-                       ErrorCode::unsupported};
+        fail_unsupported("with it the arrays become far more than the file holds; save the file without compression.");
 }
 
 std::vector<std::byte> VtpDecoder::decode(std::string_view data, bool is_base64, std::uint64_t bytes) {
@@ -97,10 +92,9 @@ std::vector<std::byte> VtpDecoder::decode(std::string_view data, bool is_base64,
     Stream stream(data, is_base64);
     if (encoding_.compressor == "vtkZLibDataCompressor") return inflate(stream, bytes);
     if (!encoding_.compressor.empty())
-        throw VtkFault{
-            "it is compressed by " + encoding_.compressor +
-                ", which is not read; save the file with the compressor zlib or none, as ParaView offers them.",
-            ErrorCode::unsupported};
+        fail_unsupported(
+            "it is compressed by ", encoding_.compressor,
+            ", which is not read; save the file with the compressor zlib or none, as ParaView offers them.");
     if (const std::uint64_t found = header(stream); found != bytes) fail_length(found, bytes);
     if (bytes > stream.room()) fail_short();
     spend(bytes);
@@ -115,8 +109,8 @@ std::vector<std::byte> VtpDecoder::inflate(Stream& stream, std::uint64_t bytes) 
     const bool is_whole = blocks > 0 && block_bytes > 0 && last <= block_bytes && blocks - 1 <= bytes / block_bytes &&
                           (blocks - 1) * block_bytes + (last > 0 ? last : block_bytes) == bytes;
     if (!is_whole)
-        throw VtkFault{"its " + std::to_string(blocks) + " compressed blocks of " + std::to_string(block_bytes) +
-                       " bytes do not make the " + std::to_string(bytes) + " that are needed; the file is damaged."};
+        fail("its ", blocks, " compressed blocks of ", block_bytes, " bytes do not make the ", bytes,
+             " that are needed; the file is damaged.");
     if (blocks > stream.room() / sizeof(std::uint32_t)) fail_short();
     std::vector<std::uint64_t> sizes(blocks);
     std::uint64_t compressed = 0;
@@ -138,7 +132,7 @@ std::vector<std::byte> VtpDecoder::inflate(Stream& stream, std::uint64_t bytes) 
         const int state = ::uncompress(reinterpret_cast<Bytef*>(values.data() + at), &found, block.data(), size);
         if (state == Z_MEM_ERROR) throw std::bad_alloc();
         if (state != Z_OK || found != wanted)
-            throw VtkFault{"a compressed block of it is damaged, or holds another number of bytes than it should."};
+            fail("a compressed block of it is damaged, or holds another number of bytes than it should.");
         at += wanted;
     }
     return values;

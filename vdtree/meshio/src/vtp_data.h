@@ -1,16 +1,32 @@
-// Bytes of arrays in VTK's XML format: base64 or raw, as they are or in blocks that zlib has compressed.
+// Arrays in VTK's XML format: the names of types, and bytes in base64 or raw, as they are or in blocks that zlib has
+// compressed.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/internal/budget.h>
 
 namespace unseen::meshio {
+
+inline constexpr std::array<const char*, 10> vtp_names{"Int8",   "UInt8", "Int16",  "UInt16",  "Int32",
+                                                       "UInt32", "Int64", "UInt64", "Float32", "Float64"};
+
+inline const char* vtp_name(ValueType type) { return vtp_names[static_cast<std::size_t>(type) - 1]; }
+
+// Nothing for types that hold no numbers of whole bytes: Bit, String.
+inline std::optional<ValueType> vtp_type(std::string_view name) {
+    for (std::size_t i = 0; i < vtp_names.size(); ++i)
+        if (name == vtp_names[i]) return static_cast<ValueType>(i + 1);
+    return std::nullopt;
+}
 
 // What the file's first element says.
 struct VtpEncoding {
@@ -25,7 +41,7 @@ public:
     // any number of arrays.
     VtpDecoder(VtpEncoding encoding, Budget budget) : encoding_(std::move(encoding)), budget_(budget) {}
 
-    // `data` begins with an array, and may go on behind it. In the order of the file. Throws VtkFault where it does not
+    // `data` begins with an array, and may go on behind it. In the order of the file. Fails if it does not
     // hold exactly so many bytes; nothing is allocated that it cannot hold.
     std::vector<std::byte> decode(std::string_view data, bool is_base64, std::uint64_t bytes);
 

@@ -13,7 +13,7 @@
 #include "mesh_readers.h"
 #include "mesh_writers.h"
 #include "value_types.h"
-#include "vtp_types.h"
+#include "vtp_data.h"
 
 namespace unseen::meshio {
 

@@ -20,7 +20,11 @@ using namespace vdtree; // the types that are compared
 // Mixes 64-bit words (the finaliser of MurmurHash3 after each).
 class SeededHash {
 public:
-    explicit SeededHash(std::uint64_t seed) : state_(seed) {}
+    static SeededHash random() {
+        SeededHash hash;
+        hash.state_ = (std::uint64_t{std::random_device{}()} << 32) | std::random_device{}();
+        return hash;
+    }
 
     SeededHash& add(std::uint64_t word) {
         state_ ^= word;
@@ -36,14 +40,28 @@ public:
     std::uint64_t value() const { return state_; }
 
 private:
-    std::uint64_t state_;
+    std::uint64_t state_ = 0;
 };
+
+// By bits, so that NaN is equal to itself.
+template <class Vector>
+bool has_same_bits(std::span<const Vector> values, std::size_t a, std::size_t b) {
+    if (values.empty()) return true;
+    for (int i = 0; i < Vector::length(); ++i)
+        if (std::bit_cast<std::uint32_t>(values[a][i]) != std::bit_cast<std::uint32_t>(values[b][i])) return false;
+    return true;
+}
+template <class Vector>
+void add_bits(SeededHash& hash, std::span<const Vector> values, std::size_t at) {
+    if (values.empty()) return;
+    for (int i = 0; i < Vector::length(); ++i) hash.add(std::bit_cast<std::uint32_t>(values[at][i]));
+}
 
 // For each of `count` items the first one that is the same. `add_to(hash, i)` adds what `same(i, j)` compares.
 template <class AddTo, class Same>
 std::vector<Index> find_first_same(std::size_t count, AddTo&& add_to, Same&& same) {
     constexpr Index none = std::numeric_limits<Index>::max();
-    const SeededHash seeded((std::uint64_t{std::random_device{}()} << 32) | std::random_device{}());
+    const SeededHash seeded = SeededHash::random();
     std::vector<Index> table(std::bit_ceil(count + count / 2 + 1), none);
     std::vector<Index> first(count);
     for (std::size_t i = 0; i < count; ++i) {

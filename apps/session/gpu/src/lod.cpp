@@ -316,7 +316,7 @@ public:
     }
 
     Result<meshio::LevelsWritten> write(const std::filesystem::path& file, const meshio::GltfOptions& options) const {
-        if (scene_.source) return meshio::write_scene_levels(file, *scene_.source, levels_, options);
+        if (scene_.source) return meshio::write_scene(file, *scene_.source, levels_, options);
         if (levels_.size() == 1) return meshio::write_model_levels(file, levels_[0], options);
         return invalid_argument("Cannot write '" + file.string() +
                                 "': scenes of several objects are written only where a glTF file is their source.");

@@ -101,19 +101,7 @@ private:
 // Whether a file's name ends like glTF.
 bool is_gltf_file(const std::filesystem::path& file);
 
-// The cut that a node shows. Its tree was built from SceneFile::mesh(), with any stretch.
-struct SceneCut {
-    std::int32_t node = -1, mesh = 0;
-    const vdtree::Cut* cut = nullptr;
-};
-
-// Writes a scene as glTF with the cuts in place of the meshes. Nodes, transforms, names, materials, cameras and
-// lights stay; images as in write_cut(). Nodes share a mesh if their cuts are the same. A node whose cut has no
-// triangles loses its mesh. Returns what could not be kept, one sentence each.
-Result<std::vector<Message>> write_scene(const std::filesystem::path& file, const SceneSource& source,
-                                         std::span<const SceneCut> cuts);
-
-// ---- levels of detail
+// ---- writing
 
 // Smaller files, by extensions that readers must know; this library's does.
 struct GltfOptions {
@@ -127,10 +115,10 @@ struct GltfOptions {
 
 bool has_meshoptimizer() noexcept; // whether this build has the library
 
-// The levels of detail of one node.
+// The cut that a node shows, or its levels of detail. Trees were built from SceneFile::mesh(), with any stretch.
 struct LevelCuts {
-    std::int32_t node = -1, mesh = 0;     // as in SceneCut
-    std::vector<const vdtree::Cut*> cuts; // finest first; not empty. A cut that occurs twice is written once
+    std::int32_t node = -1, mesh = 0;     // as in SceneNode
+    std::vector<const vdtree::Cut*> cuts; // finest first; not empty
     std::vector<double> coverages;        // by cut: shares of the screen's area, 0..1, descending
 };
 
@@ -139,13 +127,15 @@ struct LevelsWritten {
     std::vector<std::uint64_t> bytes; // geometry by level; shared geometry counts for the first level that has it
 };
 
-// Levels in one file, by the extension MSFT_lod: the node with the finest mesh names the nodes with the others, and
-// its extras (MSFT_screencoverage) say down to which share of the screen each is shown. Readers that do not know the
-// extension show the finest.
-// Writes a scene like write_scene(). Each further level has a node with the transform of the first, in no scene. A
-// node that is more than a mesh gets a child for its levels. Fails if a level but the first has no triangles.
-Result<LevelsWritten> write_scene_levels(const std::filesystem::path& file, const SceneSource& source,
-                                         std::span<const LevelCuts> levels, const GltfOptions& options = {});
+// Writes a scene as glTF with the cuts in place of the meshes. Nodes, transforms, names, materials, cameras and
+// lights stay; images as in write_cut(). Nodes share a mesh if their cuts are the same. A node whose first cut has no
+// triangles loses its mesh.
+// Levels are written by the extension MSFT_lod: the node with the finest mesh names the nodes with the others, and its
+// extras (MSFT_screencoverage) say down to which share of the screen each is shown. Readers that do not know the
+// extension show the finest. Each further level has a node with the transform of the first, in no scene. A node that is
+// more than a mesh gets a child for its levels. Fails if a level but the first has no triangles.
+Result<LevelsWritten> write_scene(const std::filesystem::path& file, const SceneSource& source,
+                                  std::span<const LevelCuts> nodes, const GltfOptions& options = {});
 
 // Writes the levels of a whole model, like write_cut() to glTF: the first has a root above its nodes, each other one
 // a root above nodes in the world's frame. `levels.node` and `levels.mesh` are ignored.

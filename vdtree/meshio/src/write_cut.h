@@ -1,4 +1,4 @@
-// What writers of cuts as glTF share.
+// What writers of cuts share.
 #pragma once
 
 #include <filesystem>
@@ -6,13 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include <unseen/meshio/source_document.h>
 
 #include "gltf_document.h"
-#include "gltf_writer.h"
-#include "restore.h"
 
 namespace unseen::meshio {
 
@@ -21,17 +17,6 @@ Error failed_to_write(const std::filesystem::path& file, const std::string& why)
 // Writes what lay beside the mesh beside this file. What is there already must be the same.
 Result<void> write_beside(const std::filesystem::path& file, const SourceDocument& document,
                           std::vector<Message>& notes);
-
-// Images that lay in the source's file.
-void add_images(nlohmann::json& out, const SourceDocument& document, GltfFile& file);
-
-// Positions lie on the grid where it is used. The part must outlive the file's write(); it may be put in order.
-nlohmann::json gltf_primitive(RestoredPart& restored, const SourceDocument& document, GltfFile& file,
-                              const GltfGrid& grid = {});
-
-// The node of a part, or a new one beside all others, where there is none or its frame cannot be turned back.
-std::size_t node_for(nlohmann::json& out, const SourceDocument::Part& part, const RestoredPart& restored,
-                     std::vector<Message>& notes);
 
 // Runs what believes what a document says.
 template <class Write>
@@ -42,8 +27,8 @@ Result<void> guarded_writing(Write&& write) {
     };
     try {
         return write();
-    } catch (const gltf::Broken& broken) {
-        return damaged(broken.what);
+    } catch (const Fault& fault) {
+        return damaged(fault.what);
     } catch (const nlohmann::json::exception&) {
         return damaged(gltf::wrong_type);
     } catch (const std::out_of_range&) {
