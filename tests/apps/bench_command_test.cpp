@@ -124,9 +124,7 @@ TEST_F(BenchCommandTest, RefusesWrongTargets) {
 
 // Who looks for it there is told where it is.
 TEST_F(BenchCommandTest, IsAProgramOfItsOwn) {
-    const Outcome outcome = run({"bench", "engine", "--quick"});
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_THAT(outcome.err, HasSubstr("unseen-bench"));
+    EXPECT_THAT(run({"bench", "engine", "--quick"}), fails(2, HasSubstr("unseen-bench")));
     const Outcome help = bench({"--help"});
     EXPECT_EQ(help.status, 0);
     for (const char* verb : {"engine", "perception", "points", "scenes"}) EXPECT_THAT(help.out, HasSubstr(verb));

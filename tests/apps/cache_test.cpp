@@ -32,17 +32,14 @@ protected:
     }
 
     // Where the tree of a model came from.
-    std::string origin(const std::string& model, std::vector<std::string> options = {}) const {
-        std::vector<std::string> words = {"simplify", model, "-o", "small.ply", "--json", "-"};
-        words.insert(words.end(), options.begin(), options.end());
-        const Outcome run_through = run(words);
-        EXPECT_EQ(run_through.status, 0) << run_through.err;
+    std::string origin(const std::string& model, Words options = {}) const {
+        const Outcome run_through = succeed(joined({"simplify", model, "-o", "small.ply", "--json", "-"}, options));
         return run_through.json().value("tree", "missing");
     }
 
     // The sources of what is kept, the last used first.
-    std::vector<std::string> kept() const {
-        std::vector<std::string> sources;
+    Words kept() const {
+        Words sources;
         for (const auto& tree : TreeCache().trees()) sources.push_back(tree.source);
         return sources;
     }
@@ -52,20 +49,17 @@ protected:
 };
 
 TEST_F(CacheTest, TheSecondStartReads) {
-    const Outcome first = run({"simplify", "ball.obj", "-o", "first.ply", "--json", "first.json"});
-    ASSERT_EQ(first.status, 0) << first.err;
+    const Outcome first = succeed({"simplify", "ball.obj", "-o", "first.ply", "--json", "first.json"});
     EXPECT_EQ(Json::parse(read_text(path("first.json")))["tree"], "built");
     EXPECT_THAT(first.err, HasSubstr("built and measured the tree of ball.obj in "));
     EXPECT_THAT(first.err, HasSubstr("kept in " + path("cache").string() + " for the next time (unseen cache)"));
     EXPECT_THAT(kept(), ElementsAre("ball.obj"));
 
-    const Outcome second = run({"simplify", "ball.obj", "-o", "second.ply", "--json", "second.json"});
-    ASSERT_EQ(second.status, 0) << second.err;
+    const Outcome second = succeed({"simplify", "ball.obj", "-o", "second.ply", "--json", "second.json"});
     EXPECT_EQ(Json::parse(read_text(path("second.json")))["tree"], "cache");
     EXPECT_EQ(second.err, "");
     EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply"))) << "another mesh";
-    const Outcome anew = run({"simplify", "ball.obj", "-o", "anew.ply", "--no-cache"});
-    ASSERT_EQ(anew.status, 0) << anew.err;
+    const Outcome anew = succeed({"simplify", "ball.obj", "-o", "anew.ply", "--no-cache"});
     EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("anew.ply"))) << "what is kept changes the mesh";
 }
 
@@ -153,9 +147,7 @@ TEST_F(CacheTest, WhatWasNotUsedForLongestGoesFirst) {
     EXPECT_THAT(kept(), ElementsAre("c.obj", "a.obj"));
 
     ::setenv("UNSEEN_CACHE_SIZE", "1K", 1);
-    const Outcome too_large = run({"simplify", "b.obj", "-o", "small.ply"});
-    EXPECT_EQ(too_large.status, 0);
-    EXPECT_THAT(too_large.err, HasSubstr("larger than"));
+    EXPECT_THAT(succeed({"simplify", "b.obj", "-o", "small.ply"}).err, HasSubstr("larger than"));
     EXPECT_THAT(kept(), SizeIs(2)) << "nothing goes for what is not kept";
 }
 
@@ -172,8 +164,7 @@ TEST_F(CacheTest, IsLeftAloneWhereNobodyWantsIt) {
 TEST_F(CacheTest, AFolderThatCannotBeWrittenToIsNoFailure) {
     write_text(path("no-folder"), "");
     ::setenv("UNSEEN_CACHE", path("no-folder/cache").c_str(), 1);
-    const Outcome outcome = run({"simplify", "ball.obj", "-o", "small.ply"});
-    EXPECT_EQ(outcome.status, 0);
+    const Outcome outcome = succeed({"simplify", "ball.obj", "-o", "small.ply"});
     EXPECT_TRUE(fs::exists(path("small.ply")));
     EXPECT_THAT(outcome.err, HasSubstr("not kept for the next time: Cannot make '" + path("no-folder/cache").string()));
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
@@ -235,11 +226,8 @@ TEST_F(CacheTest, MeasurementsOfTreeFilesAreKept) {
     EXPECT_TRUE(read_text(path("first.ply")) == read_text(path("second.ply")));
 
     // Another light makes another tree of it.
-    const std::vector<std::string> lit = {"simplify", "plain.vdt", "--light", "0", "0", "1", "-o"};
-    const auto with = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), lit.begin(), lit.end());
-        return run(more);
-    };
+    const Words lit = {"simplify", "plain.vdt", "--light", "0", "0", "1", "-o"};
+    const auto with = [&](Words more) { return run(joined(lit, more)); };
     EXPECT_EQ(with({"lit.ply"}).status, 0);
     EXPECT_EQ(with({"lit-anew.ply", "--no-cache"}).status, 0);
     EXPECT_TRUE(read_text(path("lit.ply")) == read_text(path("lit-anew.ply")));
@@ -251,11 +239,8 @@ TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKept) {
                                         "intensity": 0.8}]})");
     write_text(path("other.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [-1, 0, 1],
                                         "intensity": 0.6}]})");
-    const auto lit = [&](const std::string& model, const std::string& lights, const std::string& out,
-                         std::vector<std::string> more = {}) {
-        more.insert(more.begin(), {"simplify", model, "--lights", lights, "-o", out});
-        const Outcome outcome = run(more);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto lit = [&](const std::string& model, const std::string& lights, const std::string& out, Words more = {}) {
+        const Outcome outcome = succeed(joined({"simplify", model, "--lights", lights, "-o", out}, more));
         return outcome.err;
     };
     const std::string measured = "measured what the folds of ball.obj change under lights";
@@ -301,12 +286,10 @@ TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptInTreeFiles) {
     write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 2, 0.5],
                                         "intensity": 0.8}]})");
     ASSERT_EQ(run({"build", "ball.obj", "-o", "plain.vdt"}).status, 0);
-    const Outcome built = run({"build", "ball.obj", "-o", "lit.vdt", "--lit-fold-errors", "--json", "-"});
-    ASSERT_EQ(built.status, 0) << built.err;
+    const Outcome built = succeed({"build", "ball.obj", "-o", "lit.vdt", "--lit-fold-errors", "--json", "-"});
     EXPECT_EQ(built.json()["lit_fold_errors"], true);
     const auto lit = [&](const std::string& tree, const std::string& out) {
-        const Outcome outcome = run({"simplify", tree, "--lights", "lights.json", "-o", out});
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome outcome = succeed({"simplify", tree, "--lights", "lights.json", "-o", out});
         return outcome.err;
     };
     EXPECT_EQ(lit("lit.vdt", "lit.ply"), "");
@@ -323,8 +306,8 @@ TEST_F(CacheTest, WhatFoldsChangeUnderLightsIsKeptOfScenes) {
                                         "intensity": 0.8}]})");
     ASSERT_EQ(run({"simplify", "ball.obj", "--full", "-o", "ball.gltf", "--no-cache"}).status, 0);
     const auto lit = [&](const std::string& out) {
-        const Outcome outcome = run({"simplify", "ball.gltf", "--as", "scene", "--lights", "lights.json", "-o", out});
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome outcome =
+            succeed({"simplify", "ball.gltf", "--as", "scene", "--lights", "lights.json", "-o", out});
         return outcome.err;
     };
     EXPECT_THAT(lit("first.gltf"), HasSubstr("measured what the folds of ball.gltf change under lights"));
@@ -350,9 +333,7 @@ TEST_F(CacheTest, WrongSettingsAreSaid) {
                 HasSubstr("$UNSEEN_CACHE_SIZE is passed over: 'abc' is no size"));
     write_text(path("file"), "");
     ::setenv("UNSEEN_CACHE", path("file").c_str(), 1);
-    const Outcome listed = run({"cache"});
-    EXPECT_EQ(listed.status, 1);
-    EXPECT_THAT(listed.err, HasSubstr("file' is no folder: no trees are kept."));
+    EXPECT_THAT(run({"cache"}), fails(1, HasSubstr("file' is no folder: no trees are kept.")));
 }
 
 TEST_F(CacheTest, AProgramChoosesTheFolderOrNone) {

@@ -12,9 +12,8 @@ class CalibrateCommandTest : public CommandTest {};
 
 TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
     const Outcome outcome =
-        run({"calibrate", "--simulate", "castle:gain=0.7", "--seed", "3", "--trials", "400", "-o", "observer.json",
-             "--json", "report.json", "--date", "2001-06-25", "--conditions", "dim room"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
+        succeed({"calibrate", "--simulate", "castle:gain=0.7", "--seed", "3", "--trials", "400", "-o", "observer.json",
+                 "--json", "report.json", "--date", "2001-06-25", "--conditions", "dim room"});
     EXPECT_THAT(outcome.out, HasSubstr("400 answers"));
     EXPECT_THAT(outcome.out, HasSubstr("dB (rms over what can be seen)"));
     const Json report = Json::parse(read_text(path("report.json")));
@@ -38,7 +37,7 @@ TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
     EXPECT_EQ(profile["measured_wide"].size(), 4u);
 
     // The table stands for the observer: 0.7 of the standard one.
-    const auto sensitivity = [&](std::vector<std::string> more) {
+    const auto sensitivity = [&](Words more) {
         more.insert(more.begin(),
                     {"csf", "--frequency", "3", "--luminance", "50.25", "--eccentricity", "7", "--json", "-"});
         return run(more).json()["sensitivity"].get<double>();
@@ -49,22 +48,17 @@ TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
 TEST_F(CalibrateCommandTest, EveryVerbTakesTheProfile) {
     build_ball();
     ASSERT_EQ(run({"calibrate", "--simulate", "castle:gain=0.2", "--trials", "60", "-o", "poor.json"}).status, 0);
-    const auto triangles = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "out.ply", "--json", "-", "--size", "256x256"});
-        const Outcome outcome = run(more);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto triangles = [&](Words more) {
+        const Outcome outcome =
+            succeed(joined({"simplify", "ball.vdt", "-o", "out.ply", "--json", "-", "--size", "256x256"}, more));
         return outcome.json()["triangles"].get<int>();
     };
     EXPECT_LT(triangles({"--csf", "poor.json"}), triangles({})) << "who sees less needs less";
 }
 
 TEST_F(CalibrateCommandTest, RepeatsWithItsSeedAndResumes) {
-    const std::vector<std::string> words = {"calibrate", "--simulate", "stela", "--trials", "40", "--date", "now"};
-    const auto with = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), words.begin(), words.end());
-        const Outcome outcome = run(more);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-    };
+    const Words words = {"calibrate", "--simulate", "stela", "--trials", "40", "--date", "now"};
+    const auto with = [&](Words more) { succeed(joined(words, more)); };
     with({"--seed", "5", "-o", "a.json"});
     with({"--seed", "5", "-o", "b.json", "--resume", "state.json"});
     with({"--seed", "6", "-o", "c.json"});
@@ -81,9 +75,8 @@ TEST_F(CalibrateCommandTest, RepeatsWithItsSeedAndResumes) {
 
 // A state's plan stays as it is: what is given and says otherwise is named.
 TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
-    const auto with = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"calibrate", "--simulate", "castle", "--date", "now", "--resume", "state.json"});
-        return run(more);
+    const auto with = [&](Words more) {
+        return run(joined({"calibrate", "--simulate", "castle", "--date", "now", "--resume", "state.json"}, more));
     };
     ASSERT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "1", "4", "--eccentricities", "0", "10", "-o",
                     "a.json"})
@@ -95,7 +88,7 @@ TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
         write_text(path("state.json"), state.dump());
     };
     takes_half_away();
-    const std::vector<std::pair<std::vector<std::string>, const char*>> differing = {
+    const std::vector<std::pair<Words, const char*>> differing = {
         {{"--method", "adjustment"}, "--method (it was 2ifc)"},
         {{"--trials", "40"}, "--trials (it was 30)"},
         {{"--settings", "9"}, "--settings (it was 7)"},
@@ -126,10 +119,9 @@ TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
 // Places are chosen by what is seen at the luminance that is shown.
 TEST_F(CalibrateCommandTest, PlacesAreVisibleAtTheLuminanceThatIsGiven) {
     const auto places = [&](const char* luminance) {
-        const Outcome outcome =
-            run({"calibrate", "--simulate", "castle", "--trials", "1", "--luminance", luminance, "--json", "-"});
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        const Json json = outcome.json();
+        const Json json =
+            succeed({"calibrate", "--simulate", "castle", "--trials", "1", "--luminance", luminance, "--json", "-"})
+                .json();
         for (const Json& row : json["measured"])
             EXPECT_GE(row["true_sensitivity"].get<double>() * json["highest_contrast"].get<double>(), 3);
         return json["measured"].size();
@@ -138,10 +130,8 @@ TEST_F(CalibrateCommandTest, PlacesAreVisibleAtTheLuminanceThatIsGiven) {
 }
 
 TEST_F(CalibrateCommandTest, WidePatchesAreLeftOutOrAddedAsAskedFor) {
-    const auto report = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"calibrate", "--simulate", "castle", "--json", "-"});
-        const Outcome outcome = run(more);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto report = [&](Words more) {
+        const Outcome outcome = succeed(joined({"calibrate", "--simulate", "castle", "--json", "-"}, more));
         return outcome.json();
     };
     const Json all = report({}), small = report({"--no-wide"});
@@ -149,9 +139,9 @@ TEST_F(CalibrateCommandTest, WidePatchesAreLeftOutOrAddedAsAskedFor) {
     EXPECT_EQ(small["answers"], 200);
     EXPECT_FALSE(small.contains("summation"));
     EXPECT_EQ(all["measured"].size(), small["measured"].size() + 4);
-    const std::vector<std::string> named = {"--frequencies", "1", "4", "--eccentricities", "0", "--trials", "30"};
+    const Words named = {"--frequencies", "1", "4", "--eccentricities", "0", "--trials", "30"};
     EXPECT_EQ(report(named)["measured"].size(), 2u);
-    std::vector<std::string> wide = named;
+    Words wide = named;
     wide.push_back("--wide");
     const Json with_wide = report(wide);
     ASSERT_EQ(with_wide["measured"].size(), 4u);
@@ -166,19 +156,15 @@ TEST_F(CalibrateCommandTest, WidePatchesAreLeftOutOrAddedAsAskedFor) {
     EXPECT_THAT(worse.err, HasSubstr("Wide patches were seen worse than small ones"));
     EXPECT_FALSE(fs::exists(path("worse.json")));
     EXPECT_FALSE(fs::exists(path("report.json")));
-    const Outcome none =
-        run({"calibrate", "--simulate", "castle", "--frequencies", "60", "--eccentricities", "0", "--wide"});
-    EXPECT_EQ(none.status, 1);
-    EXPECT_THAT(none.err, HasSubstr("No wide patch"));
+    EXPECT_THAT(run({"calibrate", "--simulate", "castle", "--frequencies", "60", "--eccentricities", "0", "--wide"}),
+                fails(1, HasSubstr("No wide patch")));
 }
 
 TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
-    const std::vector<std::string> words = {"calibrate",     "--simulate", "castle",           "--trials", "20",
-                                            "--frequencies", "60",         "--eccentricities", "40"};
-    const Outcome outcome = run(words);
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(outcome.out, HasSubstr("this observer can see none of it"));
-    std::vector<std::string> with_json = words;
+    const Words words = {"calibrate",     "--simulate", "castle",           "--trials", "20",
+                         "--frequencies", "60",         "--eccentricities", "40"};
+    EXPECT_THAT(succeed(words).out, HasSubstr("this observer can see none of it"));
+    Words with_json = words;
     with_json.insert(with_json.end(), {"--json", "-"});
     EXPECT_TRUE(run(with_json).json()["rms_error_db"].is_null());
 }
@@ -186,9 +172,8 @@ TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
 // Settings that all agree make a place as certain as the grid is fine, and no more.
 TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
     const Outcome outcome =
-        run({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings",
-             "300", "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
+        succeed({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings",
+                 "300", "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
     EXPECT_LT(outcome.json()["rms_error_db"], 0.2);
     const Json row = outcome.json()["measured"][0];
     EXPECT_LT(row["low"], row["true_sensitivity"]);
@@ -198,17 +183,14 @@ TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
 
 TEST_F(CalibrateCommandTest, AdjustsToo) {
     const Outcome outcome =
-        run({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
+        succeed({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
     EXPECT_LT(outcome.json()["rms_error_db"], 1.0);
     EXPECT_EQ(outcome.json()["method"], "adjustment");
 }
 
 TEST_F(CalibrateCommandTest, PhotometersMakeDisplays) {
     write_text(path("p.csv"), "code,cdm2\n0,0.2\n64,12\n128,50\n192,120\n255,240\n");
-    const Outcome outcome = run({"calibrate", "--photometer", "p.csv", "-o", "display.json"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(outcome.out, HasSubstr("peak 240 cd/m2"));
+    EXPECT_THAT(succeed({"calibrate", "--photometer", "p.csv", "-o", "display.json"}).out, HasSubstr("peak 240 cd/m2"));
     const Json display = Json::parse(read_text(path("display.json")));
     EXPECT_EQ(display["transfer"], "table");
     EXPECT_NEAR(display["peak_cdm2"], 240, 1e-9);
@@ -233,31 +215,28 @@ TEST_F(CalibrateCommandTest, TheChartIsAPicture) {
 }
 
 TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
-    const std::vector<std::vector<std::string>> wrong = {
-        {"--simulate", "castle", "--trials", "0"},
-        {"--simulate", "castle", "--trials", "1.5"},
-        {"--simulate", "castle", "--trials", "nan"},
-        {"--simulate", "castle", "--seed", "-1"},
-        {"--simulate", "castle", "--method", "3ifc"},
-        {"--simulate", "castle", "-o", "x.txt"},
-        {"--simulate", "castle", "--chart"},
-        {"--photometer", "p.csv"},
-        {"--chart", "-o", "x.json"},
-        {"--simulate", "castle", "--luminance", "0"},
-        {"--simulate", "castle", "--frequencies", "4"},
-        {"--simulate", "castle", "--settings", "9"},
-        {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
-        {"--chart", "--seed", "2"},
-        {"--chart", "--wide"},
-        {"--gamma", "--resume", "state.json"}};
-    for (std::vector<std::string> words : wrong) {
+    const std::vector<Words> wrong = {{"--simulate", "castle", "--trials", "0"},
+                                      {"--simulate", "castle", "--trials", "1.5"},
+                                      {"--simulate", "castle", "--trials", "nan"},
+                                      {"--simulate", "castle", "--seed", "-1"},
+                                      {"--simulate", "castle", "--method", "3ifc"},
+                                      {"--simulate", "castle", "-o", "x.txt"},
+                                      {"--simulate", "castle", "--chart"},
+                                      {"--photometer", "p.csv"},
+                                      {"--chart", "-o", "x.json"},
+                                      {"--simulate", "castle", "--luminance", "0"},
+                                      {"--simulate", "castle", "--frequencies", "4"},
+                                      {"--simulate", "castle", "--settings", "9"},
+                                      {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
+                                      {"--chart", "--seed", "2"},
+                                      {"--chart", "--wide"},
+                                      {"--gamma", "--resume", "state.json"}};
+    for (Words words : wrong) {
         words.insert(words.begin(), "calibrate");
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 2) << words[1] << " " << words.back();
-        EXPECT_THAT(outcome.err, HasSubstr("unseen: "));
+        EXPECT_THAT(run(words), fails(2, HasSubstr("unseen: "))) << words[1] << " " << words.back();
     }
     write_text(path("bad.json"), "{\"format\": \"unseen-calibration\", \"version\": 1, \"method\": \"2ifc\"}");
-    const std::vector<std::pair<std::vector<std::string>, const char*>> failing = {
+    const std::vector<std::pair<Words, const char*>> failing = {
         {{"--simulate", "nobody"}, "nobody"},
         {{"--simulate", "castle:age=40"}, "age"},
         {{"--simulate", "missing.json"}, "missing.json"},
@@ -272,9 +251,7 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
         {{"--photometer", "missing.csv", "-o", "d.json"}, "missing.csv"},
         {{"--simulate", "castle", "--display", "missing.json"}, "missing.json"}};
     for (const auto& [more, expected] : failing) {
-        std::vector<std::string> words = {"calibrate"};
-        words.insert(words.end(), more.begin(), more.end());
-        const Outcome outcome = run(words);
+        const Outcome outcome = run(joined({"calibrate"}, more));
         EXPECT_EQ(outcome.status, 1) << expected;
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
         EXPECT_THAT(outcome.err, HasSubstr(expected));

@@ -18,9 +18,7 @@ protected:
         write_text(path("small.json"), R"({"name": "small", "width_px": 360, "height_px": 240, "pixel_pitch_m": 0.0005,
             "viewing_distance_m": 0.5, "peak_cdm2": 100, "black_cdm2": 0.5})");
     }
-    bool open(const std::vector<std::string>& more) {
-        return WindowTest::open({"calibrate", "--display", "small.json"}, more);
-    }
+    bool open(const Words& more) { return WindowTest::open({"calibrate", "--display", "small.json"}, more); }
     Json state() const { return Json::parse(read_text(path("state.json")), nullptr, false); }
 
     std::size_t answers() const {
@@ -43,9 +41,9 @@ protected:
 };
 
 TEST_F(CalibrateWindowTest, TwoIntervalsAreAnsweredWithKeysAndTakenUpAgain) {
-    const std::vector<std::string> words = {"--trials",      "20", "--interval",       "0.02", "--resume", "state.json",
-                                            "--frequencies", "2",  "--eccentricities", "0",    "5",        "--observer",
-                                            "anna",          "-o", "anna.json"};
+    const Words words = {"--trials",      "20", "--interval",       "0.02", "--resume", "state.json",
+                         "--frequencies", "2",  "--eccentricities", "0",    "5",        "--observer",
+                         "anna",          "-o", "anna.json"};
     if (!open(words)) GTEST_SKIP() << "no window: " << errors();
     EXPECT_THAT(window().title_with("1 of 20"), HasSubstr("2 cpd"));
     press_until(XK_1, 1);
@@ -70,9 +68,9 @@ TEST_F(CalibrateWindowTest, TwoIntervalsAreAnsweredWithKeysAndTakenUpAgain) {
 }
 
 TEST_F(CalibrateWindowTest, AdjustmentShowsAGratingAndTakesTheContrast) {
-    const std::vector<std::string> words = {
-        "--method", "adjustment", "--settings", "3",          "--frequencies", "2",    "--eccentricities", "0",
-        "--fade",   "0.001",      "--resume",   "state.json", "--screenshot",  "s.png"};
+    const Words words = {"--method",         "adjustment", "--settings", "3",     "--frequencies", "2",
+                         "--eccentricities", "0",          "--fade",     "0.001", "--resume",      "state.json",
+                         "--screenshot",     "s.png"};
     if (!open(words)) GTEST_SKIP() << "no window: " << errors();
     window().title_with("1 of 3");
     for (int i = 0; i < 60; ++i) window().press(XK_Up); // to the top: a grating that anybody sees

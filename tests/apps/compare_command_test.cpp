@@ -24,12 +24,10 @@ protected:
     void write(const std::string& name, const Image& image) const {
         const auto written = require(unseen::perception::write_image(path(name), image));
     }
-    Json compare(std::vector<std::string> words) const {
+    Json compare(Words words) const {
         words.insert(words.begin(), "compare");
         words.insert(words.end(), {"--json", "-"});
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        const Json report = outcome.json();
+        const Json report = succeed(words).json();
         EXPECT_THAT(keys(report), UnorderedElementsAre("visible_at", "different_pixels", "visible_pixels", "pixels",
                                                        "max_ratio", "ssim", "device"));
         EXPECT_TRUE(report["visible_pixels"].is_number_unsigned()) << report;
@@ -74,16 +72,10 @@ TEST_F(CompareTest, ItIsLessVisibleAside) {
 TEST_F(CompareTest, SeesForAnObserver) {
     write("a.pfm", disc(20, 20));
     write("b.pfm", disc(20.1f, 20));
-    const auto seen = [&](const std::vector<std::string>& more) {
-        std::vector<std::string> words = {"a.pfm", "b.pfm"};
-        words.insert(words.end(), more.begin(), more.end());
-        return compare(words)["max_ratio"].get<double>();
+    const auto seen = [&](const Words& more) {
+        return compare(joined({"a.pfm", "b.pfm"}, more))["max_ratio"].get<double>();
     };
-    const auto out = [&](const std::vector<std::string>& more) {
-        std::vector<std::string> words = {"compare", "a.pfm", "b.pfm"};
-        words.insert(words.end(), more.begin(), more.end());
-        return run(words).out;
-    };
+    const auto out = [&](const Words& more) { return run(joined({"compare", "a.pfm", "b.pfm"}, more)).out; };
     const double median = seen({"--observer", "median"});
     EXPECT_GT(median, 0);
     EXPECT_NEAR(seen({"--observer", "default"}) / median, 2, 1e-3);
@@ -117,9 +109,8 @@ TEST_F(CompareTest, SeesByAnotherSensitivity) {
 
 TEST_F(CompareTest, RefusesWhatTheJudgeDoesNotKnow) {
     write("a.pfm", disc(20, 20));
-    const auto error = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"compare", "a.pfm", "a.pfm"});
-        const Outcome outcome = run(more);
+    const auto error = [&](Words more) {
+        const Outcome outcome = run(joined({"compare", "a.pfm", "a.pfm"}, more));
         EXPECT_NE(outcome.status, 0);
         return outcome.err;
     };
@@ -175,10 +166,9 @@ TEST_F(CompareTest, WritesMaps) {
 TEST_F(CompareTest, AMapThatCannotBeWrittenLeavesNoOtherFile) {
     write("a.pfm", disc(20, 20));
     const auto before = files();
-    const Outcome outcome =
-        run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "a.pfm/t.pfm", "--json", "o.json"});
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+    EXPECT_THAT(
+        run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "a.pfm/t.pfm", "--json", "o.json"}),
+        fails(1, IsAnErrorForPeople()));
     EXPECT_EQ(files(), before);
 }
 
@@ -201,9 +191,9 @@ TEST_F(CompareTest, PerceptualDiffHasNoBlackLevel) {
     EXPECT_LT(display["max_ratio"], program["max_ratio"]);
     EXPECT_EQ(compare({"a.png", "b.png", "--model", "rpg99", "--display", "perceptualdiff"}), program);
     write("a.pfm", disc(20, 0));
-    const Outcome absolute = run({"compare", "a.pfm", "a.pfm", "--model", "rpg99", "--profile", "perceptualdiff"});
-    EXPECT_EQ(absolute.status, 1) << "cd/m2 are no codes";
-    EXPECT_THAT(absolute.err, IsAnErrorForPeople());
+    EXPECT_THAT(run({"compare", "a.pfm", "a.pfm", "--model", "rpg99", "--profile", "perceptualdiff"}),
+                fails(1, IsAnErrorForPeople()))
+        << "cd/m2 are no codes";
 }
 
 TEST_F(CompareTest, TheGpuSaysWhatTheCpuSays) {
@@ -221,15 +211,13 @@ TEST_F(CompareTest, TheGpuSaysWhatTheCpuSays) {
         EXPECT_EQ(on_gpu["device"], "gpu");
         EXPECT_EQ(on_cpu["device"], "cpu");
         EXPECT_NEAR(on_gpu["max_ratio"].get<double>() / on_cpu["max_ratio"].get<double>(), 1, 1e-3);
-        const auto gpu = unseen::perception::read_image(path("gpu.pfm")),
-                   cpu = unseen::perception::read_image(path("cpu.pfm"));
-        ASSERT_TRUE(gpu && cpu);
+        const auto gpu = require(unseen::perception::read_image(path("gpu.pfm"))),
+                   cpu = require(unseen::perception::read_image(path("cpu.pfm")));
         for (std::size_t i = 0; i < cpu->image.values.size(); ++i)
             ASSERT_NEAR(gpu->image.values[i] / cpu->image.values[i], 1, 1e-3) << i;
     }
-    const Outcome refused = run({"compare", "a.pfm", "b.pfm", "--model", "rpg99", "--device", "gpu"});
-    EXPECT_EQ(refused.status, 2);
-    EXPECT_THAT(refused.err, HasSubstr("--device"));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "rpg99", "--device", "gpu"}),
+                fails(2, HasSubstr("--device")));
 }
 
 } // namespace compare_command_test

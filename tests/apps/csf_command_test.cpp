@@ -11,18 +11,15 @@ using ::testing::HasSubstr;
 
 class CsfCommandTest : public CommandTest {
 protected:
-    double sensitivity(std::vector<std::string> words) const {
-        words.insert(words.begin(), {"csf", "--json", "-"});
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    double sensitivity(Words words) const {
+        const Outcome outcome = succeed(joined({"csf", "--json", "-"}, words));
         return outcome.status == 0 ? outcome.json()["sensitivity"].get<double>() : 0;
     }
 };
 
 TEST_F(CsfCommandTest, GivesThePublishedModels) {
     // From the published implementations of castleCSF and stelaCSF, at 0.125 cpd, 0.1 cd/m2, area 0.1, nasal.
-    const std::vector<std::string> stimulus = {"--frequency", "0.125", "--luminance", "0.1",
-                                               "--area",      "0.1",   "--field",     "nasal"};
+    const Words stimulus = {"--frequency", "0.125", "--luminance", "0.1", "--area", "0.1", "--field", "nasal"};
     auto with_model = [&](const std::string& model) {
         auto words = stimulus;
         words.insert(words.end(), {"--model", model});
@@ -54,10 +51,7 @@ TEST_F(CsfCommandTest, GivesTheClassicalModelsAndTheColourBranches) {
 }
 
 TEST_F(CsfCommandTest, MotionMakesFineDetailFadeAndPursuitBringsItBack) {
-    const auto with = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"--frequency", "8", "--luminance", "100"});
-        return sensitivity(more);
-    };
+    const auto with = [&](Words more) { return sensitivity(joined({"--frequency", "8", "--luminance", "100"}, more)); };
     EXPECT_LT(with({"--velocity", "10"}), 0.1 * with({}));
     EXPECT_EQ(with({"--velocity", "10", "--pursuit"}), with({"--velocity", std::to_string(10 - 8.35)}));
     EXPECT_LT(with({"--temporal", "20"}), with({}));
@@ -69,7 +63,7 @@ TEST_F(CsfCommandTest, MotionMakesFineDetailFadeAndPursuitBringsItBack) {
 }
 
 TEST_F(CsfCommandTest, ContradictionsAreRefused) {
-    const std::vector<std::pair<std::vector<std::string>, std::string>> bad = {
+    const std::vector<std::pair<Words, std::string>> bad = {
         {{"--temporal", "8", "--velocity", "1"}, "exclude each other"},
         {{"--model", "stela", "--csf", "castle"}, "--model and --csf exclude each other"},
         {{"--velocity", "-1"}, "0 or more"},
@@ -84,19 +78,15 @@ TEST_F(CsfCommandTest, ContradictionsAreRefused) {
         {{"--csf", "castle-red-green"}, "colour"},
     };
     for (const auto& [options, expected] : bad) {
-        std::vector<std::string> words = {"csf", "--frequency", "4", "--luminance", "100"};
-        words.insert(words.end(), options.begin(), options.end());
-        const Outcome outcome = run(words);
+        const Outcome outcome = run(joined({"csf", "--frequency", "4", "--luminance", "100"}, options));
         EXPECT_NE(outcome.status, 0) << expected;
         EXPECT_EQ(outcome.out, "") << expected;
         EXPECT_THAT(outcome.err, ::testing::StartsWith("unseen: "));
         EXPECT_THAT(outcome.err, HasSubstr(expected));
     }
     ASSERT_EQ(run({"csf", "--table", "--save-table", "own.json"}).status, 0);
-    const Outcome outcome =
-        run({"csf", "--csf", "own.json", "--frequency", "4", "--luminance", "9", "--velocity", "1"});
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, HasSubstr("--velocity"));
+    EXPECT_THAT(run({"csf", "--csf", "own.json", "--frequency", "4", "--luminance", "9", "--velocity", "1"}),
+                fails(1, HasSubstr("--velocity")));
 }
 
 TEST_F(CsfCommandTest, TheDefaultAreaIsAPatchOfOneAndAHalfCycles) {
@@ -106,7 +96,7 @@ TEST_F(CsfCommandTest, TheDefaultAreaIsAPatchOfOneAndAHalfCycles) {
 }
 
 TEST_F(CsfCommandTest, TheWorstFieldIsTheMoreSensitive) {
-    const std::vector<std::string> words = {"--frequency", "4", "--luminance", "100", "--eccentricity", "20"};
+    const Words words = {"--frequency", "4", "--luminance", "100", "--eccentricity", "20"};
     const auto in_field = [&](const std::string& field) {
         auto all = words;
         all.insert(all.end(), {"--field", field});
@@ -123,10 +113,9 @@ TEST_F(CsfCommandTest, AppendsSensitivityToRows) {
                              "anna,4,100,0,1,nasal\n"
                              "\n"
                              "ben,8, 20 ,10,,\r\n";
-    const Outcome outcome = run({"csf", "--csv", "-"}, rows);
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Outcome outcome = succeed({"csf", "--csv", "-"}, rows);
     std::istringstream lines(outcome.out);
-    std::vector<std::string> line(5);
+    Words line(5);
     for (std::string& l : line) ASSERT_TRUE(std::getline(lines, l));
     EXPECT_EQ(line[0], "# measured on a rainy day");
     EXPECT_EQ(line[1], "subject,frequency,luminance,eccentricity,area,field,sensitivity");
@@ -141,8 +130,7 @@ TEST_F(CsfCommandTest, AppendsSensitivityToRows) {
 
 TEST_F(CsfCommandTest, MissingColumnsTakeTheOptions) {
     write_text(path("s.csv"), "frequency\n4\n");
-    const Outcome outcome = run({"csf", "--csv", "s.csv", "--luminance", "50", "--eccentricity", "5"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Outcome outcome = succeed({"csf", "--csv", "s.csv", "--luminance", "50", "--eccentricity", "5"});
     const double expected = sensitivity({"--frequency", "4", "--luminance", "50", "--eccentricity", "5"});
     EXPECT_NEAR(std::strtod(outcome.out.c_str() + outcome.out.rfind(',') + 1, nullptr), expected, 1e-11);
 }
@@ -185,7 +173,7 @@ TEST_F(CsfCommandTest, TheTableFollowsTheFormula) {
 
 TEST_F(CsfCommandTest, TablesCanBeSavedAndUsed) {
     ASSERT_EQ(run({"csf", "--table", "--save-table", "table.json"}).status, 0);
-    const std::vector<std::string> stimulus = {"--frequency", "5", "--luminance", "12"};
+    const Words stimulus = {"--frequency", "5", "--luminance", "12"};
     auto by_file = stimulus, by_model = stimulus;
     by_file.insert(by_file.end(), {"--csf", "table.json"});
     by_model.push_back("--table");
@@ -217,9 +205,8 @@ TEST_F(CsfCommandTest, SaysWhereATableHasNoSamples) {
 // A measured profile says more than its table: it must not be lost to it.
 TEST_F(CsfCommandTest, ATableIsNotWrittenOverTheOneThatIsRead) {
     ASSERT_EQ(run({"csf", "--table", "--save-table", "table.json"}).status, 0);
-    const Outcome outcome = run({"csf", "--csf", "table.json", "--save-table", "./table.json"});
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, HasSubstr("table.json' is read"));
+    EXPECT_THAT(run({"csf", "--csf", "table.json", "--save-table", "./table.json"}),
+                fails(1, HasSubstr("table.json' is read")));
 }
 
 TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
@@ -231,9 +218,8 @@ TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
     EXPECT_EQ(sensitivity({"--csf", "daly", "--frequency", "5", "--luminance", "12"}),
               sensitivity({"--model", "daly", "--table", "--frequency", "5", "--luminance", "12"}));
     // A row cannot have conditions that the table has not.
-    const Outcome outcome = run({"csf", "--table", "--csv", "-"}, "frequency,luminance,velocity\n4,100,3\n");
-    EXPECT_EQ(outcome.status, 1);
-    EXPECT_THAT(outcome.err, HasSubstr("line 2"));
+    EXPECT_THAT(run({"csf", "--table", "--csv", "-"}, "frequency,luminance,velocity\n4,100,3\n"),
+                fails(1, HasSubstr("line 2")));
 }
 
 TEST_F(CsfCommandTest, PlotsCurves) {

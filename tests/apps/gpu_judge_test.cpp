@@ -174,9 +174,8 @@ TEST_F(GpuJudgeTest, JudgesTexturesAsTheyLie) {
                black = static_cast<float>(display.black.value());
     const auto relative = [&](unsigned seed) { return noise(61, 40, 0.4, 0.5, seed); };
     const Image a = relative(1), b = relative(2);
-    const auto up_a = render::LuminanceImage::create(context(), 61, 40, a.values),
-               up_b = render::LuminanceImage::create(context(), 61, 40, b.values);
-    ASSERT_TRUE(up_a && up_b);
+    const auto up_a = require(render::LuminanceImage::create(context(), 61, 40, a.values)),
+               up_b = require(render::LuminanceImage::create(context(), 61, 40, b.values));
     auto texture_a = up_a->texture(), texture_b = up_b->texture();
     texture_a.scale = texture_b.scale = scale;
     texture_a.offset = texture_b.offset = black;
@@ -290,9 +289,7 @@ TEST_F(GpuJudgeTest, RefusesWhatTheCpuRefuses) {
     short_one.values.pop_back();
     EXPECT_FALSE(judge->judge(short_one));
     const int too_many = render::largest_target_side() + 1;
-    const auto large = GpuJudge::create(context(), flat(too_many, 1, 1), {});
-    ASSERT_FALSE(large);
-    EXPECT_THAT(large.error().message, HasSubstr("textures"));
+    EXPECT_THAT(error_in(GpuJudge::create(context(), flat(too_many, 1, 1), {})), HasSubstr("textures"));
     EXPECT_FALSE(GpuJudge::create(context(), good, {.beta = std::nan("")}));
     EXPECT_FALSE(GpuJudge::create(context(), good, {.gain = 0}));
     EXPECT_FALSE(GpuJudge::create(context(), good, {.gaze_px = glm::dvec2(std::nan(""), 0)}));

@@ -25,11 +25,7 @@ struct Direction {
     bool operator==(const Direction&) const = default;
 };
 
-VertexTree built(const HardMesh& hard) {
-    auto tree = build_hard_tree(hard);
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
+VertexTree built(const HardMesh& hard) { return std::move(*require(build_hard_tree(hard))); }
 
 // Looked at, and so many degrees aside.
 constexpr double degrees_aside[] = {0, 12, 50}; // the fold oracle looks 29 degrees aside
@@ -51,8 +47,7 @@ public:
         look.view = vdtree::frame_sphere(tree_.origin() + glm::dvec3(sphere.centre), sphere.radius, from.towards_eye,
                                          from.fill, look.view);
         if (aside > 0) look.options.gaze_px = session::gaze_aside(look.options.display, look.view, aside);
-        const auto criterion = make_criterion(look.view, look.options);
-        if (!criterion) throw std::runtime_error(criterion.error().message);
+        const auto criterion = require(make_criterion(look.view, look.options));
         vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree_, look.view, look.options);
         if (lighting_) viewpoint.lighting = *lighting_;
         vdtree::Cut cut(tree_);

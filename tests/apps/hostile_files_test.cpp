@@ -7,14 +7,13 @@
 namespace unseen::app::testing {
 namespace {
 
-using Words = std::vector<std::string>;
+using Words = Words;
 
 class HostileFilesTest : public CommandTest {
 protected:
     // Ends after so many seconds, with status 124.
     Outcome run_within(int seconds, Words words) const {
-        words.insert(words.begin(), {"/usr/bin/timeout", std::to_string(seconds), UNSEEN_COMMAND});
-        return run_program(std::move(words));
+        return run_program(std::move(joined({"/usr/bin/timeout", std::to_string(seconds), UNSEEN_COMMAND}, words)));
     }
 
     // A ball with a texture in a library of materials.
@@ -77,9 +76,8 @@ TEST_F(HostileFilesTest, OverwriteNothingThatTheModelNames) {
         {{"tradeoff", "ball.obj", "--csv", "tex.png"}, "tex.png"},
         {{"build", "ball.obj", "-o", "new.vdt", "--json", "tex.png"}, "tex.png"}};
     for (const auto& [words, output] : table) {
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 1) << ::testing::PrintToString(words) << outcome.err;
-        EXPECT_THAT(outcome.err, HasSubstr("'" + output + "' is read: give the output another name."));
+        EXPECT_THAT(run(words), fails(1, HasSubstr("'" + output + "' is read: give the output another name.")))
+            << ::testing::PrintToString(words);
     }
     EXPECT_EQ(files(), before);
     EXPECT_TRUE(read_text(path("tex.png")) == texture && read_text(path("ball.mtl")) == library);
@@ -88,9 +86,7 @@ TEST_F(HostileFilesTest, OverwriteNothingThatTheModelNames) {
 TEST_F(HostileFilesTest, RefuseEmptyValues) {
     build_ball();
     for (const Words& words : {Words{"info", "ball.vdt", "--lights", ""}, Words{"info", "ball.vdt", "--display="}}) {
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 2) << outcome.out;
-        EXPECT_THAT(outcome.err, HasSubstr(" has an empty value: give one, or leave the option out."));
+        EXPECT_THAT(run(words), fails(2, HasSubstr(" has an empty value: give one, or leave the option out.")));
     }
 }
 

@@ -13,17 +13,14 @@ class LevelCommandTest : public CommandTest {
 protected:
     void SetUp() override {
         CommandTest::SetUp();
-        const Outcome made = run({"make", "scene", "treasure", "-o", "scene.glb", "--triangles", "30000"});
-        ASSERT_EQ(made.status, 0) << made.err;
+        succeed({"make", "scene", "treasure", "-o", "scene.glb", "--triangles", "30000"});
         const Outcome probe = run({"render", "scene.glb", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
         if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
         fs::remove(path("probe.png"));
     }
-    Outcome render(std::vector<std::string> more) const {
-        std::vector<std::string> words = {"levels", "scene.glb", "--size",
-                                          std::to_string(width) + "x" + std::to_string(height)};
-        words.insert(words.end(), more.begin(), more.end());
-        return run(words);
+    Outcome render(Words more) const {
+        return run(
+            joined({"levels", "scene.glb", "--size", std::to_string(width) + "x" + std::to_string(height)}, more));
     }
 };
 
@@ -123,9 +120,8 @@ TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
     // One object is in no layers.
     ASSERT_EQ(run({"make", "scene", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
     for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const Outcome drawn = run({"levels", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o",
-                                   show + ".png", "--show", show, "--no-shadows"});
-        EXPECT_EQ(drawn.status, 0) << drawn.err;
+        succeed({"levels", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o", show + ".png", "--show",
+                 show, "--no-shadows"});
     }
 }
 
@@ -144,9 +140,8 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
     write_text(path("scene.gltf"), json.dump());
     std::string first;
     for (const std::string method : {"perceptual", "distance", "area"}) {
-        const Outcome drawn =
-            run({"levels", "scene.gltf", "--size", "64x48", "--method", method, "-o", method + ".pfm", "--json", "-"});
-        ASSERT_EQ(drawn.status, 0) << method << ": " << drawn.err;
+        const Outcome drawn = succeed(
+            {"levels", "scene.gltf", "--size", "64x48", "--method", method, "-o", method + ".pfm", "--json", "-"});
         EXPECT_EQ(drawn.json()["frames"][0]["triangles"], 0);
         EXPECT_TRUE(drawn.json()["is_settled"]);
         const std::string picture = read_text(path(method + ".pfm"));
@@ -165,12 +160,12 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
 }
 
 TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
-    const auto refused = [&](const std::vector<std::string>& words) {
+    const auto refused = [&](const Words& words) {
         const Outcome outcome = render(words);
         EXPECT_EQ(outcome.status, 2) << outcome.out;
         return outcome.err;
     };
-    const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+    const std::vector<std::pair<Words, std::string>> wrong = {
         {{}, "-o is required, or --json"},
         {{"--bias", "2", "--json", "-"}, "--bias needs --method distance or --method area"},
         {{"--method", "area", "--layers", "3", "--json", "-"}, "--layers and --method area exclude each other"},

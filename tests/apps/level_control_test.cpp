@@ -142,9 +142,8 @@ TEST_F(LevelControlTest, LevelsAreEven) {
         }
         return most / least;
     };
-    const auto even = LevelChain::create(session.tree(), *recipe->criterion),
-               halving = LevelChain::by_triangles(session.tree(), *recipe->criterion);
-    ASSERT_TRUE(even && halving);
+    const auto even = require(LevelChain::create(session.tree(), *recipe->criterion)),
+               halving = require(LevelChain::by_triangles(session.tree(), *recipe->criterion));
     ASSERT_EQ(even->triangles(5), halving->triangles(5)) << "the same ends";
     double ours = 0, theirs = 0;
     for (const glm::dvec3 direction : {glm::dvec3(0.3, 0.2, 1), {1, 0, 0}, {-0.5, 0.7, -0.4}}) {
@@ -361,9 +360,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     // Larger than this GPU draws: the picture of before stays, and the next one is drawn.
     vdtree::View huge = ahead(64);
     huge.width = render::largest_target_side() + 1;
-    const auto too_large = control->draw(huge);
-    ASSERT_FALSE(too_large);
-    EXPECT_THAT(too_large.error().message, HasSubstr("choose a smaller size"));
+    EXPECT_THAT(error_in(control->draw(huge)), HasSubstr("choose a smaller size"));
     EXPECT_EQ(control->picture().width(), 64);
     EXPECT_TRUE(control->read_levels());
     EXPECT_TRUE(control->wait());

@@ -7,10 +7,8 @@ using namespace unseen::app::testing;
 
 class LodCommandTest : public DrawingCommandTest {
 protected:
-    Outcome lod(const std::vector<std::string>& more) const {
-        std::vector<std::string> words = {"lod", "ball.vdt", "-o", "out.glb", "--directions", "2", "--samples", "8"};
-        words.insert(words.end(), more.begin(), more.end());
-        return run(words);
+    Outcome lod(const Words& more) const {
+        return run(joined({"lod", "ball.vdt", "-o", "out.glb", "--directions", "2", "--samples", "8"}, more));
     }
     // The document of a GLB file.
     Json document(const std::string& name) const {
@@ -90,10 +88,8 @@ TEST_F(LodCommandTest, ScenesHaveLevelsByNodeWithNamesAndPlaces) {
     const std::string rest = whole.substr(20 + before);
     write_text(path("two.glb"),
                "glTF" + word(2) + word(20 + text.size() + rest.size()) + word(text.size()) + "JSON" + text + rest);
-    const Outcome made =
-        run({"lod", "two.glb", "-o", "two_lods.glb", "--directions", "1", "--samples", "4", "--json", "-"});
-    ASSERT_EQ(made.status, 0) << made.err;
-    const Json report = made.json();
+    const Json report =
+        succeed({"lod", "two.glb", "-o", "two_lods.glb", "--directions", "1", "--samples", "4", "--json", "-"}).json();
     ASSERT_EQ(report["objects"].size(), 2u);
     EXPECT_EQ(report["objects"][1]["same_as"], "left");
     const Json file = document("two_lods.glb");

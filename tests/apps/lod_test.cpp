@@ -70,8 +70,8 @@ TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {
 TEST_F(LodTest, TheSameSeedLooksFromTheSameSides) {
     Session session = bumpy();
     const LodOptions options{.chain = {.levels = 2}, .directions = 2, .samples = 4};
-    const auto once = make_levels(session, context(), options), again = make_levels(session, context(), options);
-    ASSERT_TRUE(once && again);
+    const auto once = require(make_levels(session, context(), options)),
+               again = require(make_levels(session, context(), options));
     EXPECT_EQ(once->objects[0].levels[1].distance, again->objects[0].levels[1].distance);
     EXPECT_EQ(once->objects[0].levels[1].checks[0].direction, again->objects[0].levels[1].checks[0].direction);
     EXPECT_EQ(once->objects[0].levels[1].checks[0].v, again->objects[0].levels[1].checks[0].v);

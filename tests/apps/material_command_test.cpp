@@ -26,8 +26,7 @@ protected:
         for (int y = 0; y < size; ++y)
             for (int x = 0; x < size; ++x)
                 for (int c = 0; c < 3; ++c) image.values.push_back((x / 4 + y / 4) % 2 ? dark : bright);
-        const auto written = unseen::perception::write_image(path("made.png"), image);
-        if (!written) throw std::runtime_error(written.error().message);
+        const auto written = require(unseen::perception::write_image(path("made.png"), image));
         const std::string bytes = read_text(path("made.png"));
         fs::remove(path("made.png"));
         return bytes;
@@ -36,13 +35,7 @@ protected:
         return {png(16, 0.25f, 0.75f), png(4, 0.5f, 0.5f), png(8, 0.5f, 1.0f)};
     }
 
-    // The words on stderr.
-    std::string succeed(const std::vector<std::string>& words) const {
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        return outcome.err;
-    }
-    std::string complaint(const std::vector<std::string>& words) const {
+    std::string complaint(const Words& words) const {
         const Outcome outcome = run(words);
         EXPECT_NE(outcome.status, 0);
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
@@ -116,9 +109,8 @@ TEST_F(MaterialCommandTest, CutsKeepEverythingAndLookTheSame) {
     const GltfContents in = read_gltf(path("in.glb"));
     succeed({"build", "in.glb", "-o", "in.vdt"});
     // What nobody sees, and a rough one.
-    const std::vector<std::string> view = {"--size",   "400x200", "--eye", "0", "0.5",   "6",
-                                           "--target", "0",       "0",     "0", "--fov", "40"};
-    const auto simplified = [&](std::vector<std::string> words) {
+    const Words view = {"--size", "400x200", "--eye", "0", "0.5", "6", "--target", "0", "0", "0", "--fov", "40"};
+    const auto simplified = [&](Words words) {
         words.insert(words.begin(), {"simplify", "in.vdt"});
         words.insert(words.end(), view.begin(), view.end());
         succeed(words);
@@ -187,7 +179,7 @@ TEST_F(MaterialCommandTest, WhatNoCutCanKeepIsRefusedOrDropped) {
                 HasSubstr("leave them out with --drop animations"));
     EXPECT_EQ(run({"build", "in.glb", "-o", "t.vdt", "--drop", "everything"}).status, 2);
     const std::string said =
-        succeed({"build", "in.glb", "-o", "t.vdt", "--drop", "skins,morph-targets,animations,extensions"});
+        succeed({"build", "in.glb", "-o", "t.vdt", "--drop", "skins,morph-targets,animations,extensions"}).err;
     for (const char* what : {"skins were left out", "morph targets were left out", "animations were left out",
                              "unknown extensions were left out", "tangents were left out"})
         EXPECT_THAT(said, HasSubstr(what));
@@ -205,7 +197,7 @@ TEST_F(MaterialCommandTest, InstancesGetMeshesOfTheirOwn) {
         {{"name", "flat"}, {"mesh", 1}, {"scale", {1, 1, 0}}, {"translation", {0, 3, 0}}});
     scene.document["scenes"][0]["nodes"].push_back(4);
     write_text(path("in.glb"), scene.glb(images()));
-    const std::string said = succeed({"simplify", "in.glb", "--as", "model", "--full", "-o", "out.glb"});
+    const std::string said = succeed({"simplify", "in.glb", "--as", "model", "--full", "-o", "out.glb"}).err;
     EXPECT_THAT(said, AllOf(HasSubstr("1 mesh was under several nodes"), HasSubstr("no inverse")));
     const GltfContents in = read_gltf(path("in.glb")), out = read_gltf(path("out.glb"));
     EXPECT_EQ(out.rest["meshes"].size(), 3u);
@@ -284,20 +276,20 @@ TEST_F(ObjMaterialTest, FullModelComesOutAsItCameIn) {
 TEST_F(ObjMaterialTest, FormatsBecomeEachOther) {
     write_model();
     fs::create_directories(path("out"));
-    const std::string said = succeed({"simplify", "in/model.obj", "--full", "-o", "out/model.glb"});
+    const std::string said = succeed({"simplify", "in/model.obj", "--full", "-o", "out/model.glb"}).err;
     EXPECT_THAT(said, HasSubstr("glTF gets"));
     const GltfContents out = read_gltf(path("out/model.glb"));
     EXPECT_EQ(out.rest["materials"][0]["name"], "check");
     EXPECT_EQ(out.rest["nodes"][1]["name"], "right");
-    EXPECT_EQ(out.images, std::vector<std::string>{"images/check.png"});
+    EXPECT_EQ(out.images, Words{"images/check.png"});
     EXPECT_NEAR(out.rest["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"][1].get<double>(), 0.6038, 1e-3);
     EXPECT_TRUE(look_the_same("in/model.obj", "out/model.glb"));
 
     write_text(path("scene.glb"), GltfScene().glb(images()));
-    EXPECT_THAT(succeed({"simplify", "scene.glb", "--full", "-o", "out/scene.obj"}), HasSubstr("OBJ gets"));
+    EXPECT_THAT(succeed({"simplify", "scene.glb", "--full", "-o", "out/scene.obj"}).err, HasSubstr("OBJ gets"));
     EXPECT_THAT(read_text(path("out/scene.mtl")), AllOf(HasSubstr("newmtl gold"), HasSubstr("norm scene_image2.png")));
     EXPECT_EQ(read_text(path("out/scene_image0.png")), images()[0]);
-    EXPECT_THAT(succeed({"simplify", "scene.glb", "--full", "-o", "out/scene.ply"}),
+    EXPECT_THAT(succeed({"simplify", "scene.glb", "--full", "-o", "out/scene.ply"}).err,
                 HasSubstr("PLY holds no materials"));
 }
 
@@ -306,12 +298,11 @@ TEST_F(ObjMaterialTest, FormatsBecomeEachOther) {
 // OBJ and glTF, with an image somewhere and without: the same surfaces look the same.
 TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
     write_model();
-    for (const std::vector<std::string>& option : {std::vector<std::string>{}, {"--no-texture"}}) {
-        std::vector<std::string> words = {
-            "render", "in/model.obj", "-o", "p.pfm", "--full", "--size",    "64x32", "--eye", "0",  "0",
-            "4",      "--target",     "0",  "0",     "0",      "--samples", "4",     "--fov", "40", "--prelit"};
-        words.insert(words.end(), option.begin(), option.end());
-        const Outcome drawn = run(words);
+    for (const Words& option : {Words{}, {"--no-texture"}}) {
+        const Outcome drawn = run(
+            joined({"render", "in/model.obj", "-o", "p.pfm", "--full", "--size",    "64x32", "--eye", "0",  "0",
+                    "4",      "--target",     "0",  "0",     "0",      "--samples", "4",     "--fov", "40", "--prelit"},
+                   option));
         if (drawn.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
         ASSERT_EQ(drawn.status, 0) << drawn.err;
         const auto picture = require(unseen::perception::read_image(path("p.pfm")));

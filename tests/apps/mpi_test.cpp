@@ -21,8 +21,7 @@ protected:
     // Several parts, of 2^15 vertices each at most.
     void write_parts() const { write_ball("large.obj", 250, 300); }
     void build_alone() const {
-        const Outcome built = run({"build", "large.obj", "--no-fold-errors", "-o", "alone.vdt", "--threads", "2"});
-        ASSERT_EQ(built.status, 0) << built.err;
+        succeed({"build", "large.obj", "--no-fold-errors", "-o", "alone.vdt", "--threads", "2"});
     }
     // Where a process was killed: one tree or none, never a part of one. Whoever is killed on the way out has left a
     // whole one.
@@ -107,8 +106,7 @@ TEST_F(TeamTest, WhatADeadTeamLeavesIsRemovedAtTheNextStart) {
                                               " build large.obj --no-fold-errors -o team.vdt; fi");
         expect_whole_or_none(built);
     }
-    const Outcome built = run({"build", "large.obj", "--no-fold-errors", "-o", "team.vdt"});
-    ASSERT_EQ(built.status, 0) << built.err;
+    succeed({"build", "large.obj", "--no-fold-errors", "-o", "team.vdt"});
     EXPECT_THAT(files(), ::testing::UnorderedElementsAre("large.obj", "alone.vdt", "team.vdt"));
 }
 

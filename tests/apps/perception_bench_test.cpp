@@ -57,8 +57,8 @@ TEST_F(PerceptionBenchTest, MeasuresModelsTolerancesAndCosts) {
 
 // One figure that is off by a thousandth of a sensitivity of about 200 is found.
 TEST_F(PerceptionBenchTest, DeviationsFromReferencesAreFound) {
-    const Outcome sensitivity = run({"csf", "--frequency", "4", "--luminance", "100", "--area", "1", "--json", "-"});
-    ASSERT_EQ(sensitivity.status, 0) << sensitivity.err;
+    const Outcome sensitivity =
+        succeed({"csf", "--frequency", "4", "--luminance", "100", "--area", "1", "--json", "-"});
     const double right = sensitivity.json()["sensitivity"];
     fs::create_directory(path("figures"));
     for (const double factor : {1.0, 1.001}) {
@@ -200,14 +200,11 @@ TEST_F(PerceptionBenchTest, BadReferencesAreNamedWithTheirLine) {
 }
 
 TEST_F(PerceptionBenchTest, RefusesWrongUsage) {
-    for (const std::vector<std::string>& words :
-         std::vector<std::vector<std::string>>{{"--only", "saving"},
-                                               {"--window", "1"},
-                                               {"--second-judge", "castle-red-green"},
-                                               {"--reference", "missing"}}) {
-        std::vector<std::string> all = {"perception", "--quick"};
-        all.insert(all.end(), words.begin(), words.end());
-        EXPECT_EQ(bench(all).status, 2) << words[0];
+    for (const Words& words : std::vector<Words>{{"--only", "saving"},
+                                                 {"--window", "1"},
+                                                 {"--second-judge", "castle-red-green"},
+                                                 {"--reference", "missing"}}) {
+        EXPECT_EQ(bench(joined({"perception", "--quick"}, words)).status, 2) << words[0];
     }
     EXPECT_EQ(bench({"perception", "--mesh", "missing.ply"}).status, 1);
 }

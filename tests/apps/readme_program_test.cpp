@@ -8,8 +8,7 @@ using namespace unseen::app::testing;
 class ReadmeProgramTest : public CommandTest {
 protected:
     void expect_same_as_command(const std::string& mesh) const {
-        const Outcome command = run({"simplify", mesh, "-o", "command.ply", "--json", "-"});
-        ASSERT_EQ(command.status, 0) << command.err;
+        const Outcome command = succeed({"simplify", mesh, "-o", "command.ply", "--json", "-"});
         const Json report = command.json();
         const Outcome program = run_program({UNSEEN_README_PROGRAM, mesh, "program.ply"});
         ASSERT_EQ(program.status, 0) << program.err;

@@ -10,12 +10,9 @@ using unseen::perception::read_image;
 
 class RenderCommandTest : public DrawingCommandTest {
 protected:
-    Json render(std::vector<std::string> more, const std::string& out) const {
-        std::vector<std::string> words = {"render", "ball.vdt", "-o", out, "--size", "200x160", "--json", "-"};
-        words.insert(words.end(), more.begin(), more.end());
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        const Json report = outcome.json();
+    Json render(Words more, const std::string& out) const {
+        const Json report =
+            succeed(joined({"render", "ball.vdt", "-o", out, "--size", "200x160", "--json", "-"}, more)).json();
         expect_cut_report(report);
         EXPECT_TRUE(report["draw_ms"].is_number()) << report;
         return report;
@@ -51,8 +48,7 @@ TEST_F(RenderCommandTest, TheImperceptibleCutShowsNoDifference) {
     EXPECT_LT(cut["triangles"], ball_triangles);
     EXPECT_EQ(effect_named(cut, "back-face culling")["on"], true);
     EXPECT_EQ(effect_named(cut, "frustum culling")["on"], true);
-    const Outcome same = run({"compare", "full.pfm", "cut.pfm", "--gaze", "1500", "80", "--fail-above", "0"});
-    EXPECT_EQ(same.status, 0) << same.out << same.err;
+    succeed({"compare", "full.pfm", "cut.pfm", "--gaze", "1500", "80", "--fail-above", "0"});
 
     render({"--triangles", "60"}, "rough.pfm");
     const Outcome rough = run({"compare", "full.pfm", "rough.pfm", "--fail-above", "0"});
@@ -78,7 +74,7 @@ std::vector<std::vector<double>> numbers_of(const std::string& csv) {
 
 // One request, one answer: a single picture and a flight's frame from the same place are cut alike.
 TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
-    const std::vector<std::vector<std::string>> requests = {
+    const std::vector<Words> requests = {
         {"--fold-test", "luebke-hallen"},
         {"--fold-test", "luebke-hallen", "--gaze", "1500", "80"},
         {"--fold-test", "luebke-hallen", "--triangles", "500"},
@@ -87,14 +83,13 @@ TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
         {"--pixels", "2"},
         {"--pixels", "2", "--fold-test", "displacement"},
     };
-    for (const std::vector<std::string>& request : requests) {
+    for (const Words& request : requests) {
         SCOPED_TRACE(::testing::PrintToString(request));
         const double still = render(request, "still.png")["triangles"];
-        std::vector<std::string> flight = {"fly",   "ball.vdt",   "--path", "orbit:0:1", "--no-draw",
-                                           "--csv", "flight.csv", "--size", "200x160"};
-        flight.insert(flight.end(), request.begin(), request.end());
-        const Outcome flown = run(flight);
-        ASSERT_EQ(flown.status, 0) << flown.err;
+        Words flight =
+            joined({"fly", "ball.vdt", "--path", "orbit:0:1", "--no-draw", "--csv", "flight.csv", "--size", "200x160"},
+                   request);
+        succeed(flight);
         const auto rows = numbers_of(read_text(path("flight.csv")));
         ASSERT_EQ(rows.size(), 1u);
         EXPECT_GT(still, 0);
@@ -103,16 +98,13 @@ TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
 }
 
 TEST_F(RenderCommandTest, ANumberedPictureWithoutAPathIsAWalk) {
-    const Outcome still = run({"fly", "ball.vdt", "--path", "walk:-600:5", "--no-draw", "--csv", "walk.csv"});
-    ASSERT_EQ(still.status, 0) << still.err;
+    succeed({"fly", "ball.vdt", "--path", "walk:-600:5", "--no-draw", "--csv", "walk.csv"});
     const auto rows = numbers_of(read_text(path("walk.csv")));
     ASSERT_EQ(rows.size(), 5u);
     EXPECT_NE(rows[4][1], rows[0][1]) << "40 m farther away";
-    const Outcome old = run({"render", "ball.vdt", "--path", "walk:-600:5", "--no-draw", "--csv", "old.csv"});
-    ASSERT_EQ(old.status, 0) << "an old spelling: " << old.err;
+    const Outcome old = succeed({"render", "ball.vdt", "--path", "walk:-600:5", "--no-draw", "--csv", "old.csv"});
     EXPECT_EQ(numbers_of(read_text(path("old.csv"))).size(), 5u);
-    const Outcome numbered = run({"render", "ball.vdt", "-o", "walk/%02d.png", "--size", "24x24"});
-    ASSERT_EQ(numbered.status, 0) << numbered.err;
+    succeed({"render", "ball.vdt", "-o", "walk/%02d.png", "--size", "24x24"});
     EXPECT_TRUE(std::filesystem::exists(path("walk/59.png")));
     for (const char* none : {"walk:", "walk:x", "walk:1:0", "walk:1:2:3", "walk:nan"})
         EXPECT_THAT(run({"fly", "ball.vdt", "--path", none, "--no-draw"}).err, HasSubstr("METRES_A_SECOND")) << none;
@@ -124,10 +116,9 @@ TEST_F(RenderCommandTest, WhatAPictureHidesIsOfThatPictureAlone) {
 }
 
 TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
-    const Outcome flown = run({"fly", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
-                               "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"});
-    ASSERT_EQ(flown.status, 0) << flown.err;
-    const Json report = flown.json();
+    const Json report = succeed({"fly", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
+                                 "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"})
+                            .json();
     EXPECT_EQ(report["frames"], 24);
     EXPECT_EQ(effect_named(report, "back-face folding")["on"], true);
     const auto rows = numbers_of(read_text(path("orbit.csv")));
@@ -152,10 +143,9 @@ TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
 TEST_F(RenderCommandTest, PathsComeFromFiles) {
     write_text(path("path.csv"), "eye_x, eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\r\n"
                                  "0,0,4,0,0,0,48,40\r\n\n+0.1,0,4,0,0,0,48,41\n0.1,0,4,0,0,0,48,41\n");
-    const Outcome flown =
-        run({"fly", "ball.vdt", "--path", "path.csv", "--size", "96x80", "--csv", "out.csv", "--no-draw"});
-    ASSERT_EQ(flown.status, 0) << flown.err;
-    EXPECT_THAT(flown.out, HasSubstr("frames"));
+    EXPECT_THAT(
+        succeed({"fly", "ball.vdt", "--path", "path.csv", "--size", "96x80", "--csv", "out.csv", "--no-draw"}).out,
+        HasSubstr("frames"));
     const auto rows = numbers_of(read_text(path("out.csv")));
     ASSERT_EQ(rows.size(), 3u);
     EXPECT_EQ(rows[2][4], 0) << "a still view changes nothing";
@@ -164,11 +154,10 @@ TEST_F(RenderCommandTest, PathsComeFromFiles) {
 }
 
 TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
-    const auto triangles = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"fly", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--observer",
-                                   "median", "--fold-test", "error", "--csv", "out.csv", "--no-draw"});
-        const Outcome flown = run(more);
-        EXPECT_EQ(flown.status, 0) << flown.err;
+    const auto triangles = [&](Words more) {
+        succeed(joined({"fly", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--observer", "median",
+                        "--fold-test", "error", "--csv", "out.csv", "--no-draw"},
+                       more));
         std::vector<double> column;
         for (const auto& row : numbers_of(read_text(path("out.csv")))) column.push_back(row[1]);
         EXPECT_EQ(column.size(), 40u);
@@ -193,16 +182,14 @@ TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     EXPECT_EQ(traced[32], traced[39]);
     EXPECT_LT(traced[25], traced[35]);
     const Outcome still =
-        run({"render", "ball.vdt", "-o", "head.png", "--gaze-mode", "head", "--size", "96x80", "--json", "-"});
-    ASSERT_EQ(still.status, 0) << still.err;
+        succeed({"render", "ball.vdt", "-o", "head.png", "--gaze-mode", "head", "--size", "96x80", "--json", "-"});
     EXPECT_THAT(effect_named(still.json(), "gaze")["why"].get<std::string>(), HasSubstr("give or take 15 degrees"));
 }
 
 TEST_F(RenderCommandTest, GazesAreReadAsTrackersWriteThem) {
     const auto triangles = [&](const std::string& trace) {
-        const Outcome flown = run({"fly", "ball.vdt", "--path", "orbit:0:12", "--size", "800x640", "--fold-test",
-                                   "error", "--csv", "out.csv", "--no-draw", "--gaze-trace", trace});
-        EXPECT_EQ(flown.status, 0) << flown.err;
+        const Outcome flown = succeed({"fly", "ball.vdt", "--path", "orbit:0:12", "--size", "800x640", "--fold-test",
+                                       "error", "--csv", "out.csv", "--no-draw", "--gaze-trace", trace});
         std::vector<double> column;
         for (const auto& row : numbers_of(read_text(path("out.csv")))) column.push_back(row[1]);
         return std::pair(column, flown.err);
@@ -228,11 +215,8 @@ TEST_F(RenderCommandTest, GazesAreReadAsTrackersWriteThem) {
 }
 
 TEST_F(RenderCommandTest, BadGazesAreRefused) {
-    const std::vector<std::string> flight = {"fly", "ball.vdt", "--path", "orbit:0:2", "--no-draw"};
-    const auto with = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), flight.begin(), flight.end());
-        return run(more);
-    };
+    const Words flight = {"fly", "ball.vdt", "--path", "orbit:0:2", "--no-draw"};
+    const auto with = [&](Words more) { return run(joined(flight, more)); };
     write_text(path("gap.csv"), "time_s,x_px,y_px\n0,1,2\n3,1,2\n");
     const Outcome gap = with({"--gaze-trace", "gap.csv"});
     EXPECT_EQ(gap.status, 1);
@@ -244,17 +228,16 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_THAT(run({"fly", "missing.vdt", "--path", "orbit:1", "--gaze-trace", "missing.csv"}).err,
                 HasSubstr("missing.csv"));
     EXPECT_THAT(run({"view", "missing.vdt", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
-    for (const std::vector<std::string>& more :
-         std::vector<std::vector<std::string>>{{"--gaze-mode", "nobody"},
-                                               {"--gaze-mode", "mouse"},
-                                               {"--gaze-error", "-1"},
-                                               {"--gaze-error", "nan"},
-                                               {"--gaze-latency", "1e9"},
-                                               {"--gaze-mode", "head", "--gaze-trace", "gap.csv"},
-                                               {"--gaze", "1", "2", "--gaze-mode", "head"},
-                                               {"--seed", "3"},
-                                               {"--gaze-mode", "head", "--gaze-latency", "20"},
-                                               {"--gaze", "1", "2", "--suppression"}})
+    for (const Words& more : std::vector<Words>{{"--gaze-mode", "nobody"},
+                                                {"--gaze-mode", "mouse"},
+                                                {"--gaze-error", "-1"},
+                                                {"--gaze-error", "nan"},
+                                                {"--gaze-latency", "1e9"},
+                                                {"--gaze-mode", "head", "--gaze-trace", "gap.csv"},
+                                                {"--gaze", "1", "2", "--gaze-mode", "head"},
+                                                {"--seed", "3"},
+                                                {"--gaze-mode", "head", "--gaze-latency", "20"},
+                                                {"--gaze", "1", "2", "--suppression"}})
         EXPECT_EQ(with(more).status, 2) << more.back();
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-mode", "simulated"}).status, 2)
         << "one picture has no time";
@@ -269,9 +252,8 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_EQ(ended.status, 0) << ended.err;
     EXPECT_THAT(ended.err, HasSubstr("after its end"));
     write_text(path("seen.csv"), "eye_x,eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\n0,0,5,0,0,0,10,10\n");
-    const Outcome twice = run({"fly", "ball.vdt", "--path", "seen.csv", "--no-draw", "--gaze", "1", "2"});
-    EXPECT_EQ(twice.status, 1);
-    EXPECT_THAT(twice.err, HasSubstr("says where the viewer looks"));
+    EXPECT_THAT(run({"fly", "ball.vdt", "--path", "seen.csv", "--no-draw", "--gaze", "1", "2"}),
+                fails(1, HasSubstr("says where the viewer looks")));
 }
 
 TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
@@ -299,16 +281,16 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
     for (const std::string orbit :
          {"orbit", "orbit:", "orbit:x", "orbit:1:0", "orbit:1:x", "orbit:0", "orbit:nan:5", "missing.csv"})
         EXPECT_EQ(run({"fly", "ball.vdt", "--path", orbit, "--no-draw"}).status, 1) << orbit;
-    const std::vector<std::vector<std::string>> wrong = {{"--csv", "a.csv"},
-                                                         {"--path", "orbit:1", "-o", "same.png"},
-                                                         {"--path", "orbit:1", "-o", "%d%d.png"},
-                                                         {"--path", "orbit:1", "-o", "%s.png"},
-                                                         {"--path", "orbit:1", "--threshold", "0"},
-                                                         {"--geomorph", "0.2", "-o", "a.png"},
-                                                         {"--path", "orbit:1", "--geomorph", "-1"},
-                                                         {"--path", "orbit:1", "--geomorph", "nan"},
-                                                         {"--path", "orbit:1", "--fps", "30"},
-                                                         {"--path", "orbit:1", "--no-draw", "-o", "%d.png"}};
+    const std::vector<Words> wrong = {{"--csv", "a.csv"},
+                                      {"--path", "orbit:1", "-o", "same.png"},
+                                      {"--path", "orbit:1", "-o", "%d%d.png"},
+                                      {"--path", "orbit:1", "-o", "%s.png"},
+                                      {"--path", "orbit:1", "--threshold", "0"},
+                                      {"--geomorph", "0.2", "-o", "a.png"},
+                                      {"--path", "orbit:1", "--geomorph", "-1"},
+                                      {"--path", "orbit:1", "--geomorph", "nan"},
+                                      {"--path", "orbit:1", "--fps", "30"},
+                                      {"--path", "orbit:1", "--no-draw", "-o", "%d.png"}};
     for (auto words : wrong) {
         words.insert(words.begin(), {"render", "ball.vdt"});
         EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
@@ -320,11 +302,10 @@ TEST_F(RenderCommandTest, AFlightSaysWhetherChangesCanBeSeen) {
     std::string away = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
     for (int i = 0; i < 12; ++i) away += "0,0," + std::to_string(60 + 2 * i) + ",0,0,0\n";
     write_text(path("away.csv"), away);
-    const auto fly = [&](std::vector<std::string> more) {
+    const auto fly = [&](Words more) {
         more.insert(more.begin(),
                     {"render", "ball.vdt", "--changes", "--size", "96x80", "--samples", "16", "--json", "-"});
-        const Outcome flown = run(more);
-        EXPECT_EQ(flown.status, 0) << flown.err;
+        const Outcome flown = succeed(more);
         return flown.json();
     };
     const Json popping =
@@ -358,11 +339,9 @@ TEST_F(RenderCommandTest, AFlightSaysWhetherChangesCanBeSeen) {
     write_text(path("turning.csv"), turning);
     const Json entering = fly({"--path", "turning.csv", "--pixels", "0.2"})["changes_seen"];
     EXPECT_LT(entering["largest_v"], 0.5);
-    for (const auto& wrong : {std::vector<std::string>{"-o", "a.png"},
-                              {"--path", "orbit:1", "--no-draw"},
-                              {"--path", "orbit:1", "--wireframe"}}) {
-        std::vector<std::string> words = {"render", "ball.vdt", "--changes"};
-        words.insert(words.end(), wrong.begin(), wrong.end());
+    for (const auto& wrong :
+         {Words{"-o", "a.png"}, {"--path", "orbit:1", "--no-draw"}, {"--path", "orbit:1", "--wireframe"}}) {
+        Words words = joined({"render", "ball.vdt", "--changes"}, wrong);
         EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
     }
 }
@@ -371,12 +350,9 @@ TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
     std::string away = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
     for (int i = 0; i < 20; ++i) away += "0,0," + std::to_string(60 + 2 * i) + ",0,0,0\n";
     write_text(path("away.csv"), away);
-    const std::vector<std::string> flight = {"fly",    "ball.vdt", "--path",   "away.csv",
-                                             "--size", "96x80",    "--pixels", "6"};
-    const auto fly = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), flight.begin(), flight.end());
-        const Outcome flown = run(more);
-        EXPECT_EQ(flown.status, 0) << flown.err;
+    const Words flight = {"fly", "ball.vdt", "--path", "away.csv", "--size", "96x80", "--pixels", "6"};
+    const auto fly = [&](Words more) {
+        const Outcome flown = succeed(joined(flight, more));
         return flown.json();
     };
     const Json still = fly({"--csv", "still.csv", "-o", "still%d.png", "--json", "-"});
@@ -408,7 +384,7 @@ TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
 TEST_F(RenderCommandTest, OptionsChangeThePicture) {
     render({}, "plain.png");
     const std::string plain = read_text(path("plain.png"));
-    const std::vector<std::vector<std::string>> changes = {
+    const std::vector<Words> changes = {
         {"--wireframe"},      {"--light", "1", "0", "0"}, {"--light", "-1", "0", "0"},
         {"--ambient", "0.9"}, {"--background", "70"},     {"--direction", "1", "0", "0"},
         {"--fill", "0.3"},    {"--triangles", "60"},      {"--samples", "1"}};
@@ -456,42 +432,34 @@ TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
     const Json cut = render({"--orthographic", "fit", "--fill", "0.5"}, "cut.pfm");
     EXPECT_LT(cut["triangles"], ball_triangles);
     EXPECT_EQ(effect_named(cut, "back-face culling")["on"], true);
-    const Outcome same = run({"compare", "fit.pfm", "cut.pfm", "--fail-above", "0"});
-    EXPECT_EQ(same.status, 0) << same.out << same.err;
-    const Outcome orbit = run({"fly", "ball.vdt", "--path", "orbit:30", "--orthographic", "fit", "--csv", "turn.csv"});
-    EXPECT_EQ(orbit.status, 0) << orbit.err;
-    EXPECT_THAT(orbit.out, HasSubstr("12 frames"));
+    succeed({"compare", "fit.pfm", "cut.pfm", "--fail-above", "0"});
+    EXPECT_THAT(succeed({"fly", "ball.vdt", "--path", "orbit:30", "--orthographic", "fit", "--csv", "turn.csv"}).out,
+                HasSubstr("12 frames"));
 
     for (const auto& [words, complaint] :
-         {std::pair<std::vector<std::string>, std::string>{{"--orthographic", "0"}, "must be fit or a height above 0"},
+         {std::pair<Words, std::string>{{"--orthographic", "0"}, "must be fit or a height above 0"},
           {{"--orthographic", "fit", "--fov", "30"}, "a parallel view has no field of view"},
           {{"--orthographic", "fit", "--eye", "0", "0", "3"}, "--orthographic fit frames the whole model"},
           {{"--orthographic", "2", "--fill", "0.5"}, "exclude each other"}}) {
-        std::vector<std::string> all = {"render", "ball.vdt", "-o", "none.png"};
-        all.insert(all.end(), words.begin(), words.end());
-        const Outcome refused = run(all);
-        EXPECT_EQ(refused.status, 2);
-        EXPECT_THAT(refused.err, HasSubstr(complaint));
+        EXPECT_THAT(run(joined({"render", "ball.vdt", "-o", "none.png"}, words)), fails(2, HasSubstr(complaint)));
     }
-    const Outcome picture =
-        run({"simplify", "ball.vdt", "-o", "n.ply", "--orthographic", "fit", "--visibility", "picture"});
-    EXPECT_EQ(picture.status, 1);
-    EXPECT_THAT(picture.err, HasSubstr("needs a perspective view"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "n.ply", "--orthographic", "fit", "--visibility", "picture"}),
+                fails(1, HasSubstr("needs a perspective view")));
 }
 
 TEST_F(RenderCommandTest, AnEyeInsideIsValid) { render({"--eye", "0", "0", "0.1"}, "inside.png"); }
 
 TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
-    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "sheet.png", "--size", "256x256", "--samples", "4",
-                                 "--cell", "64", "--json", "sheet.json"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(outcome.out, HasSubstr("gaze-directed"));
+    EXPECT_THAT(succeed({"sheet", "ball.vdt", "-o", "sheet.png", "--size", "256x256", "--samples", "4", "--cell", "64",
+                         "--json", "sheet.json"})
+                    .out,
+                HasSubstr("gaze-directed"));
     const auto sheet = require(read_image(path("sheet.png")));
     EXPECT_GT(sheet->image.width, 4 * 64);
     EXPECT_GT(sheet->image.height, 2 * 64);
     const Json report = Json::parse(read_text(path("sheet.json")));
     ASSERT_EQ(report["cuts"].size(), 4u);
-    std::vector<std::string> names;
+    Words names;
     for (const Json& cut : report["cuts"]) names.push_back(cut["name"]);
     EXPECT_THAT(names, ElementsAre("full", "imperceptible", "budget", "gaze-directed"));
     const Json& cuts = report["cuts"];
@@ -505,10 +473,8 @@ TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
 
 // A map has the window's size and a scale below; what is folded has a colour, what is not is grey.
 TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
-    const auto share_of_colour = [&](const std::string& map, const std::vector<std::string>& more) {
-        std::vector<std::string> words = {"--show", map};
-        words.insert(words.end(), more.begin(), more.end());
-        render(words, map + ".png");
+    const auto share_of_colour = [&](const std::string& map, const Words& more) {
+        render(joined({"--show", map}, more), map + ".png");
         const auto picture = read_image(path(map + ".png"));
         EXPECT_TRUE(picture) << picture.error().message;
         EXPECT_EQ(picture->image.width, 200);
@@ -525,7 +491,7 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
         EXPECT_GT(model, 0.3 * 200 * 160) << "the ball fills most of the height";
         return coloured / model;
     };
-    const std::vector<std::string> aside = {"--gaze", "1191", "80"};
+    const Words aside = {"--gaze", "1191", "80"};
     for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"})
         EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
     EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
@@ -556,11 +522,10 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
 
 // Both sheets of one drawing are those that are asked for one by one.
 TEST_F(RenderCommandTest, MapsComeOnASheetOfTheirOwn) {
-    const auto sheet = [&](std::vector<std::string> outputs) {
+    const auto sheet = [&](Words outputs) {
         outputs.insert(outputs.begin(), {"sheet", "ball.vdt"});
         outputs.insert(outputs.end(), {"--size", "256x256", "--samples", "4", "--cell", "64", "--json", "-"});
-        const Outcome outcome = run(outputs);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome outcome = succeed(outputs);
         return outcome.json()["cuts"];
     };
     EXPECT_EQ(sheet({"--maps", "maps.png"}).size(), 3u) << "a budget has no map";
@@ -578,21 +543,21 @@ TEST_F(RenderCommandTest, MapsComeOnASheetOfTheirOwn) {
 
 TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
     const auto before = files();
-    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"render", "ball.vdt", "-o", "out.gif"},
-             {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
-             {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
-             {"render", "ball.vdt", "-o", "out.png", "--show", "cost", "--samples", "4"},
-             {"fly", "ball.vdt", "--samples", "4"},
-             {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
-             {"sheet", "ball.vdt", "-o", "out.png", "--full"},
-             {"fly", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
-             {"fly", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
-             {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
-             {"view", "ball.vdt", "--frames", "0"},
-             {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
-             {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
-             {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
+    for (const Words& words :
+         std::vector<Words>{{"render", "ball.vdt", "-o", "out.gif"},
+                            {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
+                            {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
+                            {"render", "ball.vdt", "-o", "out.png", "--show", "cost", "--samples", "4"},
+                            {"fly", "ball.vdt", "--samples", "4"},
+                            {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
+                            {"sheet", "ball.vdt", "-o", "out.png", "--full"},
+                            {"fly", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
+                            {"fly", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
+                            {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
+                            {"view", "ball.vdt", "--frames", "0"},
+                            {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
+                            {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
+                            {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 2) << ::testing::PrintToString(words);
         EXPECT_EQ(outcome.err.rfind("unseen: ", 0), 0U) << outcome.err;
@@ -612,12 +577,10 @@ TEST_F(RenderCommandTest, FollowsLightsThatMove) {
     };
     EXPECT_TRUE(effect(still, "light")["on"]);
     EXPECT_THAT(effect(still, "light")["why"].get<std::string>(), HasSubstr("1 directional, ambient 0.1"));
-    const Outcome flown = run({"fly", "ball.vdt", "--path", "orbit:0:30", "--lights", "lights.json", "--fps", "60",
-                               "-o", "f%02d.png", "--size", "96x96", "--json", "-"});
-    ASSERT_EQ(flown.status, 0) << flown.err;
+    const Outcome flown = succeed({"fly", "ball.vdt", "--path", "orbit:0:30", "--lights", "lights.json", "--fps", "60",
+                                   "-o", "f%02d.png", "--size", "96x96", "--json", "-"});
     EXPECT_GT(flown.json()["node_tests"]["largest"].get<double>(), 0);
-    const auto first = read_image(path("f00.png")), last = read_image(path("f29.png"));
-    ASSERT_TRUE(first && last);
+    const auto first = require(read_image(path("f00.png"))), last = require(read_image(path("f29.png")));
     EXPECT_NE(first->image.values, last->image.values) << "the camera stands still, the light does not";
     EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lit.ply", "--lights", "lights.json"}).status, 0);
 }
@@ -646,13 +609,10 @@ TEST_F(RenderCommandTest, LightsCastShadowsWhereTheyAreToldTo) {
     EXPECT_FALSE(none.contains("shadows"));
     EXPECT_EQ(effect(none)["on"], false);
     EXPECT_THAT(effect(none)["why"].get<std::string>(), HasSubstr("no light casts a shadow"));
-    const Outcome without = run({"render", "ball.vdt", "-o", "o.png", "--shadows"});
-    EXPECT_EQ(without.status, 1);
-    EXPECT_THAT(without.err, HasSubstr("--shadows needs lights"));
+    EXPECT_THAT(run({"render", "ball.vdt", "-o", "o.png", "--shadows"}), fails(1, HasSubstr("--shadows needs lights")));
     EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lit.ply", "--lights", "lights.json", "--shadows"}).status, 0);
-    const Outcome sheet = run({"sheet", "ball.vdt", "-o", "sheet.png", "--lights", "lights.json"});
-    EXPECT_EQ(sheet.status, 1);
-    EXPECT_THAT(sheet.err, HasSubstr("--no-shadows"));
+    EXPECT_THAT(run({"sheet", "ball.vdt", "-o", "sheet.png", "--lights", "lights.json"}),
+                fails(1, HasSubstr("--no-shadows")));
 }
 
 TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
@@ -673,37 +633,29 @@ TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
     EXPECT_THAT(complaint("{\"lights\": [{\"type\": \"directional\", \"intensity\": 1, \"direction\": [0, 0, 0]}]}"),
                 HasSubstr("lights[0].direction"));
     write_text(path("good.json"), point_at("[9, 9, 9]"));
-    for (const std::vector<std::string>& more :
-         std::vector<std::vector<std::string>>{{"--light", "0", "0", "1"}, {"--ambient", "0.5"}}) {
-        std::vector<std::string> words = {"render", "ball.vdt", "-o", "o.png", "--lights", "good.json"};
-        words.insert(words.end(), more.begin(), more.end());
-        EXPECT_EQ(run(words).status, 2);
+    for (const Words& more : std::vector<Words>{{"--light", "0", "0", "1"}, {"--ambient", "0.5"}}) {
+        EXPECT_EQ(run(joined({"render", "ball.vdt", "-o", "o.png", "--lights", "good.json"}, more)).status, 2);
     }
     write_text(path("shiny.json"), R"({"material": {"specular": 0.3, "shininess": 20},
         "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.5}]})");
-    const Outcome by_errors =
-        run({"render", "ball.vdt", "-o", "o.png", "--lights", "shiny.json", "--fold-test", "error"});
-    EXPECT_EQ(by_errors.status, 1);
-    EXPECT_THAT(by_errors.err, HasSubstr("--fold-test luebke-hallen"));
+    EXPECT_THAT(run({"render", "ball.vdt", "-o", "o.png", "--lights", "shiny.json", "--fold-test", "error"}),
+                fails(1, HasSubstr("--fold-test luebke-hallen")));
 }
 
 TEST_F(RenderCommandTest, VerbsThatDrawHaveHelpWithExamples) {
     for (const std::string verb : {"render", "fly", "levels", "sheet", "view"}) {
-        const Outcome help = run({verb, "--help"});
-        EXPECT_EQ(help.status, 0) << verb << help.err;
+        const Outcome help = succeed({verb, "--help"});
         EXPECT_THAT(help.out, ::testing::AllOf(HasSubstr("Examples:"), HasSubstr("unseen " + verb))) << verb;
     }
 }
 
 TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
     const auto before = files();
-    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"render", "ball.vdt", "-o", "ball.obj/o.png", "--json", "o.json"},
-             {"render", "missing.vdt", "-o", "o.png", "--json", "o.json"},
-             {"sheet", "ball.vdt", "-o", "ball.obj/o.png", "--size", "32x32", "--json", "o.json"}}) {
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 1) << outcome.out;
-        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+    for (const Words& words :
+         std::vector<Words>{{"render", "ball.vdt", "-o", "ball.obj/o.png", "--json", "o.json"},
+                            {"render", "missing.vdt", "-o", "o.png", "--json", "o.json"},
+                            {"sheet", "ball.vdt", "-o", "ball.obj/o.png", "--size", "32x32", "--json", "o.json"}}) {
+        EXPECT_THAT(run(words), fails(1, IsAnErrorForPeople()));
         EXPECT_EQ(files(), before);
     }
     EXPECT_EQ(run({"fly", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "ball.vdt"}).status, 1)
@@ -717,10 +669,9 @@ TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
                              "keyframes": [{"time_s": 0, "position": [0, 0, 9]},
                                            {"time_s": 0.04, "position": [0, 0, 0]}]}]})");
     const auto with_light = files();
-    const Outcome hit =
-        run({"fly", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"});
-    EXPECT_EQ(hit.status, 1);
-    EXPECT_THAT(hit.err, HasSubstr("Frame "));
+    EXPECT_THAT(
+        run({"fly", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"}),
+        fails(1, HasSubstr("Frame ")));
     EXPECT_EQ(files(), with_light);
 }
 
@@ -757,22 +708,18 @@ TEST_F(NoGpuTest, RenderingSaysSoAndEverythingElseWorks) {
 }
 
 TEST_F(RenderCommandTest, AnswersInThreeLines) {
-    const Outcome outcome = run({"render", "ball.vdt", "-o", "o.png", "--size", "96x80"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(outcome.out, ::testing::MatchesRegex("kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
-                                                     "nobody sees a difference, looked at from 0.5 m or more: [^\n]+\n"
-                                                     "wrote o.png \\([0-9.]+ kB\\)\n"));
+    EXPECT_THAT(succeed({"render", "ball.vdt", "-o", "o.png", "--size", "96x80"}).out,
+                ::testing::MatchesRegex("kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
+                                        "nobody sees a difference, looked at from 0.5 m or more: [^\n]+\n"
+                                        "wrote o.png \\([0-9.]+ kB\\)\n"));
     const Outcome verbose = run({"render", "ball.vdt", "-o", "o.png", "--size", "96x80", "--verbose"});
     for (const std::string text : {"drawn in", "effects\n", "drawn by "}) EXPECT_THAT(verbose.out, HasSubstr(text));
 }
 
 TEST_F(RenderCommandTest, FlightsDrawWhatIsKept) {
-    const std::vector<std::string> flight = {"fly",    "ball.vdt", "--path", "orbit:5:3",
-                                             "--size", "96x80",    "--csv",  "o.csv"};
-    const auto drawn = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), flight.begin(), flight.end());
-        const Outcome outcome = run(more);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const Words flight = {"fly", "ball.vdt", "--path", "orbit:5:3", "--size", "96x80", "--csv", "o.csv"};
+    const auto drawn = [&](Words more) {
+        const Outcome outcome = succeed(joined(flight, more));
         EXPECT_THAT(outcome.out, HasSubstr("3 frames; the median frame kept "));
         EXPECT_THAT(outcome.out, HasSubstr("in the last frame"));
         EXPECT_THAT(outcome.out, HasSubstr("\nwrote o.csv ("));
@@ -818,8 +765,7 @@ TEST_F(RenderCommandTest, PathsAndTracesAreTextOfAnEnd) {
     const std::string mark = "\xef\xbb\xbf";
     write_text(path("p.csv"), mark + "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,0,3,0,0,0\n");
     write_text(path("g.csv"), mark + "time_s,x_px,y_px\n0,1,2\n");
-    const Outcome flown = run({"fly", "ball.vdt", "--path", "p.csv", "--gaze-trace", "g.csv"});
-    EXPECT_EQ(flown.status, 0) << flown.err;
+    succeed({"fly", "ball.vdt", "--path", "p.csv", "--gaze-trace", "g.csv"});
     write_text(path("p.csv"), "eye_\x1b[31m\n");
     EXPECT_THAT(run({"fly", "ball.vdt", "--path", "p.csv"}).err,
                 ::testing::AllOf(HasSubstr("eye_\\x1b[31m"), ::testing::Not(HasSubstr("\x1b"))));

@@ -7,7 +7,7 @@ namespace unseen::app::testing {
 
 class BenchTest : public CommandTest {
 protected:
-    Outcome bench(std::vector<std::string> words) const {
+    Outcome bench(Words words) const {
         words.insert(words.begin(), UNSEEN_BENCH_COMMAND);
         return run_program(std::move(words));
     }

@@ -20,6 +20,13 @@ namespace unseen::app::testing {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
+using Words = std::vector<std::string>;
+
+inline Words joined(Words words, const Words& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
 inline std::string read_text(const fs::path& file) {
     std::ifstream stream(file, std::ios::binary);
     std::stringstream text;
@@ -41,7 +48,16 @@ struct Outcome {
     std::string out, err;
 
     Json json() const { return Json::parse(out, nullptr, false); }
+    friend std::ostream& operator<<(std::ostream& stream, const Outcome& outcome) {
+        return stream << "status " << outcome.status << "\n" << outcome.out << outcome.err;
+    }
 };
+
+// Of an outcome: the status, and what is said on stderr.
+template <class Matcher>
+auto fails(int status, Matcher error) {
+    return AllOf(::testing::Field("status", &Outcome::status, status), ::testing::Field("err", &Outcome::err, error));
+}
 
 // A fixture with an empty folder, where the command runs.
 class CommandTest : public ::testing::Test {
@@ -62,16 +78,12 @@ protected:
     const fs::path& folder() const { return folder_; }
     fs::path path(const std::string& name) const { return folder_ / name; }
 
-    pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err,
-                const std::string& input = {}) const {
-        std::vector<std::string> words = {UNSEEN_COMMAND};
-        words.insert(words.end(), arguments.begin(), arguments.end());
-        return start_program(std::move(words), out, err, input);
+    pid_t start(const Words& arguments, const fs::path& out, const fs::path& err, const std::string& input = {}) const {
+        return start_program(joined({UNSEEN_COMMAND}, arguments), out, err, input);
     }
 
     // The first word is the program's path.
-    pid_t start_program(std::vector<std::string> words, const fs::path& out, const fs::path& err,
-                        const std::string& input = {}) const {
+    pid_t start_program(Words words, const fs::path& out, const fs::path& err, const std::string& input = {}) const {
         write_text(out.string() + ".in", input);
         std::vector<char*> argv;
         for (std::string& word : words) argv.push_back(word.data());
@@ -97,14 +109,19 @@ protected:
         return failed ? -1 : process;
     }
 
-    Outcome run(const std::vector<std::string>& arguments, const std::string& input = {}) const {
-        std::vector<std::string> words = {UNSEEN_COMMAND};
-        words.insert(words.end(), arguments.begin(), arguments.end());
-        return run_program(std::move(words), input);
+    Outcome run(const Words& arguments, const std::string& input = {}) const {
+        return run_program(joined({UNSEEN_COMMAND}, arguments), input);
+    }
+    // Ends the test where the command fails.
+    Outcome succeed(const Words& arguments, const std::string& input = {}) const {
+        Outcome outcome = run(arguments, input);
+        if (outcome.status != 0)
+            throw std::runtime_error(::testing::PrintToString(arguments) + ": " + ::testing::PrintToString(outcome));
+        return outcome;
     }
     Outcome run_shell(const std::string& command) const { return run_program({"/bin/sh", "-c", command}); }
 
-    Outcome run_program(std::vector<std::string> words, const std::string& input = {}) const {
+    Outcome run_program(Words words, const std::string& input = {}) const {
         // Beside the folder, so that its content is the command's alone.
         const fs::path out = folder_.string() + ".out", err = folder_.string() + ".err";
         const std::string program = words.front();
@@ -154,12 +171,9 @@ protected:
 
     // Whether the judge sees no pixel change between two models, both whole, drawn with these options; yes where nothing
     // can be drawn. Leaves a.pfm and b.pfm.
-    ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b,
-                                             const std::vector<std::string>& view) const {
+    ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b, const Words& view) const {
         for (const auto& [model, picture] : {std::pair(a, "a.pfm"), std::pair(b, "b.pfm")}) {
-            std::vector<std::string> words = {"render", model, "-o", picture, "--full"};
-            words.insert(words.end(), view.begin(), view.end());
-            const Outcome drawn = run(words);
+            const Outcome drawn = run(joined({"render", model, "-o", picture, "--full"}, view));
             if (drawn.err.find("No OpenGL") != std::string::npos) return ::testing::AssertionSuccess();
             if (drawn.status != 0) return ::testing::AssertionFailure() << drawn.err;
         }
@@ -184,8 +198,8 @@ private:
 
 // Whether a sentence speaks of the session library's fields instead of the command's options.
 inline bool names_fields(const std::string& text) {
-    const std::vector<std::string> fields = {"request.",    "observer.csf", "load.texture",     "load.without",
-                                             "load.prelit", "scene.lights", "scene.background", "::"};
+    const Words fields = {"request.",    "observer.csf", "load.texture",     "load.without",
+                          "load.prelit", "scene.lights", "scene.background", "::"};
     return std::any_of(fields.begin(), fields.end(),
                        [&](const std::string& field) { return text.find(field) != std::string::npos; });
 }

@@ -10,13 +10,12 @@ class SelectCommandTest : public CommandTest {
 protected:
     void SetUp() override {
         CommandTest::SetUp();
-        const Outcome made = run({"make", "scene", "bunnies", "-o", "scene.glb", "--triangles", "12000"});
-        ASSERT_EQ(made.status, 0) << made.err;
+        succeed({"make", "scene", "bunnies", "-o", "scene.glb", "--triangles", "12000"});
         const Outcome probe = run({"render", "scene.glb", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
         if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
         fs::remove(path("probe.png"));
     }
-    std::vector<std::string> words(const std::string& out) const {
+    Words words(const std::string& out) const {
         return {"levels", "precompute", "scene.glb", "-o",      out, "--triangles", "8000", "--window",
                 "64",     "--spacing",  "25",        "--depth", "1"};
     }
@@ -30,25 +29,21 @@ protected:
 TEST_F(SelectCommandTest, SelectsTellsAndDraws) {
     auto asked = words("a.sel");
     asked.insert(asked.end(), {"--json", "-"});
-    const Outcome done = run(asked);
-    ASSERT_EQ(done.status, 0) << done.err;
-    const Json report = done.json();
+    const Json report = succeed(asked).json();
     EXPECT_GT(report["cameras"], 10);
     EXPECT_EQ(report["resumed_corners"], 0);
     EXPECT_GT(report["evaluations"], report["cameras"]);
     EXPECT_THAT(files(), UnorderedElementsAre("scene.glb", "a.sel"));
 
-    const Outcome told = run({"levels", "info", "a.sel", "--json", "-"});
-    ASSERT_EQ(told.status, 0) << told.err;
+    const Outcome told = succeed({"levels", "info", "a.sel", "--json", "-"});
     EXPECT_EQ(told.json()["budget"], 8000);
     EXPECT_EQ(told.json()["objects"], 40);
     EXPECT_EQ(told.json()["cameras"], report["cameras"]);
     EXPECT_THAT(run({"levels", "info", "a.sel"}).out, HasSubstr("selected at level 4"));
 
-    const Outcome flown = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--path",
-                               "walk:60:12", "--size", "160x90", "--json", "-"});
-    ASSERT_EQ(flown.status, 0) << flown.err;
-    const Json flight = flown.json();
+    const Json flight = succeed({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--path",
+                                 "walk:60:12", "--size", "160x90", "--json", "-"})
+                            .json();
     EXPECT_EQ(flight["method"], "selection");
     ASSERT_EQ(flight["frames"].size(), 12u);
     int changed = 0;
@@ -58,9 +53,8 @@ TEST_F(SelectCommandTest, SelectsTellsAndDraws) {
         changed += frame["changed"].get<int>();
     }
     EXPECT_GT(changed, 0);
-    const Outcome less = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--triangles",
-                              "5000", "--size", "160x90", "-o", "still.png", "--json", "-"});
-    ASSERT_EQ(less.status, 0) << less.err;
+    const Outcome less = succeed({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "--triangles",
+                                  "5000", "--size", "160x90", "-o", "still.png", "--json", "-"});
     EXPECT_LE(less.json()["frames"][0]["triangles"], 5000);
 }
 
@@ -91,8 +85,7 @@ TEST_F(SelectCommandTest, GoesOnAfterItWasKilled) {
     EXPECT_GT(kills, 0);
     auto asked = words("parts.sel");
     asked.insert(asked.end(), {"--json", "-"});
-    const Outcome rest = run(asked);
-    ASSERT_EQ(rest.status, 0) << rest.err;
+    const Outcome rest = succeed(asked);
     resumed = rest.json()["resumed_corners"];
     EXPECT_GE(resumed, kills);
     EXPECT_TRUE(read_text(path("parts.sel")) == read_text(path("whole.sel")));
@@ -112,9 +105,8 @@ TEST_F(SelectCommandTest, WhatIsWrongIsSaid) {
     // Of another scene.
     ASSERT_EQ(run(words("a.sel")).status, 0);
     ASSERT_EQ(run({"make", "scene", "bunnies", "-o", "scene.glb", "--triangles", "12000", "--seed", "2"}).status, 0);
-    const Outcome other = run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "-o", "a.png"});
-    EXPECT_EQ(other.status, 1);
-    EXPECT_THAT(other.err, HasSubstr("another scene"));
+    EXPECT_THAT(run({"levels", "scene.glb", "--method", "selection", "--selection", "a.sel", "-o", "a.png"}),
+                fails(1, HasSubstr("another scene")));
 }
 
 TEST_F(SelectCommandTest, AFlightIsMeasured) {
@@ -153,10 +145,9 @@ TEST_F(SelectCommandTest, LevelsAreAsManyAsAreAskedFor) {
     ASSERT_EQ(run_shell(text("few.sel") + " --levels 3").status, 0);
     const Outcome told = run({"levels", "info", "few.sel", "--json", "-"});
     EXPECT_EQ(told.json()["levels"], 3);
-    const Outcome drawn =
-        run({"levels", "scene.glb", "--method", "selection", "--selection", "few.sel", "-o", "few.png", "--json", "-"});
-    ASSERT_EQ(drawn.status, 0) << drawn.err;
-    const Json flight = drawn.json();
+    const Json flight = succeed({"levels", "scene.glb", "--method", "selection", "--selection", "few.sel", "-o",
+                                 "few.png", "--json", "-"})
+                            .json();
     for (const Json& object : flight["objects"]) EXPECT_LE(object["level_triangles"].size(), 3u);
     EXPECT_EQ(run_shell(text("one.sel") + " --levels 1").status, 2);
 }

@@ -52,9 +52,7 @@ TEST(Session, RefusesWhatCannotBeSeen) {
     EXPECT_FALSE(Session::create({}));
     session::Scene scene = session::Scene::of(tree_of(shapes::cube(4)));
     scene.background = perception::Luminance(1e6);
-    const auto refused = Session::create(std::move(scene));
-    ASSERT_FALSE(refused);
-    EXPECT_THAT(refused.error().message, HasSubstr("scene.background"));
+    EXPECT_THAT(error_in(Session::create(std::move(scene))), HasSubstr("scene.background"));
     auto session = Session::create(session::Scene::of(tree_of(shapes::cube(4))));
     vdtree::View blind = session->default_view();
     blind.target = blind.eye;
@@ -94,17 +92,14 @@ TEST(Session, SaysOfEachEffectWhyItIsOnOrOff) {
 TEST(Session, RefusesObjectsThatAreNotThere) {
     Session session = two_balls();
     const vdtree::View view = session.default_view();
-    const auto plan = session.plan(view, {}, 2);
-    ASSERT_FALSE(plan);
-    EXPECT_THAT(plan.error().message, HasSubstr("There is no object 2: the scene has 2"));
+    EXPECT_THAT(error_in(session.plan(view, {}, 2)), HasSubstr("There is no object 2: the scene has 2"));
     EXPECT_FALSE(session.recipe(view, {}, 2));
     EXPECT_DEATH(session.tree(2), "There is no object 2");
 }
 
 TEST(Session, ChromaAsksNothingOfWhatIsGrey) {
     auto session = *Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
-    const auto plain = session.simplify(), chroma = session.simplify({.chroma = true});
-    ASSERT_TRUE(plain && chroma);
+    const auto plain = require(session.simplify()), chroma = require(session.simplify({.chroma = true}));
     EXPECT_EQ(chroma->fold_tests.front(), FoldTest::error);
     EXPECT_EQ(chroma->stats.triangles, plain->stats.triangles);
 }
@@ -120,9 +115,7 @@ TEST(Session, SharesABudgetAmongItsObjects) {
     EXPECT_GT(whole, half) << "what is smaller needs fewer";
     EXPECT_EQ(shared->mesh(1).triangles.size(), half);
     EXPECT_EQ(shared->source_triangles, session.tree(0).triangle_count() + session.tree(1).triangle_count());
-    const auto filled = session.simplify({.goal = Goal::budget(1500, true)});
-    ASSERT_FALSE(filled);
-    EXPECT_THAT(filled.error().message, HasSubstr("request.goal.fill"));
+    EXPECT_THAT(error_in(session.simplify({.goal = Goal::budget(1500, true)})), HasSubstr("request.goal.fill"));
 }
 
 TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
@@ -162,8 +155,8 @@ TEST(Session, OrthographicViewsKeepWhatTheWindowShows) {
     const auto kept = [&](double x, double z) {
         view.eye = {x, 0, z};
         view.target = {x, 0, z - 1};
-        auto made = session.simplify(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture});
-        if (!made) throw std::runtime_error(made.error().message);
+        auto made =
+            require(session.simplify(view, {.goal = Goal::imperceptible(), .purpose = session::Purpose::picture}));
         return std::pair{made->cuts[0].triangle_count(), made->cuts[1].triangle_count()};
     };
     const auto at_first = kept(0, 5);
@@ -263,10 +256,9 @@ TEST(Session, SaysWhereItsTableHasNoSamples) {
 
 TEST(Observer, AVelocityIsOneThatTablesKnow) {
     for (const double bad : {-1.0, 81.0, std::numeric_limits<double>::quiet_NaN()}) {
-        const auto refused = Session::create(session::Scene::of(tree_of(shapes::cube(2))),
-                                             {.velocity = perception::DegreesPerSecond(bad)});
-        ASSERT_FALSE(refused);
-        EXPECT_THAT(refused.error().message, HasSubstr("observer.velocity"));
+        EXPECT_THAT(error_in(Session::create(session::Scene::of(tree_of(shapes::cube(2))),
+                                             {.velocity = perception::DegreesPerSecond(bad)})),
+                    HasSubstr("observer.velocity"));
     }
 }
 

@@ -120,8 +120,7 @@ vdtree::VertexTree ball_of(float grey) {
     if (found != measured.end()) return found->second.share();
     vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
     mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(grey), 1));
-    auto tree = session::measured_under_lights(support::built(mesh));
-    if (!tree) throw std::runtime_error(tree.error().message);
+    auto tree = require(session::measured_under_lights(support::built(mesh)));
     return measured.emplace(grey, std::move(*tree)).first->second.share();
 }
 

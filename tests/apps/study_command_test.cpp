@@ -8,18 +8,14 @@ using ::testing::HasSubstr;
 
 class StudyCommandTest : public DrawingCommandTest {
 protected:
-    Outcome make(const std::vector<std::string>& more = {}) const {
-        std::vector<std::string> words = {"study",   "make",    "ball.vdt", "-o",        "s", "--size",
-                                          "200x160", "--views", "4",        "--samples", "4"};
-        words.insert(words.end(), more.begin(), more.end());
-        return run(words);
+    Outcome make(const Words& more = {}) const {
+        return run(joined(
+            {"study", "make", "ball.vdt", "-o", "s", "--size", "200x160", "--views", "4", "--samples", "4"}, more));
     }
-    Json analysis(const std::vector<std::string>& files) const {
-        std::vector<std::string> words = {"study", "analyse"};
-        words.insert(words.end(), files.begin(), files.end());
+    Json analysis(const Words& files) const {
+        Words words = joined({"study", "analyse"}, files);
         words.insert(words.end(), {"--json", "-"});
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome outcome = succeed(words);
         return outcome.json();
     }
 };
@@ -30,8 +26,7 @@ TEST_F(StudyCommandTest, WhatIsPlainIsToldAndWhatIsImperceptibleIsNot) {
     // Training: a view each; two conditions of four views, 25 times.
     EXPECT_THAT(made.out, HasSubstr("12 pairs, 204 trials"));
     EXPECT_TRUE(fs::exists(path("s/ball-view4-original.png")));
-    const Outcome ran = run({"study", "run", "s", "--simulate", "default", "--subject", "nobody"});
-    ASSERT_EQ(ran.status, 0) << ran.err;
+    succeed({"study", "run", "s", "--simulate", "default", "--subject", "nobody"});
     const Json result = analysis({"s/answers-nobody.csv"});
     ASSERT_EQ(result["conditions"].size(), 2u);
     for (const Json& condition : result["conditions"]) {
@@ -56,18 +51,16 @@ TEST_F(StudyCommandTest, GoesOnWhereItWasLeft) {
     write_text(path("s/answers-unnamed.csv"), whole.substr(0, end));
     ASSERT_EQ(run({"study", "run", "s", "--simulate", "median"}).status, 0);
     EXPECT_EQ(read_text(path("s/answers-unnamed.csv")), whole);
-    const Outcome other =
-        run({"study", "run", "s", "--simulate", "median", "--subject", "bob", "--answers", "s/answers-unnamed.csv"});
-    EXPECT_EQ(other.status, 1);
-    EXPECT_THAT(other.err, HasSubstr("the column subject is 'unnamed'"));
+    EXPECT_THAT(
+        run({"study", "run", "s", "--simulate", "median", "--subject", "bob", "--answers", "s/answers-unnamed.csv"}),
+        fails(1, HasSubstr("the column subject is 'unnamed'")));
     EXPECT_EQ(read_text(path("s/answers-unnamed.csv")), whole);
 }
 
 TEST_F(StudyCommandTest, LevelsArePairedByWhatIsDecided) {
     // Small and far away a coarser level is kept than from near by.
-    const Outcome made = run({"study", "make", "ball.vdt", "-o", "s", "--levels", "--maps", "rpg99", "--size",
-                              "200x160", "--views", "2", "--distances", "1", "8", "--samples", "4", "--repeats", "2"});
-    ASSERT_EQ(made.status, 0) << made.err;
+    succeed({"study", "make", "ball.vdt", "-o", "s", "--levels", "--maps", "rpg99", "--size", "200x160", "--views", "2",
+             "--distances", "1", "8", "--samples", "4", "--repeats", "2"});
     const Json study = Json::parse(read_text(path("s/study.json")));
     int maintained = 0;
     for (const Json& pair : study["pairs"]) {
@@ -112,9 +105,7 @@ TEST_F(StudyCommandTest, RefusesWhatItCannotDo) {
     EXPECT_THAT(near.err, HasSubstr("made for 34.4 pixels a degree"));
     fs::remove(path("s/ball-view2-1.png"));
     fs::remove(path("s/answers-unnamed.csv"));
-    const Outcome gone = run({"study", "run", "s", "--simulate", "median"});
-    EXPECT_EQ(gone.status, 1);
-    EXPECT_THAT(gone.err, HasSubstr("ball-view2-1.png"));
+    EXPECT_THAT(run({"study", "run", "s", "--simulate", "median"}), fails(1, HasSubstr("ball-view2-1.png")));
 }
 
 } // namespace study_command_test

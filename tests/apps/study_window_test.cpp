@@ -25,9 +25,7 @@ protected:
             {"condition": "plain", "original": "white.png", "other": "black.png", "training": true},
             {"condition": "black", "original": "white.png", "other": "black.png", "training": false}]})");
     }
-    bool open(const std::vector<std::string>& more = {}) {
-        return WindowTest::open({"study", "run", "s", "--subject", "ann"}, more);
-    }
+    bool open(const Words& more = {}) { return WindowTest::open({"study", "run", "s", "--subject", "ann"}, more); }
     std::size_t answers() const {
         const std::string text = read_text(path("s/answers-ann.csv"));
         return static_cast<std::size_t>(std::max<std::ptrdiff_t>(std::ranges::count(text, '\n') - 1, 0));

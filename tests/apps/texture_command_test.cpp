@@ -48,30 +48,24 @@ protected:
         const auto written = require(unseen::perception::write_image(path(name), image));
     }
     // Pictures are drawn as they are, without light.
-    Json build(const std::string& mesh, std::vector<std::string> more = {}) const {
-        std::vector<std::string> words = {"build", mesh, "-o", "t.vdt", "--prelit", "--json", "-"};
-        words.insert(words.end(), more.begin(), more.end());
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        const Outcome verified = run({"info", "t.vdt", "--verify"});
-        EXPECT_EQ(verified.status, 0) << verified.err;
+    Json build(const std::string& mesh, Words more = {}) const {
+        const Outcome outcome = succeed(joined({"build", mesh, "-o", "t.vdt", "--prelit", "--json", "-"}, more));
+        succeed({"info", "t.vdt", "--verify"});
         return outcome.json();
     }
     // The luminance in cd/m2 of the pictures' upper and lower halves; empty where nothing can be drawn.
-    std::optional<std::pair<float, float>> draw(const std::string& model, std::vector<std::string> more = {},
+    std::optional<std::pair<float, float>> draw(const std::string& model, Words more = {},
                                                 Json* report = nullptr) const {
-        std::vector<std::string> words = {"render", model, "-o",        "p.pfm", "--size", "64x64",
-                                          "--fill", "1.2", "--samples", "4",     "--json", "-"};
-        words.insert(words.end(), more.begin(), more.end());
-        const Outcome outcome = run(words);
+        const Outcome outcome = run(joined(
+            {"render", model, "-o", "p.pfm", "--size", "64x64", "--fill", "1.2", "--samples", "4", "--json", "-"},
+            more));
         if (outcome.err.find("No OpenGL") != std::string::npos) return std::nullopt;
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         if (report) *report = outcome.json();
-        const auto picture = read_image(path("p.pfm"));
-        if (!picture) throw std::runtime_error(picture.error().message);
+        const auto picture = require(read_image(path("p.pfm")));
         return std::pair(picture->image.at(32, 24), picture->image.at(32, 40));
     }
-    std::string complaint(const std::vector<std::string>& words) const {
+    std::string complaint(const Words& words) const {
         const Outcome outcome = run(words);
         EXPECT_NE(outcome.status, 0) << outcome.out;
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
@@ -113,9 +107,8 @@ TEST_F(TextureCommandTest, CanBeLeftOutOrReplaced) {
         EXPECT_THAT(effect_named(drawn, "texture")["why"].get<std::string>(), HasSubstr("--no-texture"));
     }
     EXPECT_THAT(complaint({"render", "t.vdt", "-o", "x.png", "--texture", "grey.png"}), HasSubstr("unseen build"));
-    const Outcome both = run({"build", "square.obj", "-o", "x.vdt", "--texture", "grey.png", "--no-texture"});
-    EXPECT_EQ(both.status, 2);
-    EXPECT_THAT(both.err, HasSubstr("--texture and --no-texture exclude each other"));
+    EXPECT_THAT(run({"build", "square.obj", "-o", "x.vdt", "--texture", "grey.png", "--no-texture"}),
+                fails(2, HasSubstr("--texture and --no-texture exclude each other")));
 }
 
 TEST_F(TextureCommandTest, OfSeveralMaterialsBecomeOne) {
@@ -200,8 +193,7 @@ TEST_F(TextureCommandTest, OfGltfAreFoundInTheFileAndBesideIt) {
     }
     const auto warning_of = [&](const Json& changed) {
         write_text(path("bad.gltf"), changed.dump());
-        const Outcome outcome = run({"build", "bad.gltf", "-o", "x.vdt"});
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome outcome = succeed({"build", "bad.gltf", "-o", "x.vdt"});
         return outcome.err;
     };
     EXPECT_THAT(warning_of(document({{"uri", "nowhere.png"}}, white)),
@@ -243,8 +235,7 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
         if (image.name != "missing.png" && image.name != "../p.png") write_text(path(image.name), image.bytes);
         write_square(image.name);
         for (const int time : {1, 2}) {
-            const Outcome outcome = run({"simplify", "square.obj", "-o", "x.ply"});
-            EXPECT_EQ(outcome.status, 0) << outcome.err;
+            const Outcome outcome = succeed({"simplify", "square.obj", "-o", "x.ply"});
             EXPECT_THAT(outcome.err, AllOf(HasSubstr(image.warning), HasSubstr("colour of the material alone"),
                                            HasSubstr("--texture")))
                 << time;
@@ -261,16 +252,13 @@ TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
     EXPECT_THAT(complaint({"build", "none.obj", "-o", "x.vdt", "--texture", "p.png"}),
                 HasSubstr("no texture coordinates"));
     write_text(path("nan.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 1 1\nf 1/1 2/2 3/3\n");
-    const Outcome outcome = run({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"});
-    EXPECT_EQ(outcome.status, 0);
-    EXPECT_THAT(outcome.err, HasSubstr("1 texture coordinate was not finite"));
+    EXPECT_THAT(succeed({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"}).err,
+                HasSubstr("1 texture coordinate was not finite"));
 }
 
 TEST_F(TextureCommandTest, MissingMaterialsAreNoted) {
     write_text(path("square.obj"), square(4, "mtllib nowhere.mtl\nusemtl paint\n"));
-    const Outcome outcome = run({"build", "square.obj", "-o", "t.vdt"});
-    EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr("nowhere.mtl"));
+    EXPECT_THAT(succeed({"build", "square.obj", "-o", "t.vdt"}).err, HasSubstr("nowhere.mtl"));
 }
 
 TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
@@ -294,11 +282,8 @@ TEST_F(TextureCommandTest, AreMeasuredWithWhatFoldsChange) {
     EXPECT_TRUE(built["fold_errors"].get<bool>());
     EXPECT_TRUE(built["lit_fold_errors"].get<bool>());
     write_text(path("l.json"), R"({"lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
-    for (const std::vector<std::string>& lights : {std::vector<std::string>{}, {"--lights", "l.json"}}) {
-        std::vector<std::string> words = {"simplify", "t.vdt", "-o", "x.obj", "--json", "-"};
-        words.insert(words.end(), lights.begin(), lights.end());
-        const Outcome cut = run(words);
-        EXPECT_EQ(cut.status, 0) << cut.err;
+    for (const Words& lights : {Words{}, {"--lights", "l.json"}}) {
+        const Outcome cut = succeed(joined({"simplify", "t.vdt", "-o", "x.obj", "--json", "-"}, lights));
         EXPECT_THAT(effect_named(cut.json(), "fold test")["why"].get<std::string>(), StartsWith("error:"));
         EXPECT_THAT(effect_named(cut.json(), "texture")["why"].get<std::string>(), HasSubstr("what they change of it"));
     }
@@ -309,8 +294,8 @@ TEST_F(TextureCommandTest, HoldFoldsBackWhereTheyWouldMove) {
     write_square("p.png");
     build("square.obj");
     // Half black and half white: only folds within a half are free.
-    const Outcome cut = run({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
-    EXPECT_EQ(cut.status, 0) << cut.err;
+    const Outcome cut =
+        succeed({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
     EXPECT_THAT(effect_named(cut.json(), "texture")["why"].get<std::string>(), HasSubstr("how far they move it"));
 }
 
@@ -329,7 +314,7 @@ TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
         write_text(path("large.vdt"), bytes);
         fs::resize_file(path("large.vdt"), mapped_bytes);
     };
-    for (const std::vector<std::string>& texture : {std::vector<std::string>{}, {"--no-texture"}}) {
+    for (const Words& texture : {Words{}, {"--no-texture"}}) {
         build("square.obj", texture);
         write_large([](TreeFile&) {});
         EXPECT_EQ(run({"simplify", "large.vdt", "-o", "x.obj"}).status, 0);
@@ -352,8 +337,7 @@ TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
                         AnyOf(HasSubstr("damaged"), HasSubstr("No OpenGL")));
             // What asks node by node goes as far as nodes are sound.
             for (const char* const test : {"extent", "displacement"}) {
-                const Outcome cut = run({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", test, "--pixels", "1"});
-                EXPECT_EQ(cut.status, 0) << cut.err;
+                succeed({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", test, "--pixels", "1"});
             }
         }
     }

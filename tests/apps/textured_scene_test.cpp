@@ -152,17 +152,11 @@ protected:
         draft.set_camera(6, 0.4);
         draft.write(path("in/scene.gltf"));
     }
-
-    Outcome succeed(const std::vector<std::string>& words) const {
-        Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        return outcome;
-    }
 };
 
 TEST_F(TexturedSceneTest, GoesThroughTheCommandFromEndToEnd) {
-    const std::vector<std::string> window = {"--size", "256x256"};
-    const auto with = [&](std::vector<std::string> words) {
+    const Words window = {"--size", "256x256"};
+    const auto with = [&](Words words) {
         words.insert(words.end(), window.begin(), window.end());
         return words;
     };
@@ -212,19 +206,17 @@ TEST_F(TexturedSceneTest, GoesThroughTheCommandFromEndToEnd) {
 
 // As one model, under its own light: nothing is seen, and aside or far away little is kept.
 TEST_F(TexturedSceneTest, FoldsWhereNobodySeesIt) {
-    const auto draw = [&](const std::vector<std::string>& view, const std::vector<std::string>& how) {
-        std::vector<std::string> words = {"render", "in/scene.gltf", "--as",   "model",
-                                          "--size", "256x256",       "--json", "-"};
-        words.insert(words.end(), view.begin(), view.end());
+    const auto draw = [&](const Words& view, const Words& how) {
+        Words words = joined({"render", "in/scene.gltf", "--as", "model", "--size", "256x256", "--json", "-"}, view);
         words.insert(words.end(), how.begin(), how.end());
         return run(words);
     };
-    const auto aside = [](std::vector<std::string> view) {
+    const auto aside = [](Words view) {
         view.insert(view.end(), {"--gaze", "1200", "128"});
         return view;
     };
     struct Far {
-        std::vector<std::string> view;
+        Words view;
         double most_kept; // of the triangles
     };
     const Far far[] = {{{"--direction", "0", "0.2", "1", "--fill", "0.5"}, 1.01},
@@ -239,7 +231,7 @@ TEST_F(TexturedSceneTest, FoldsWhereNobodySeesIt) {
         const Outcome cut = draw(look.view, {"-o", "cut.pfm"});
         ASSERT_EQ(cut.status, 0) << cut.err;
         EXPECT_THAT(effect_named(cut.json(), "fold test")["why"].get<std::string>(), ::testing::StartsWith("error:"));
-        std::vector<std::string> words = {"compare", "whole.pfm", "cut.pfm", "--json", "-"};
+        Words words = {"compare", "whole.pfm", "cut.pfm", "--json", "-"};
         if (look.view.size() > 6) words.insert(words.end(), look.view.end() - 3, look.view.end());
         EXPECT_EQ(succeed(words).json()["visible_pixels"], 0);
         const double kept = cut.json()["triangles"].get<double>() / whole.json()["triangles"].get<double>();

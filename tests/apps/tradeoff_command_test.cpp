@@ -7,17 +7,14 @@ using namespace unseen::app::testing;
 
 class TradeoffCommandTest : public DrawingCommandTest {
 protected:
-    Json tradeoff(const std::vector<std::string>& more = {}) const {
-        std::vector<std::string> words = {"tradeoff",  "ball.vdt", "--size", "200x160",
-                                          "--samples", "16",       "--json", "-"};
-        words.insert(words.end(), more.begin(), more.end());
-        const Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    Json tradeoff(const Words& more = {}) const {
+        const Outcome outcome =
+            succeed(joined({"tradeoff", "ball.vdt", "--size", "200x160", "--samples", "16", "--json", "-"}, more));
         return outcome.json();
     }
 };
 
-std::vector<std::string> words_of(const std::string& text) {
+Words words_of(const std::string& text) {
     std::istringstream stream(text);
     return {std::istream_iterator<std::string>(stream), {}};
 }
@@ -30,11 +27,9 @@ TEST_F(TradeoffCommandTest, EachPointIsWhatItsOptionsMake) {
     EXPECT_EQ(points[0]["triangles"], report["source_triangles"]);
     EXPECT_EQ(points[0]["v"], 0);
     for (const Json& point : points) {
-        std::vector<std::string> words = {"render", "ball.vdt", "--size", "200x160", "-o", "x.png", "--json", "-"};
+        Words words = {"render", "ball.vdt", "--size", "200x160", "-o", "x.png", "--json", "-"};
         for (const std::string& word : words_of(point["options"])) words.push_back(word);
-        const Outcome made = run(words);
-        ASSERT_EQ(made.status, 0) << made.err;
-        const Json cut = made.json();
+        const Json cut = succeed(words).json();
         EXPECT_EQ(cut["triangles"], point["triangles"]) << point;
         EXPECT_GT(point["draw_ms"], 0) << point;
         EXPECT_LE(point["draw_ms_from"], point["draw_ms"]) << point;
@@ -79,9 +74,8 @@ TEST_F(TradeoffCommandTest, WhatDoesNotFitIsLeftOutAndSaid) {
     EXPECT_EQ(report["points"][0]["recommended"], true);
     EXPECT_THAT(run({"tradeoff", "ball.vdt", "--seconds", "0"}).err, HasSubstr("--seconds"));
     EXPECT_THAT(run({"tradeoff", "missing.vdt"}).err, HasSubstr("missing.vdt"));
-    const Outcome text = run({"tradeoff", "ball.vdt", "--size", "64x64", "--samples", "1", "--seconds", "0.2"});
-    EXPECT_EQ(text.status, 0) << text.err;
-    EXPECT_THAT(text.out, HasSubstr("recommended, as the safe way with the fewest triangles that shows nothing: --"));
+    EXPECT_THAT(succeed({"tradeoff", "ball.vdt", "--size", "64x64", "--samples", "1", "--seconds", "0.2"}).out,
+                HasSubstr("recommended, as the safe way with the fewest triangles that shows nothing: --"));
 }
 
 TEST_F(TradeoffCommandTest, ThresholdsAreOfImperceptibleCuts) {

@@ -31,11 +31,6 @@ protected:
         write_text(path(name), ply.str());
     }
 
-    Outcome succeed(const std::vector<std::string>& words) const {
-        Outcome outcome = run(words);
-        EXPECT_EQ(outcome.status, 0) << outcome.err;
-        return outcome;
-    }
     Json arrays(const std::string& file) const { return succeed({"info", file, "--json"}).json()["arrays"]; }
 };
 
@@ -80,9 +75,8 @@ TEST_F(ValuesCommandTest, VtkFilesAreModels) {
                     HasSubstr("made 5,888 triangles of 1,472"));
     }
     write_text(path("grid.vtu"), "<VTKFile type=\"UnstructuredGrid\"></VTKFile>");
-    const Outcome refused = run({"build", "grid.vtu", "-o", "grid.vdt"});
-    EXPECT_EQ(refused.status, 1);
-    EXPECT_THAT(refused.err, AllOf(IsAnErrorForPeople(), HasSubstr("Extract Surface")));
+    EXPECT_THAT(run({"build", "grid.vtu", "-o", "grid.vdt"}),
+                fails(1, AllOf(IsAnErrorForPeople(), HasSubstr("Extract Surface"))));
 }
 
 TEST_F(ValuesCommandTest, AreKeptInEveryWayOfBuilding) {

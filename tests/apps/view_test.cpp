@@ -17,12 +17,12 @@ protected:
         if (IsSkipped()) return;
         build_ball();
     }
-    bool open(const std::vector<std::string>& more, const std::string& size = "200x160") {
+    bool open(const Words& more, const std::string& size = "200x160") {
         return WindowTest::open({"view", "ball.vdt", "--size", size}, more);
     }
     // The pictures that keys were pressed for, in their order.
     std::vector<Image> screenshots() const {
-        std::vector<std::string> names;
+        Words names;
         for (const std::string& name : files())
             if (name.starts_with("unseen-")) names.push_back(name);
         // "unseen-DATE-TIME-NUMBER.png"
@@ -150,9 +150,7 @@ TEST_F(ViewCommandTest, ParallelViewsZoomAndComeBack) {
     window().title_with("whole");
     window().press(XK_q);
     ASSERT_EQ(ended(), 0) << errors();
-    const Outcome drawn =
-        run({"render", "ball.vdt", "--full", "--orthographic", "fit", "--size", "200x160", "-o", "same.png"});
-    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    succeed({"render", "ball.vdt", "--full", "--orthographic", "fit", "--size", "200x160", "-o", "same.png"});
     EXPECT_TRUE(read_text(path("fit.png")) == read_text(path("same.png")));
 }
 
@@ -206,7 +204,7 @@ TEST_F(ViewCommandTest, GlidesComeToRestByThemselves) {
 }
 
 TEST_F(ViewCommandTest, FoldingCanBeginAtTheFullModel) {
-    const auto imperceptible = [&](const std::vector<std::string>& words, bool begins_whole) {
+    const auto imperceptible = [&](const Words& words, bool begins_whole) {
         if (!open(words)) return std::string();
         if (begins_whole) {
             window().title_with("whole");

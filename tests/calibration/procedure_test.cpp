@@ -237,14 +237,12 @@ TEST_F(ProcedureTest, WhatIsFarFromVisibleIsNotPutAtTheGridsEnd) {
 TEST_F(ProcedureTest, WhatCannotBeMeasuredIsRefused) {
     const CalibrationPlan plan = one_place(Method::two_interval);
     EXPECT_TRUE(check_measurable(observer_of("castle:gain=20", 1), plan));
-    const auto refused = check_measurable(observer_of("castle:gain=100", 1), plan);
-    ASSERT_FALSE(refused);
-    EXPECT_THAT(refused.error().message, AllOf(HasSubstr("2 cpd"), HasSubstr("3162")));
+    EXPECT_THAT(error_in(check_measurable(observer_of("castle:gain=100", 1), plan)),
+                AllOf(HasSubstr("2 cpd"), HasSubstr("3162")));
     CsfSamples samples = CsfTable::standard().samples();
     for (double& s : samples.sensitivity) s *= 1000;
-    const auto procedure = Procedure::create(plan, *CsfTable::create(samples));
-    ASSERT_FALSE(procedure);
-    EXPECT_THAT(procedure.error().message, AllOf(HasSubstr("places[0]"), HasSubstr("3162")));
+    EXPECT_THAT(error_in(Procedure::create(plan, *CsfTable::create(samples))),
+                AllOf(HasSubstr("places[0]"), HasSubstr("3162")));
     // A table that ends at the largest sensitivity there can be, elsewhere: the deviation carries it beyond.
     samples = CsfTable::standard().samples();
     for (std::size_t i = 0; i < samples.sensitivity.size(); ++i)
@@ -417,9 +415,8 @@ TEST_F(ProcedureTest, RunsRepeatAndResume) {
     }
     // Not with another table than it was begun with; files that do not say which it was take any.
     const auto file = folder() / "state.json";
-    const auto other_table = Procedure::resume(file, CsfTable::from_model(perception::CsfModel::stela));
-    ASSERT_FALSE(other_table);
-    EXPECT_THAT(other_table.error().message, AllOf(HasSubstr("state.json"), HasSubstr("castle"), HasSubstr("stela")));
+    EXPECT_THAT(error_in(Procedure::resume(file, CsfTable::from_model(perception::CsfModel::stela))),
+                AllOf(HasSubstr("state.json"), HasSubstr("castle"), HasSubstr("stela")));
     std::string old = read(file);
     const auto from = old.find("\"expected\""), to = old.find("\"answers\"");
     ASSERT_LT(from, to);
@@ -496,10 +493,10 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
                              {"\"answers\": [\n[", "\"answers\": [\n[99", "\"answers[0]\" has no place"},
                              {"\"luminance_cdm2\": ", "\"luminance_cdm2\": -", "luminance_cdm2"}};
     for (const BadCase& bad : cases) {
-        const auto resumed =
-            Procedure::resume(write(replaced(good, bad.from, bad.to), "bad.json"), CsfTable::standard());
-        ASSERT_FALSE(resumed) << bad.expected;
-        EXPECT_THAT(resumed.error().message, AllOf(HasSubstr("bad.json"), HasSubstr(bad.expected)));
+        EXPECT_THAT(
+            error_in(Procedure::resume(write(replaced(good, bad.from, bad.to), "bad.json"), CsfTable::standard())),
+            AllOf(HasSubstr("bad.json"), HasSubstr(bad.expected)))
+            << bad.expected;
     }
     for_each_mutation(good, 150, [&](const std::string& text) {
         const auto resumed = Procedure::resume(write(text), CsfTable::standard());
@@ -521,9 +518,7 @@ TEST_F(ProcedureTest, ObserversAreDescribedByNameAndKeys) {
                                          {"castle:lapse=0.9", "lapse"},
                                          {"castle:age=40", "'age=40' is none of"},
                                          {"missing.json", "missing.json"}}) {
-        const auto observer = simulated_observer(text, 1);
-        ASSERT_FALSE(observer) << text;
-        EXPECT_THAT(observer.error().message, HasSubstr(expected));
+        EXPECT_THAT(error_in(simulated_observer(text, 1)), HasSubstr(expected)) << text;
     }
 }
 

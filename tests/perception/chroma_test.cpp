@@ -50,9 +50,7 @@ VertexTree checkerboard(Colour&& colour, vdtree::Light light = {}) {
             mesh.triangles.push_back({at(row, column), at(row + 1, column + 1), at(row + 1, column)});
         }
     }
-    auto tree = vdtree::build_tree(mesh.view(), {.light = light, .prelit = true});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(vdtree::build_tree(mesh.view(), {.light = light, .prelit = true})));
 }
 VertexTree red_green_checkerboard(double saturation) {
     return checkerboard([&](bool is_red) { return red_or_green(is_red ? saturation : -saturation); });
@@ -84,8 +82,7 @@ Result<DistanceCriterion> criterion_of(const VertexTree& tree, const View& view,
 
 Cut cut_of(const VertexTree& tree, double eye_distance, Test test) {
     const View view = view_from(eye_distance);
-    const auto criterion = criterion_of(tree, view, test);
-    if (!criterion) throw std::runtime_error(criterion.error().message);
+    const auto criterion = require(criterion_of(tree, view, test));
     EXPECT_TRUE(criterion->is_monotone());
     Cut cut(tree);
     EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, {}, {}, false)));
@@ -209,9 +206,8 @@ TEST(Chroma, OfGreyMeshesCostsNothing) {
     EXPECT_TRUE(ring_chroma(tree)->empty());
     for (const bool safe : {false, true}) {
         for (const bool gazes : {false, true}) {
-            const auto with = criterion_of(tree, view_from(near), {safe, true}, gazes),
-                       without = criterion_of(tree, view_from(near), {safe, false}, gazes);
-            ASSERT_TRUE(with && without);
+            const auto with = require(criterion_of(tree, view_from(near), {safe, true}, gazes)),
+                       without = require(criterion_of(tree, view_from(near), {safe, false}, gazes));
             EXPECT_EQ(with->parts().switch_distance, without->parts().switch_distance);
             EXPECT_EQ(with->parts().least_cost, without->parts().least_cost);
         }

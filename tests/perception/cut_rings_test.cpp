@@ -213,9 +213,8 @@ TEST(CutRings, FindShiftsOfTheMean) {
         clustering.positions = {{1, 1, 0}, {1, 0.5, 0}}; // of the edge and of the root
         return clustering;
     };
-    auto even = build_tree(strip(0.5f, 0.5f).view(), merge_middle, {.prelit = true}),
-         bright = build_tree(strip(1, 0.25f).view(), merge_middle, {.prelit = true});
-    ASSERT_TRUE(even && bright);
+    auto even = require(build_tree(strip(0.5f, 0.5f).view(), merge_middle, {.prelit = true})),
+         bright = require(build_tree(strip(1, 0.25f).view(), merge_middle, {.prelit = true}));
     ASSERT_EQ(even->interior_count(), 2u); // the root and the edge
     constexpr NodeId node = 1;
     EXPECT_NEAR(bound_cut_rings(*even)->mean_shift[node], 0, 1e-6);

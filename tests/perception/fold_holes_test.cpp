@@ -60,8 +60,7 @@ struct Scene {
             clustering.positions.push_back({0, 0, 0});
             return clustering;
         };
-        auto built = vdtree::build_tree(mesh.view(), merge, {.prelit = true});
-        if (!built) throw std::runtime_error(built.error().message);
+        auto built = require(vdtree::build_tree(mesh.view(), merge, {.prelit = true}));
         tree = std::move(*built);
         std::vector<NodeId> parent_of_vertex(mesh.positions.size());
         for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf)
@@ -195,16 +194,14 @@ Image picture(const Cut& cut, const View& view) {
 std::uint64_t visible_pixels(const Cut& cut, const View& view) {
     Cut whole(cut.tree());
     whole.unfold_all();
-    const auto judged = judge_modern(picture(whole, view), picture(cut, view), {.gain = median_person.gain});
-    if (!judged) throw std::runtime_error(judged.error().message);
+    const auto judged = require(judge_modern(picture(whole, view), picture(cut, view), {.gain = median_person.gain}));
     return judged->visible_pixels;
 }
 
 // What the safe test makes of the scene.
 Cut safe_cut(const Scene& scene, const View& view) {
-    const auto criterion = luebke_hallen_safe_distances(*scene.tree, *perception::bound_cut_rings(*scene.tree), view,
-                                                        fold_test(*scene.tree));
-    if (!criterion) throw std::runtime_error(criterion.error().message);
+    const auto criterion = require(luebke_hallen_safe_distances(*scene.tree, *perception::bound_cut_rings(*scene.tree),
+                                                                view, fold_test(*scene.tree)));
     EXPECT_TRUE(criterion->is_monotone());
     Cut cut(*scene.tree);
     EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(*scene.tree, view, fold_test(*scene.tree))));

@@ -29,8 +29,7 @@ namespace fold_measurement_test {
 VertexTree built(const Mesh& mesh) { return support::measured(support::built(mesh, {.prelit = true, .threads = 1})); }
 
 std::vector<FoldError> errors_of(const VertexTree& tree) {
-    const auto errors = fold_errors_of(support::sound(tree));
-    if (!errors) throw std::runtime_error(errors.error().message);
+    const auto errors = require(fold_errors_of(support::sound(tree)));
     return errors->of_nodes;
 }
 std::span<const FoldRecord> records_of(const VertexTree& tree) { return tree.attribute<FoldRecord>(record_name); }
@@ -243,8 +242,7 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
 
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     const VertexTree tree = built(shapes::bumpy_sphere(4, 0.02));
-    const auto one = measure_folds(tree, 1), four = measure_folds(tree, 4);
-    ASSERT_TRUE(one && four);
+    const auto one = require(measure_folds(tree, 1)), four = require(measure_folds(tree, 4));
     EXPECT_EQ(errors_of(*one), errors_of(*four));
     EXPECT_TRUE(std::ranges::equal(records_of(*one), records_of(*four)));
 }

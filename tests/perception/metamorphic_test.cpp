@@ -47,9 +47,7 @@ View moved(View view, const Similarity& by) {
 
 FoldTestOptions options_for(const View& view) { return {.gaze_px = glm::dvec2(1.3 * view.width, 0.5 * view.height)}; }
 DistanceCriterion criterion_of(const VertexTree& tree) {
-    auto criterion = error_distances(tree, View{}, options_for(View{}));
-    if (!criterion) throw std::runtime_error(criterion.error().message);
-    return std::move(*criterion);
+    return std::move(*require(error_distances(tree, View{}, options_for(View{}))));
 }
 
 // Each frame's decisions, one after the other.
@@ -58,8 +56,7 @@ std::vector<bool> decisions_at(const VertexTree& tree, const DistanceCriterion& 
     Cut cut(tree);
     std::vector<bool> all;
     for (const Viewpoint& viewpoint : viewpoints) {
-        const auto stats = cut.follow(criterion, viewpoint);
-        if (!stats) throw std::runtime_error(stats.error().message);
+        const auto stats = require(cut.follow(criterion, viewpoint));
         for (NodeId node = 0; node < tree.interior_count(); ++node) all.push_back(cut.is_unfolded(node));
     }
     return all;

@@ -72,9 +72,7 @@ TEST(TexturedLight, IsTheMeanOverTheTriangle) {
 }
 
 VertexTree measured(const Mesh& mesh, bool prelit = true) {
-    auto tree = measure_folds(support::built(mesh, {.prelit = prelit}), 2);
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(measure_folds(support::built(mesh, {.prelit = prelit}), 2)));
 }
 
 float largest_contrast(const VertexTree& tree) {
@@ -173,8 +171,7 @@ TEST(TexturedFolds, CountAsTheirVerticesTintThem) {
 TEST(TexturedFolds, DoNotDependOnTheThreads) {
     const VertexTree tree =
         support::built(textures::with_seams(textures::textured_sphere(4, textures::noise(64, 64, 2))));
-    const auto one = measure_folds(tree, 1), four = measure_folds(tree, 4);
-    ASSERT_TRUE(one && four);
+    const auto one = require(measure_folds(tree, 1)), four = require(measure_folds(tree, 4));
     EXPECT_TRUE(std::ranges::equal(one->attribute<FoldRecord>(record_name), four->attribute<FoldRecord>(record_name)));
     EXPECT_TRUE(
         std::ranges::equal(one->attribute<FoldTexture>(texture_name), four->attribute<FoldTexture>(texture_name)));

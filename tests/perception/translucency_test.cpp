@@ -35,9 +35,7 @@ VertexTree square(float alpha_on_the_right) {
             mesh.triangles.push_back({at(row, column), at(row + 1, column + 1), at(row + 1, column)});
         }
     }
-    auto tree = vdtree::build_tree(mesh.view(), {.prelit = true});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(vdtree::build_tree(mesh.view(), {.prelit = true})));
 }
 
 struct Halves {
@@ -80,8 +78,7 @@ Halves halves_of(const VertexTree& given, Form form) {
     FoldTestOptions options;
     options.scene = {0.1f, 0.9f};
     Cut cut(tree);
-    const auto criterion = criterion_of(tree, view, options, form);
-    if (!criterion) throw std::runtime_error(criterion.error().message);
+    const auto criterion = require(criterion_of(tree, view, options, form));
     EXPECT_TRUE(criterion->is_monotone());
     EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, options, {}, false)));
     return inner_triangles(cut);

@@ -152,14 +152,11 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatTheErrorTestFolds) {
 
 // How many pixels of a mesh the observer that the test goes by sees change, over all views.
 std::uint64_t seen_by_castle(const VertexTree& tree, const oracle::Looks& looks, std::uint64_t& triangles) {
-    auto context = render::Context::headless();
-    if (!context) throw std::runtime_error(context.error().message);
-    auto renderer = render::Renderer::create(*context, tree);
-    if (!renderer) throw std::runtime_error(renderer.error().message);
+    auto context = require(render::Context::headless());
+    auto renderer = require(render::Renderer::create(*context, tree));
     std::uint64_t visible = 0;
     for (const oracle::Look& look : oracle::looks_at(tree, looks)) {
-        const auto criterion = perception::error_distances(tree, look.view, look.options);
-        if (!criterion) throw std::runtime_error(criterion.error().message);
+        const auto criterion = require(perception::error_distances(tree, look.view, look.options));
         Cut whole(tree), cut(tree);
         whole.unfold_all();
         const auto viewpoint = perception::viewpoint_of(tree, look.view, look.options);
@@ -174,8 +171,7 @@ std::uint64_t seen_by_castle(const VertexTree& tree, const oracle::Looks& looks,
 }
 
 VertexTree measured_file(const std::filesystem::path& file) {
-    const auto read = meshio::read_mesh(file);
-    if (!read) throw std::runtime_error(read.error().message);
+    const auto read = require(meshio::read_mesh(file));
     return measured(read->mesh);
 }
 
@@ -261,8 +257,7 @@ TEST(FoldDistance, LeavesLittleOfAFarObject) {
         if (aside) options.gaze_px = glm::dvec2(1603, 512);
         const View from =
             vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, {0, 0, 1}, fill, view);
-        const auto criterion = perception::error_distances(tree, from, options);
-        if (!criterion) throw std::runtime_error(criterion.error().message);
+        const auto criterion = require(perception::error_distances(tree, from, options));
         Cut cut(tree);
         EXPECT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, from, options)));
         return cut.triangle_count();

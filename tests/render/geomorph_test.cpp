@@ -53,11 +53,7 @@ protected:
         return stats ? stats->folds + stats->unfolds : 0;
     }
 
-    Geomorph geomorph(double seconds) {
-        auto made = Geomorph::create(tree(), {.seconds = seconds});
-        if (!made) throw std::runtime_error(made.error().message);
-        return std::move(*made);
-    }
+    Geomorph geomorph(double seconds) { return std::move(*require(Geomorph::create(tree(), {.seconds = seconds}))); }
 
     template <class Drawn>
     Frame draw(Renderer& renderer, const Drawn& drawn, const View& view, int samples = 4) {

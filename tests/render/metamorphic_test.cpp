@@ -32,9 +32,8 @@ TEST_F(Metamorphic, PicturesOfPermutedMeshes) {
     const Mesh mesh = shapes::bumpy_sphere(4);
     const VertexTree tree = support::measured(support::built(mesh)),
                      other = support::measured(support::built(permuted(mesh)));
-    auto renderer = render::Renderer::create(context(), tree),
-         renderer_of_other = render::Renderer::create(context(), other);
-    ASSERT_TRUE(renderer && renderer_of_other);
+    auto renderer = require(render::Renderer::create(context(), tree)),
+         renderer_of_other = require(render::Renderer::create(context(), other));
     std::uint64_t folded = 0; // triangles
     for (const oracle::Look& look : oracle::looks_at(tree, {.count = 4})) {
         Cut whole(tree), whole_other(other);

@@ -58,8 +58,7 @@ inline perception::Image draw(render::Renderer& renderer, const vdtree::Cut& cut
     options.samples = samples;
     options.background = background;
     options.lighting = lighting;
-    const auto frame = renderer.draw(cut, view, options);
-    if (!frame) throw std::runtime_error(frame.error().message);
+    const auto frame = require(renderer.draw(cut, view, options));
     perception::Image image{frame->width, frame->height, 1, frame->luminance};
     for (float& value : image.values)
         value = static_cast<float>(perception::to_luminance({}, static_cast<double>(value)).value());

@@ -26,10 +26,8 @@ float at(const Frame& frame, int column, int row) {
 class Orthographic : public GlTest {
 protected:
     Frame draw(const Scene& scene, const View& view, const DrawOptions& options = {}) {
-        auto renderer = Renderer::create(context(), scene.tree);
-        if (!renderer) throw std::runtime_error(renderer.error().message);
-        auto frame = renderer->draw(scene.cut, view, options);
-        if (!frame) throw std::runtime_error(frame.error().message);
+        auto renderer = require(Renderer::create(context(), scene.tree));
+        auto frame = require(renderer->draw(scene.cut, view, options));
         EXPECT_EQ(context().take_errors(), "");
         return std::move(*frame);
     }
@@ -63,8 +61,7 @@ TEST_F(Orthographic, WhatIsNearerHidesWhatIsFarther) {
     const Scene far(rectangle({-1, -1}, {1, 1}, 0, grey(0.3f)));
     const Scene near(rectangle({0, -1000}, {1000, 1000}, 0, grey(0.6f)));
     const auto item = [&](const Scene& scene, Similarity placement) {
-        auto tree = GpuTree::create(context(), scene.tree);
-        if (!tree) throw std::runtime_error(tree.error().message);
+        auto tree = require(GpuTree::create(context(), scene.tree));
         GpuCut cut(*tree);
         EXPECT_TRUE(cut.follow(scene.cut));
         return Item{cut, placement};

@@ -27,15 +27,13 @@ double encoded(double linear) {
 class OverlayTest : public GlTest {
 protected:
     Target target(const TargetOptions& options = {}, glm::vec4 colour = below) {
-        auto made = Target::create(context(), width, height, options);
-        if (!made) throw std::runtime_error(made.error().message);
+        auto made = require(Target::create(context(), width, height, options));
         EXPECT_TRUE(draw({}, {.view = frontal_view(width, height)}, *made, {.colour = colour}));
         return std::move(*made);
     }
     Overlay overlay(int columns, int rows, const std::vector<glm::u8vec4>& pixels) {
         Overlay made(context());
-        const auto set = made.set_image({columns, rows, pixels});
-        if (!set) throw std::runtime_error(set.error().message);
+        const auto set = require(made.set_image({columns, rows, pixels}));
         return made;
     }
 };

@@ -40,8 +40,7 @@ View oblique_view() {
 class SceneTest : public GlTest {
 protected:
     GpuTree on_gpu(const Scene& scene) {
-        auto made = GpuTree::create(context(), scene.tree);
-        if (!made) throw std::runtime_error(made.error().message);
+        auto made = require(GpuTree::create(context(), scene.tree));
         return *made;
     }
     GpuCut cut_on_gpu(const Scene& scene) {
@@ -50,9 +49,7 @@ protected:
         return cut;
     }
     Target target(const TargetOptions& options = {}) {
-        auto made = Target::create(context(), window, window, options);
-        if (!made) throw std::runtime_error(made.error().message);
-        return std::move(*made);
+        return std::move(*require(Target::create(context(), window, window, options)));
     }
     std::vector<float> picture(const std::vector<Item>& items, const View& view) {
         Target to = target();

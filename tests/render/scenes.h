@@ -107,9 +107,7 @@ private:
         vdtree::BuildOptions options;
         options.clusterer = vdtree::ClustererKind::octree;
         options.prelit = true; // colours are what is drawn
-        auto built = vdtree::build_tree(mesh.view(), options);
-        if (!built) throw std::runtime_error("the test's mesh does not build: " + built.error().message);
-        return std::move(*built);
+        return std::move(*require(vdtree::build_tree(mesh.view(), options)));
     }
 };
 

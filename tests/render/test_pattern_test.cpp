@@ -172,9 +172,7 @@ TEST_F(TestPatternTest, RefusesWhatCannotBeDrawn) {
     EXPECT_FALSE(drawer().draw(TestPattern(), 0, 8));
     auto wrong = levels();
     wrong[7] = 0;
-    const auto made = TestPatternDrawer::create(context(), wrong);
-    ASSERT_FALSE(made);
-    EXPECT_THAT(made.error().message, HasSubstr("code 7"));
+    EXPECT_THAT(error_in(TestPatternDrawer::create(context(), wrong)), HasSubstr("code 7"));
 }
 
 } // namespace test_pattern_test

@@ -45,8 +45,7 @@ protected:
     }
     // The square 0..n seen straight from the front, filling the window.
     render::Frame draw(const VertexTree& tree, int n, int window, render::DrawOptions options = {}) const {
-        auto renderer = render::Renderer::create(*context_, tree);
-        if (!renderer) throw std::runtime_error(renderer.error().message);
+        auto renderer = require(render::Renderer::create(*context_, tree));
         Cut cut(tree);
         cut.unfold_all();
         View view;
@@ -54,9 +53,7 @@ protected:
         view.fov_y_degrees = 2 * std::atan(0.5 / 10) * 180 / 3.14159265358979;
         view.target = {n * 0.5, n * 0.5, 0};
         view.eye = view.target + glm::dvec3(0, 0, 10.0 * n);
-        auto frame = renderer->draw(cut, view, options);
-        if (!frame) throw std::runtime_error(frame.error().message);
-        return std::move(*frame);
+        return std::move(*require(renderer->draw(cut, view, options)));
     }
     static glm::dvec3 colour(const render::Frame& frame, int x, int y) {
         const std::size_t i = 3 * static_cast<std::size_t>(y * frame.width + x);

@@ -111,8 +111,7 @@ TEST(TextureDeviation, LetsEvenTexturesOnPlanesFold) {
         view = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, {0, 0, 1}, 0.9, view);
         perception::FoldTestOptions options;
         options.display = display;
-        const auto criterion = perception::luebke_hallen_safe_distances(tree, rings, view, options);
-        if (!criterion) throw std::runtime_error(criterion.error().message);
+        const auto criterion = require(perception::luebke_hallen_safe_distances(tree, rings, view, options));
         Cut cut(tree);
         EXPECT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, view, options)));
         return cut.triangle_count();

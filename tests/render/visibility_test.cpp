@@ -49,18 +49,15 @@ TEST_F(VisibilityTest, MakesOnlyWhatIsCalledFor) {
 }
 
 TEST_F(VisibilityTest, RefusesTablesForAnotherSize) {
-    const auto made = VisibilityPasses::create(context(), tables(5, 4), picture(context(), 4, 4, 10).texture());
-    ASSERT_FALSE(made);
-    EXPECT_THAT(made.error().message, HasSubstr("judge: the tables are for pictures of 5x4, not 4x4"));
+    EXPECT_THAT(error_in(VisibilityPasses::create(context(), tables(5, 4), picture(context(), 4, 4, 10).texture())),
+                HasSubstr("judge: the tables are for pictures of 5x4, not 4x4"));
 }
 
 TEST_F(VisibilityTest, RefusesTexturesThatAreNoPictures) {
     const auto reference = picture(context(), 4, 4, 10);
     auto passes = require(VisibilityPasses::create(context(), tables(4, 4), reference.texture()));
     const auto refused = [&](const LuminanceTexture& t, const char* why) {
-        const auto judged = passes->judge(t);
-        ASSERT_FALSE(judged) << why;
-        EXPECT_THAT(judged.error().message, HasSubstr(why));
+        EXPECT_THAT(error_in(passes->judge(t)), HasSubstr(why)) << why;
         EXPECT_FALSE(passes->summary()) << "of the picture before";
         EXPECT_FALSE(luminance_extent(context(), t, "test")) << why;
     };
@@ -111,16 +108,14 @@ TEST_F(VisibilityTest, FindsTheExtentOfAPicture) {
     EXPECT_EQ(extent->largest, 1e5f);
     values[201] = -1;
     ASSERT_TRUE(image->set(values));
-    const auto bad = luminance_extent(context(), image->texture(), "reference");
-    ASSERT_FALSE(bad);
-    EXPECT_THAT(bad.error().message, HasSubstr("luminance of the reference at pixel (1, 2)"));
+    EXPECT_THAT(error_in(luminance_extent(context(), image->texture(), "reference")),
+                HasSubstr("luminance of the reference at pixel (1, 2)"));
     EXPECT_FALSE(image->set(std::vector<float>(3, 1.f)));
 }
 
 TEST_F(VisibilityTest, RefusesPlanesThatCannotBeDrawnTo) {
-    const auto made = GpuPlanes::create({4, largest_target_side() + 1}, 1, PlaneFormat::full, "too high");
-    ASSERT_FALSE(made);
-    EXPECT_THAT(made.error().message, HasSubstr("memory does not suffice"));
+    EXPECT_THAT(error_in(GpuPlanes::create({4, largest_target_side() + 1}, 1, PlaneFormat::full, "too high")),
+                HasSubstr("memory does not suffice"));
     EXPECT_NE(context().take_errors(), ""); // GL says so, too
 }
 

@@ -66,4 +66,10 @@ Result require(Result result, std::source_location where = std::source_location:
     return result;
 }
 
+// The message of the error; nothing, which no test expects, where there is a result.
+template <class Result>
+std::string error_in(const Result& result) {
+    return result ? "" : result.error().message;
+}
+
 } // namespace unseen

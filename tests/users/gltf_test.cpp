@@ -202,8 +202,7 @@ TEST_P(GltfCards, AreDrawnAsTheirSamplersSay) {
     }
     write_text(path("card.glb"), file.glb());
     expect_as_known("card.glb");
-    for (const std::vector<std::string>& request :
-         {std::vector<std::string>{"--full"}, {"--triangles", card.is_beside_another ? "120" : "100"}}) {
+    for (const Words& request : {Words{"--full"}, {"--triangles", card.is_beside_another ? "120" : "100"}}) {
         const Simplified made = simplify("card.glb", "out/card.glb", request);
         EXPECT_LE(made.report["triangles"], made.report["source_triangles"]);
         expect_as_known("out/card.glb");

@@ -46,8 +46,8 @@ protected:
         }
     };
 
-    static std::vector<std::string> names(const ObjContents& contents) {
-        std::vector<std::string> out;
+    static Words names(const ObjContents& contents) {
+        Words out;
         for (const auto& [name, faces] : contents.faces) out.push_back(name);
         return out;
     }

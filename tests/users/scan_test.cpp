@@ -206,8 +206,8 @@ TEST_F(ScanUsers, VerticesThatAreNoNumbers) {
     }
     const auto grey = [](const std::array<double, 3>&) { return std::array{190, 190, 190}; };
     write_text(path("scan.ply"), ply(mesh, grey));
-    for (const std::vector<std::string>& words :
-         {std::vector<std::string>{"simplify", "scan.ply", "-o", "small.ply"}, {"build", "scan.ply", "-o", "scan.vdt"}})
+    for (const Words& words :
+         {Words{"simplify", "scan.ply", "-o", "small.ply"}, {"build", "scan.ply", "-o", "scan.vdt"}})
         EXPECT_THAT(refused(words), AllOf(HasSubstr("scan.ply"), HasSubstr("vertex 100 "),
                                           HasSubstr("the first of 2 such"), HasSubstr("--skip-bad")));
     EXPECT_FALSE(fs::exists(path("small.ply")));

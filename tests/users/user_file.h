@@ -18,14 +18,14 @@ protected:
     }
 
     // Where from, for all that is done with the model: half a window of the default display, 15 degrees high.
-    std::vector<std::string> view = {"--size", "512x512", "--eye", "0", "0.8", "10", "--target", "0", "0", "0"};
+    Words view = {"--size", "512x512", "--eye", "0", "0.8", "10", "--target", "0", "0", "0"};
 
-    std::string succeed(std::vector<std::string> words) const {
+    std::string succeed(Words words) const {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 0) << ::testing::PrintToString(words) << outcome.err;
         return outcome.out + outcome.err;
     }
-    std::string refused(const std::vector<std::string>& words) const {
+    std::string refused(const Words& words) const {
         const Outcome outcome = run(words);
         EXPECT_NE(outcome.status, 0) << ::testing::PrintToString(words) << outcome.out;
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
@@ -37,27 +37,25 @@ protected:
         Json report;
     };
     // With the default request, or another.
-    Simplified simplify(const std::string& file, const std::string& out, std::vector<std::string> more = {}) const {
-        std::vector<std::string> words = {"simplify", file, "-o", out, "--json", out + ".json"};
-        words.insert(words.end(), more.begin(), more.end());
+    Simplified simplify(const std::string& file, const std::string& out, Words more = {}) const {
+        Words words = joined({"simplify", file, "-o", out, "--json", out + ".json"}, more);
         words.insert(words.end(), view.begin(), view.end());
         const std::string said = succeed(words);
         return {said, Json::parse(read_text(path(out + ".json")), nullptr, false)};
     }
     ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b) const {
-        std::vector<std::string> words = view;
+        Words words = view;
         words.insert(words.end(), {"--samples", "16"});
         return CommandTest::look_the_same(a, b, words);
     }
 
     // Simplifies what nobody sees into small.ENDING and copies into whole.ENDING, below the folder out/: from where it
     // was asked for, nobody sees a difference to the file. (Of contrasty textures that may be nothing.)
-    void expect_invisible(const std::string& file, const std::string& ending,
-                          const std::vector<std::string>& more = {}) const {
+    void expect_invisible(const std::string& file, const std::string& ending, const Words& more = {}) const {
         for (const bool is_whole : {false, true}) {
             SCOPED_TRACE(is_whole ? "--full" : "the default request");
             const std::string out = (is_whole ? "out/whole." : "out/small.") + ending;
-            std::vector<std::string> words = more;
+            Words words = more;
             if (is_whole) words.push_back("--full");
             const Simplified made = simplify(file, out, words);
             ASSERT_TRUE(made.report.is_object());

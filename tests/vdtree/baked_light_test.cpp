@@ -28,8 +28,7 @@ Mesh painted(Mesh mesh, Grey&& grey) {
 }
 
 BakedLight found(const Mesh& mesh) {
-    const auto light = find_baked_light(built(mesh));
-    if (!light) throw std::runtime_error(light.error().message);
+    const auto light = require(find_baked_light(built(mesh)));
     return *light;
 }
 

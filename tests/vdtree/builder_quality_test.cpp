@@ -22,9 +22,7 @@ namespace {
 using support::distance_to_triangle;
 
 VertexTree built(const Mesh& mesh, ClustererKind kind) {
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind})));
 }
 
 // The cut with at most so many triangles whose largest displacement is the least; no viewer takes part.

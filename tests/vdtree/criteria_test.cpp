@@ -21,20 +21,16 @@ using shapes::random_unit;
 constexpr double cost_rounding = 1e-6;
 
 VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind})));
 }
 
 using MakeCriterion = Result<DistanceCriterion> (*)(const VertexTree&, const View&, double tolerance_pixels);
 
 std::vector<float> costs_of(MakeCriterion make, const VertexTree& tree, const View& view, double tolerance,
                             const Similarity& placement = {}) {
-    const auto criterion = make(tree, view, tolerance);
-    if (!criterion) throw std::runtime_error(criterion.error().message);
+    const auto criterion = require(make(tree, view, tolerance));
     EXPECT_TRUE(criterion->is_monotone());
-    const auto costs = find_every_cost(tree, *criterion, {.eye = eye_in_tree(tree, view, placement)});
-    if (!costs) throw std::runtime_error(costs.error().message);
+    const auto costs = require(find_every_cost(tree, *criterion, {.eye = eye_in_tree(tree, view, placement)}));
     return *costs;
 }
 

@@ -16,9 +16,7 @@ using support::fault_in_cut;
 
 VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
     // On one thread: a thread sanitizer that does not know how TBB synchronises is to see the cuts' threads only.
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .threads = 1})));
 }
 
 struct State {

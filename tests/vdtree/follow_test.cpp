@@ -28,9 +28,7 @@ int frame_count() {
 }
 
 VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .threads = 1})));
 }
 
 // Many quads, each on its own, turned anyhow.
@@ -104,9 +102,7 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
                 : row == rows - 1
                     ? DistanceCriterion::always_visible
                     : static_cast<float>(2.0 * static_cast<double>(row) * std::exp(-0.06 * static_cast<double>(bin))));
-    Result<DistanceCriterion> criterion = DistanceCriterion::create(tree, std::move(parts));
-    if (!criterion) throw std::runtime_error(criterion.error().message);
-    return std::move(*criterion);
+    return std::move(*require(DistanceCriterion::create(tree, std::move(parts))));
 }
 
 // Costs of a fold from the definition, in doubles: nothing for what is out of sight or faces away, else the distance
@@ -747,8 +743,7 @@ TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
 
 // The largest cost of a folded node under unfolded ones (or of the root).
 float largest_cost_of(const Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint) {
-    const auto costs = find_every_cost(cut.tree(), criterion, viewpoint);
-    if (!costs) throw std::runtime_error(costs.error().message);
+    const auto costs = require(find_every_cost(cut.tree(), criterion, viewpoint));
     float largest = 0;
     for (NodeId node = 0; node < cut.tree().interior_count();
          node = cut.is_unfolded(node) ? node + 1 : support::sound(cut.tree()).subtree_end()[node])
@@ -891,9 +886,8 @@ TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
     ASSERT_EQ(right.closedness(), Closedness::closed_outward);
     ASSERT_EQ(wrong.closedness(), Closedness::closed_inward);
     ASSERT_EQ(right.interior_count(), wrong.interior_count());
-    const auto for_right = DistanceCriterion::create(right, {.switch_distance = {1000}}),
-               for_wrong = DistanceCriterion::create(wrong, {.switch_distance = {1000}});
-    ASSERT_TRUE(for_right && for_wrong);
+    const auto for_right = require(DistanceCriterion::create(right, {.switch_distance = {1000}})),
+               for_wrong = require(DistanceCriterion::create(wrong, {.switch_distance = {1000}}));
     const FollowOptions culling{.cull_back_faces = true};
     Cut of_right(right), of_wrong(wrong), with_back(wrong);
     std::mt19937_64 random(41);

@@ -24,15 +24,11 @@ VertexTree built(Mesh mesh, ClustererKind kind) {
         const glm::dvec3 wave = 0.5 + 0.4 * glm::sin(7.0 * p);
         mesh.colours.push_back(glm::vec4(glm::vec3(wave), 1));
     }
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .threads = 1});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .threads = 1})));
 }
 
 Geomorph made(const VertexTree& tree, const GeomorphOptions& options) {
-    Result<Geomorph> geomorph = Geomorph::create(tree, options);
-    if (!geomorph) throw std::runtime_error(geomorph.error().message);
-    return std::move(*geomorph);
+    return std::move(*require(Geomorph::create(tree, options)));
 }
 
 struct TreeClass {

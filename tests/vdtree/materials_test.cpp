@@ -22,8 +22,7 @@ protected:
         return meshio::read_mesh(folder_ / "m.obj", options);
     }
     meshio::Material first(const std::string& mtl) const {
-        const auto result = read(mtl);
-        if (!result) throw std::runtime_error(result.error().message);
+        const auto result = require(read(mtl));
         return result->materials.at(0);
     }
     support::TempFolder folder_;

@@ -29,15 +29,12 @@ using Points = std::vector<glm::dvec3>;
 constexpr double pi = std::numbers::pi;
 
 std::vector<float> costs_from(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint) {
-    const auto costs = find_every_cost(tree, criterion, viewpoint);
-    if (!costs) throw std::runtime_error(costs.error().message);
+    const auto costs = require(find_every_cost(tree, criterion, viewpoint));
     return *costs;
 }
 
 DistanceCriterion extent(const VertexTree& tree, const View& view, double pixels = 1) {
-    auto criterion = extent_criterion(tree, view, pixels);
-    if (!criterion) throw std::runtime_error(criterion.error().message);
-    return std::move(*criterion);
+    return std::move(*require(extent_criterion(tree, view, pixels)));
 }
 
 // ---- geometry

@@ -29,15 +29,12 @@ bool is_in_full() {
 }
 
 DistanceCriterion extent(const VertexTree& tree, double pixels) {
-    auto criterion = extent_criterion(tree, View{}, pixels);
-    if (!criterion) throw std::runtime_error(criterion.error().message);
-    return std::move(*criterion);
+    return std::move(*require(extent_criterion(tree, View{}, pixels)));
 }
 
 AdjustStats followed(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                      const FollowOptions& options = {}) {
-    const auto stats = cut.follow(criterion, viewpoint, options);
-    if (!stats) throw std::runtime_error(stats.error().message);
+    const auto stats = require(cut.follow(criterion, viewpoint, options));
     return *stats;
 }
 

@@ -84,9 +84,8 @@ TEST(InnerSpheresOf, AFlatSolidAreNone) {
 
 // A criterion that unfolds all that is in sight.
 DistanceCriterion all_of(const VertexTree& tree) {
-    auto criterion = DistanceCriterion::create(tree, {.switch_distance = {DistanceCriterion::always_visible}});
-    if (!criterion) throw std::runtime_error(criterion.error().message);
-    return std::move(*criterion);
+    return std::move(
+        *require(DistanceCriterion::create(tree, {.switch_distance = {DistanceCriterion::always_visible}})));
 }
 
 TEST(Occluders, FoldOnlyWhatNoLineOfSightReaches) {

@@ -28,8 +28,7 @@ Result<meshio::SceneFile> open(const json& document, const std::string& name = "
 }
 
 meshio::SceneContents contents(const std::string& rest) {
-    auto file = open(document(rest));
-    if (!file) throw std::runtime_error(file.error().message);
+    auto file = require(open(document(rest)));
     return file->contents();
 }
 
@@ -219,9 +218,7 @@ TEST(SceneFile, NamesWhatIsWrong) {
     broken["meshes"][0]["name"] = "sail";
     broken["meshes"][0]["primitives"][0]["indices"] = 0;
     auto file = require(open(broken));
-    const auto read = file->mesh(0);
-    ASSERT_FALSE(read);
-    EXPECT_THAT(read.error().message, HasSubstr("mesh 0 'sail'"));
+    EXPECT_THAT(error_in(file->mesh(0)), HasSubstr("mesh 0 'sail'"));
 }
 
 TEST(SceneFile, MayHoldNothing) {

@@ -20,8 +20,7 @@ const std::array<std::string, 3> images = {"\x89PNG one", "\x89PNG two", "\xFF\x
 // The scene as it is read, with what materials laid over it would be.
 meshio::ReadResult read_scene(const support::TempFolder& folder, meshio::ReadOptions options = {}) {
     support::write_bytes(folder / "in.glb", GltfScene(6, 8).glb(images));
-    auto read = meshio::read_mesh(folder / "in.glb", options);
-    if (!read) throw std::runtime_error(read.error().message);
+    auto read = require(meshio::read_mesh(folder / "in.glb", options));
     SourceDocument& document = *read->document;
     document.vertex_parts.assign(read->mesh.positions.size(), 0);
     for (std::size_t t = 0; t < read->mesh.triangles.size(); ++t)
@@ -31,9 +30,7 @@ meshio::ReadResult read_scene(const support::TempFolder& folder, meshio::ReadOpt
 
 VertexTree tree_with(Mesh mesh, std::vector<std::byte> document) {
     mesh.document = std::move(document);
-    auto tree = build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view())));
 }
 
 Cut full_cut(const VertexTree& tree) {

@@ -46,9 +46,7 @@ const VertexArray& named(const std::vector<VertexArray>& arrays, const std::stri
 
 VertexTree tree_with(Mesh mesh, std::vector<VertexArray> arrays) {
     mesh.document = meshio::pack({.format = SourceDocument::Format::table, .arrays = std::move(arrays)});
-    auto tree = build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(mesh.view())));
 }
 
 Cut full_cut(const VertexTree& tree) {
@@ -261,9 +259,8 @@ TEST(VertexValues, OfDamagedBytesLeadNobodyAstray) {
     EXPECT_GT(written, 40);
     // Fewer values than the mesh has vertices.
     const VertexTree tree = tree_with(mesh, some_arrays(mesh.positions.size() - 1));
-    const auto out = meshio::write_cut(folder / "x.ply", full_cut(tree));
-    ASSERT_FALSE(out);
-    EXPECT_THAT(out.error().message, HasSubstr("not that of the tree's mesh"));
+    EXPECT_THAT(error_in(meshio::write_cut(folder / "x.ply", full_cut(tree))),
+                HasSubstr("not that of the tree's mesh"));
 }
 
 // ---- cuts
@@ -354,17 +351,11 @@ std::map<std::array<double, 3>, std::string> by_place(const meshio::ReadResult& 
     return found;
 }
 
-meshio::ReadResult read_file(const std::filesystem::path& file) {
-    auto read = meshio::read_mesh(file);
-    if (!read) throw std::runtime_error(read.error().message);
-    return std::move(*read);
-}
+meshio::ReadResult read_file(const std::filesystem::path& file) { return std::move(*require(meshio::read_mesh(file))); }
 
 VertexTree tree_of(meshio::ReadResult read) {
     read.mesh.document = meshio::pack(*read.document);
-    auto tree = build_tree(read.mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
+    return std::move(*require(build_tree(read.mesh.view())));
 }
 
 TEST(VertexValues, ComeOutOfAFullCutAsTheyWentIn) {
