@@ -7,14 +7,10 @@
 #include <bit>
 #include <cmath>
 #include <csetjmp>
-#include <cstdint>
 #include <cstring>
 #include <exception>
 #include <limits>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include <Iex.h>
@@ -90,45 +86,42 @@ Result<void> hand_over(const std::filesystem::path& file, const ImageFile& heade
 
 // libpng leaves by longjmp. So every object with a destructor lives out here, and `guarded` runs one step at a time,
 // whose own frame holds nothing to destroy.
-struct PngReader {
-    ByteView bytes;
-    std::size_t position = 0;
+struct PngCodec {
     png_structp png = nullptr;
     png_infop info = nullptr;
     std::string message;
+
+    PngCodec() = default;
+    PngCodec(const PngCodec&) = delete;
+    PngCodec& operator=(const PngCodec&) = delete;
+};
+
+struct PngReader : PngCodec {
+    ByteView bytes;
+    std::size_t position = 0;
     bool is_interlaced = false;
     std::size_t row_bytes = 0;
     png_bytep row = nullptr;
     png_bytepp rows = nullptr;
 
-    PngReader() = default;
-    PngReader(const PngReader&) = delete;
-    PngReader& operator=(const PngReader&) = delete;
     ~PngReader() {
         if (png != nullptr) png_destroy_read_struct(&png, &info, nullptr);
     }
 };
 
-struct PngWriter {
+struct PngWriter : PngCodec {
     Bytes bytes;
-    png_structp png = nullptr;
-    png_infop info = nullptr;
-    std::string message;
     png_uint_32 width = 0, height = 0;
     int colour_type = 0;
     png_bytepp rows = nullptr;
 
-    PngWriter() = default;
-    PngWriter(const PngWriter&) = delete;
-    PngWriter& operator=(const PngWriter&) = delete;
     ~PngWriter() {
         if (png != nullptr) png_destroy_write_struct(&png, &info);
     }
 };
 
-template <class Codec>
 [[noreturn]] void on_png_error(png_structp png, png_const_charp text) {
-    static_cast<Codec*>(png_get_error_ptr(png))->message = text;
+    static_cast<PngCodec*>(png_get_error_ptr(png))->message = text;
     png_longjmp(png, 1);
 }
 void on_png_warning(png_structp, png_const_charp) {}
@@ -202,7 +195,8 @@ Result<void> decode_png_rows(PngReader& reader, const std::filesystem::path& fil
 Result<ImageFile> read_png(const std::filesystem::path& file, ByteView bytes, const TakeRow& take) {
     PngReader reader;
     reader.bytes = bytes;
-    reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_png_error<PngReader>, on_png_warning);
+    reader.png =
+        png_create_read_struct(PNG_LIBPNG_VER_STRING, static_cast<PngCodec*>(&reader), on_png_error, on_png_warning);
     if (reader.png != nullptr) reader.info = png_create_info_struct(reader.png);
     if (reader.info == nullptr) return io_error(file, "libpng could not be started");
     const auto complain = [&](const std::string& what) {
@@ -254,14 +248,14 @@ void png_write_all(PngWriter& w) {
 Result<Bytes> encode_png(const std::filesystem::path& file, const Image& image) {
     Bytes codes;
     codes.reserve(image.values.size());
-    for (const float v : image.values) {
+    for (const float v : image.values)
         codes.push_back(static_cast<unsigned char>(std::lround(255 * std::clamp(v, 0.0F, 1.0F))));
-    }
     std::vector<png_bytep> rows;
     for (int y = 0; y < image.height; ++y) rows.push_back(codes.data() + image.index(0, y, 0));
 
     PngWriter writer;
-    writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer, on_png_error<PngWriter>, on_png_warning);
+    writer.png =
+        png_create_write_struct(PNG_LIBPNG_VER_STRING, static_cast<PngCodec*>(&writer), on_png_error, on_png_warning);
     if (writer.png != nullptr) writer.info = png_create_info_struct(writer.png);
     if (writer.info == nullptr) return io_error(file, "libpng could not be started");
     writer.width = static_cast<png_uint_32>(image.width);
@@ -312,18 +306,16 @@ Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, ByteView b
     };
     if (!parse(next_word(bytes, position), header.width)) return complain("width");
     if (!parse(next_word(bytes, position), header.height)) return complain("height");
-    if (!parse(next_word(bytes, position), header.scale) || !std::isfinite(header.scale) || header.scale == 0) {
+    if (!parse(next_word(bytes, position), header.scale) || !std::isfinite(header.scale) || header.scale == 0)
         return complain("scale (negative: little-endian, positive: big-endian)");
-    }
     if (const auto complaint = size_complaint(header.width, header.height, bytes.size()))
         return malformed(file, *complaint);
     header.data = position + 1;
     const std::uint64_t need = header.width * header.height * static_cast<std::uint64_t>(header.channels) * 4;
     const std::uint64_t have = bytes.size() > header.data ? bytes.size() - header.data : 0;
-    if (have != need) {
+    if (have != need)
         return malformed(file, "the PFM header asks for " + std::to_string(need) + " bytes of pixels, the file holds " +
                                    std::to_string(have));
-    }
     return header;
 }
 
@@ -372,9 +364,8 @@ class MemoryInput : public Imf::IStream {
 public:
     explicit MemoryInput(ByteView bytes) : Imf::IStream("image"), bytes_(bytes) {}
     bool read(char to[], int count) override {
-        if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() - position_) {
+        if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() - position_)
             throw Iex::InputExc("the file ends too early");
-        }
         std::memcpy(to, bytes_.data() + position_, static_cast<std::size_t>(count));
         position_ += static_cast<std::uint64_t>(count);
         return position_ < bytes_.size();
@@ -459,42 +450,31 @@ private:
     // OpenEXR reads what a known type needs, whatever length the file gives; where the two differ it would go on in the
     // middle of an attribute and see another header than this walk.
     bool has_its_length(std::string_view type, std::size_t position, std::size_t size) const {
-        static constexpr std::pair<std::string_view, std::size_t> lengths[] = {{"box2f", 16},
-                                                                               {"box2i", 16},
-                                                                               {"chromaticities", 32},
-                                                                               {"compression", 1},
-                                                                               {"deepImageState", 1},
-                                                                               {"double", 8},
-                                                                               {"envmap", 1},
-                                                                               {"float", 4},
-                                                                               {"int", 4},
-                                                                               {"keycode", 28},
-                                                                               {"lineOrder", 1},
-                                                                               {"m33f", 36},
-                                                                               {"m33d", 72},
-                                                                               {"m44f", 64},
-                                                                               {"m44d", 128},
-                                                                               {"rational", 8},
-                                                                               {"tiledesc", 9},
-                                                                               {"timecode", 8},
-                                                                               {"v2f", 8},
-                                                                               {"v2i", 8},
-                                                                               {"v2d", 16},
-                                                                               {"v3f", 12},
-                                                                               {"v3i", 12},
-                                                                               {"v3d", 24}};
-        for (const auto& [known, length] : lengths) {
-            if (type == known) return size == length;
-        }
+        static constexpr std::pair<std::size_t, std::string_view> types_of_length[] = {
+            {1, " compression deepImageState envmap lineOrder "},
+            {4, " float int "},
+            {8, " double rational timecode v2f v2i "},
+            {9, " tiledesc "},
+            {12, " v3f v3i "},
+            {16, " box2f box2i v2d "},
+            {24, " v3d "},
+            {28, " keycode "},
+            {32, " chromaticities "},
+            {36, " m33f "},
+            {64, " m44f "},
+            {72, " m33d "},
+            {128, " m44d "}};
+        const std::string word_of_type = " " + std::string(type) + " ";
+        for (const auto& [length, types] : types_of_length)
+            if (types.find(word_of_type) != types.npos) return size == length;
         if (type == "floatvector") return size % 4 == 0;
         if (type != "preview") return true;
         return size >= 8 && std::uint64_t{4} * word(position) * word(position + 4) == size - 8;
     }
 
     Result<void> attribute(std::string_view name, std::string_view type, std::size_t position, std::size_t size) {
-        if (!has_its_length(type, position, size)) {
+        if (!has_its_length(type, position, size))
             return malformed(file_, "the EXR attribute at byte " + std::to_string(position) + " has a wrong length");
-        }
         if (name == "dataWindow" && type == "box2i") {
             std::array<std::int64_t, 4> box{};
             for (std::size_t i = 0; i < 4; ++i) box[i] = std::bit_cast<std::int32_t>(word(position + 4 * i));
@@ -535,14 +515,12 @@ private:
         }
         const std::uint64_t lines = lines_per_chunk();
         const std::uint64_t chunks = (height_ + lines - 1) / lines;
-        if (chunks * 8 > rest) {
+        if (chunks * 8 > rest)
             return malformed(file_, "the EXR header promises " + std::to_string(chunks) + " chunks, but only " +
                                         std::to_string(rest) + " bytes follow it");
-        }
-        if (lines * width_ * channels_ * 4 > std::max(small_buffer, bytes_.size() * largest_expansion)) {
+        if (lines * width_ * channels_ * 4 > std::max(small_buffer, bytes_.size() * largest_expansion))
             return malformed(file_, "a chunk of the EXR file would be out of proportion to its " +
                                         std::to_string(bytes_.size()) + " bytes");
-        }
         return {};
     }
 
@@ -576,9 +554,8 @@ Result<std::vector<std::string>> choose_channels(const std::filesystem::path& fi
     else return unsupported(file, "has neither a channel Y, nor R, G and B, nor a single channel");
     for (const std::string& name : chosen) {
         const Imf::Channel& channel = list[name.c_str()];
-        if (channel.type == Imf::UINT || channel.xSampling != 1 || channel.ySampling != 1) {
+        if (channel.type == Imf::UINT || channel.xSampling != 1 || channel.ySampling != 1)
             return unsupported(file, "channel " + name + " is not float or half at full resolution");
-        }
     }
     return chosen;
 }
@@ -594,11 +571,10 @@ Result<void> read_exr_pixels(Imf::InputFile& input, const std::vector<std::strin
         const int rows = std::min(strip_rows, header.image.height - row);
         const int top = window.min.y + row;
         Imf::FrameBuffer frame;
-        for (std::size_t c = 0; c < channels.size(); ++c) {
+        for (std::size_t c = 0; c < channels.size(); ++c)
             frame.insert(channels[c],
                          Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top),
                                           header.image.width, rows, pixel_bytes, row_values * sizeof(float)));
-        }
         input.setFrameBuffer(frame);
         input.readPixels(top, top + rows - 1);
         for (int i = 0; i < rows; ++i) {
@@ -742,18 +718,16 @@ Result<void> write_image(const std::filesystem::path& file, const Image& image) 
     const auto complain = [&](const std::string& what) {
         return Error{ErrorCode::invalid_argument, file.string() + ": " + what};
     };
-    if (image.channels != 1 && image.channels != 3) {
+    if (image.channels != 1 && image.channels != 3)
         return complain("an image to write has 1 or 3 channels, not " + std::to_string(image.channels));
-    }
     if (image.width <= 0 || image.height <= 0 || image.width > static_cast<int>(largest_side) ||
         image.height > static_cast<int>(largest_side)) {
         return complain("an image to write has 1 to 32768 pixels a side, not " + std::to_string(image.width) + " x " +
                         std::to_string(image.height));
     }
-    if (image.values.size() != image.index(0, image.height, 0)) {
+    if (image.values.size() != image.index(0, image.height, 0))
         return complain("the image says " + std::to_string(image.index(0, image.height, 0)) + " values but holds " +
                         std::to_string(image.values.size()));
-    }
     for (std::size_t i = 0; i < image.values.size(); ++i) {
         if (!std::isfinite(image.values[i])) return complain("value " + std::to_string(i) + " is not a finite number");
     }

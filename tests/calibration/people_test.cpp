@@ -2,9 +2,9 @@
 #include <unseen/calibration/internal/people.h>
 
 #include <unseen/perception/csf.h>
-#include <unseen/perception/internal/change.h>
 #include <unseen/perception/judge.h>
 
+#include "change/flicker.h"
 #include "judge/band_weights.h"
 #include "testing.h"
 
@@ -180,7 +180,6 @@ TEST(People, AtTheirThresholdsAreNearTheSecondJudge) {
 
 // A Gabor patch that flickers, by elaTCSF's law of pooling. Gratings' bright and dark bars both count.
 double flicker_sensitivity_to(const Stimulus& s) {
-    constexpr double pooling = 3.80022, pooled_deg2 = 6.52801;
     constexpr int rings = 60, turns = 16;
     const double sigma = std::sqrt(s.area.value() / std::numbers::pi), radius = std::min(3 * sigma, 60.0);
     double sum = 0;
@@ -192,16 +191,19 @@ double flicker_sensitivity_to(const Stimulus& s) {
             const double degrees = std::min(std::hypot(s.eccentricity.value() + x, y), 90.0);
             const double contrast = std::exp(-ring * ring / (2 * sigma * sigma)) *
                                     std::abs(std::cos(2 * std::numbers::pi * s.frequency.value() * x));
-            sum += std::pow(contrast *
-                                perception::flicker_sensitivity(s.temporal, perception::Degrees(degrees), s.luminance),
-                            pooling) *
-                   ring * (radius / rings) * (2 * std::numbers::pi / turns);
+            sum +=
+                std::pow(contrast * perception::flicker_sensitivity(s.temporal.value(), degrees, s.luminance.value()),
+                         perception::flicker_pooling) *
+                ring * (radius / rings) * (2 * std::numbers::pi / turns);
         }
     }
-    return std::pow(sum / pooled_deg2, 1 / pooling) * perception::flicker_share(s.frequency);
+    double share = 0;
+    for (const perception::FlickerBlur& blur : perception::flicker_blurs)
+        share += blur.weight * std::exp(-std::pow(s.frequency.value() / blur.cpd, 2));
+    return std::pow(sum / perception::flicker_pooling_deg2, 1 / perception::flicker_pooling) * share;
 }
 
-// What the judge of changes rests on (<unseen/perception/internal/change.h>): coarse gratings are seen much better while they flicker,
+// What the judge of changes rests on (change/flicker.h): coarse gratings are seen much better while they flicker,
 // and the judge sees that, with a margin of 4 dB. As medians over people, in decibels.
 TEST(People, SeeCoarseFlickerBetterThanWhatStandsStill) {
     std::vector<MeasuredSensitivity> flickering = *read_sensitivities("data/people/achromatic_thresholds.csv");

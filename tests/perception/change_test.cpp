@@ -3,10 +3,10 @@
 
 #include "testing.h"
 
+#include "change/flicker.h"
+
 namespace unseen::perception::change_test {
 namespace {
-
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 double decibels(double ratio) { return 20 * std::log10(ratio); }
 
@@ -26,29 +26,33 @@ constexpr Disc published[] = {
 // Relative; the published program integrates in another way.
 constexpr double published_tolerance = 2e-4;
 
-TEST(Flicker, IsThatOfThePublishedProgram) {
-    for (const Disc& d : published)
-        EXPECT_NEAR(
-            disc_flicker_sensitivity(Hertz(d.hz), Degrees(d.degrees), Luminance(d.cdm2), Degrees(d.radius_deg)) /
-                d.sensitivity,
-            1, published_tolerance)
-            << d.degrees << " deg, " << d.cdm2 << " cd/m2, radius " << d.radius_deg << ", " << d.hz << " Hz";
+// To a uniform disc about that eccentricity: in rings about the disc's centre, by the rule of midpoints; within 1e-4.
+double disc_sensitivity(double hz, double degrees, double cdm2, double radius_deg) {
+    constexpr int rings = 128, half_turns = 32;
+    double sum = 0;
+    for (int i = 0; i < rings; ++i) {
+        const double ring = (i + 0.5) / rings * radius_deg;
+        double mean = 0;
+        for (int j = 0; j < half_turns; ++j) {
+            const double turn = std::numbers::pi * (j + 0.5) / half_turns;
+            const double here = std::hypot(degrees + ring * std::cos(turn), ring * std::sin(turn));
+            mean += std::pow(flicker_sensitivity(hz, here, cdm2), flicker_pooling) / half_turns;
+        }
+        sum += mean * 2 * std::numbers::pi * ring * radius_deg / rings;
+    }
+    return std::pow(sum / flicker_pooling_deg2, 1 / flicker_pooling);
 }
 
-TEST(Flicker, IsNaNOutsideOfItsDomain) {
-    const auto at = [](double hz, double degrees, double cdm2) {
-        return flicker_sensitivity(Hertz(hz), Degrees(degrees), Luminance(cdm2));
-    };
-    EXPECT_GT(at(8, 10, 50), 0);
-    EXPECT_EQ(at(8, 10, 1e-5), at(8, 10, 0.1));
-    for (const double bad : {-1.0, not_a_number}) {
-        EXPECT_TRUE(std::isnan(at(bad, 10, 50)));
-        EXPECT_TRUE(std::isnan(at(8, bad, 50)));
-        EXPECT_TRUE(std::isnan(at(8, 10, bad)));
-        EXPECT_TRUE(std::isnan(disc_flicker_sensitivity(Hertz(8), Degrees(0), Luminance(50), Degrees(bad))));
-        EXPECT_TRUE(std::isnan(ramp_response(bad, Degrees(0), Luminance(50))));
-        EXPECT_TRUE(std::isnan(flicker_share(CyclesPerDegree(bad))));
-    }
+double share_of(double cpd) {
+    double share = 0;
+    for (const FlickerBlur& blur : flicker_blurs) share += blur.weight * std::exp(-cpd * cpd / (blur.cpd * blur.cpd));
+    return share;
+}
+
+TEST(Flicker, IsThatOfThePublishedProgram) {
+    for (const Disc& d : published)
+        EXPECT_NEAR(disc_sensitivity(d.hz, d.degrees, d.cdm2, d.radius_deg) / d.sensitivity, 1, published_tolerance)
+            << d.degrees << " deg, " << d.cdm2 << " cd/m2, radius " << d.radius_deg << ", " << d.hz << " Hz";
 }
 
 TEST(Flicker, OfCoarseThingsIsThatOfCastlesTransientChannel) {
@@ -58,27 +62,8 @@ TEST(Flicker, OfCoarseThingsIsThatOfCastlesTransientChannel) {
     };
     const double peak_cpd = 0.42966;
     for (double cpd = 1.0 / 16; cpd < 64; cpd *= 1.1)
-        EXPECT_NEAR(flicker_share(CyclesPerDegree(cpd)), cpd < peak_cpd ? 1 : transient(cpd) / transient(peak_cpd),
-                    0.02)
-            << cpd;
-    EXPECT_NEAR(flicker_share(CyclesPerDegree(0)), 1, 1e-9);
-}
-
-TEST(Flicker, SlowChangesMakeASmallerResponse) {
-    const auto at = [](double seconds, double degrees = 0) {
-        return ramp_response(seconds, Degrees(degrees), Luminance(50));
-    };
-    EXPECT_NEAR(at(0), 0.753, 0.002);
-    EXPECT_NEAR(at(0, 40), 0.753, 0.002) << "of a step, whatever the speed";
-    double last = at(0);
-    for (double s = 0.01; s < 30; s *= 1.3) {
-        EXPECT_LE(at(s), last * (1 + 1e-9));
-        EXPECT_LE(at(s, 40), at(s) * (1 + 1e-9)) << "aside, time runs faster";
-        last = at(s);
-    }
-    EXPECT_NEAR(at(1e4), 0.231, 0.002);
-    // The usual glide takes away half of it.
-    EXPECT_NEAR(at(0.25) / at(0), 0.46, 0.03);
+        EXPECT_NEAR(share_of(cpd), cpd < peak_cpd ? 1 : transient(cpd) / transient(peak_cpd), 0.02) << cpd;
+    EXPECT_NEAR(share_of(0), 1, 1e-9);
 }
 
 // ---- pictures -----------------------------------------------------------------------------------------------------
@@ -116,8 +101,11 @@ Image blob(int side, double ppd, double sigma_deg, double contrast) {
     });
 }
 
-ChangeJudgement judged(const Image& before, const Image& after, double seconds, double ppd, double gain = 1) {
-    const auto judgement = judge_change(before, after, seconds, {.display = display_of(ppd), .gain = gain});
+Result<ChangeJudgement> judge_pop(const Image& before, const Image& after, const JudgeOptions& options) {
+    return ChangeWatch(options).next(before, after, 0);
+}
+ChangeJudgement judged(const Image& before, const Image& after, double ppd) {
+    const auto judgement = judge_pop(before, after, {.display = display_of(ppd), .gain = 1});
     EXPECT_TRUE(judgement) << judgement.error().message;
     return *judgement;
 }
@@ -127,22 +115,20 @@ TEST(ChangeJudge, ADiscThatPopsIsSeenByTheLawOfFlicker) {
     constexpr int side = 256;
     constexpr double ppd = 16, radius_deg = 2;
     double best = 0;
-    for (double hz = 1; hz < 40; hz += 0.1)
-        best =
-            std::max(best, disc_flicker_sensitivity(Hertz(hz), Degrees(0), Luminance(grey_cdm2), Degrees(radius_deg)));
+    for (double hz = 1; hz < 40; hz += 0.1) best = std::max(best, disc_sensitivity(hz, 0, grey_cdm2, radius_deg));
     constexpr double contrast = 0.01;
     const Image disc = picture(side, [](double x, double y) {
         return grey_cdm2 * (1 + (std::hypot(x, y) < radius_deg * ppd ? contrast : 0));
     });
     // In the middle of the window, without a gaze, everything is looked at: give one.
     JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5), .gain = 1};
-    const auto popped = require(judge_change(grey(side), disc, 0, options));
+    const auto popped = require(judge_pop(grey(side), disc, options));
     EXPECT_NEAR(decibels(popped->flicker / (contrast * 0.753 * best)), 0, 1);
     EXPECT_GT(popped->visibility, popped->flicker);
     EXPECT_GT(popped->visibility, popped->lasting);
     // Twice the contrast or twice the eye: twice the flicker.
     options.gain = 2;
-    const auto sharper = judge_change(grey(side), disc, 0, options);
+    const auto sharper = judge_pop(grey(side), disc, options);
     EXPECT_NEAR(sharper->flicker / popped->flicker, 2, 1e-3);
 }
 
@@ -155,32 +141,24 @@ TEST(ChangeJudge, CoarseFlickerIsSeenBetterThanWhatStandsStill) {
         // Of a patch of 20 square degrees, a disc of which half the contrast's powers are left.
         double flicker = 0;
         for (const double hz : {4.0, 6.0, 8.0, 10.0})
-            flicker = std::max(flicker, disc_flicker_sensitivity(Hertz(hz), Degrees(0), Luminance(grey_cdm2),
-                                                                 Degrees(std::sqrt(20 / std::numbers::pi))));
-        EXPECT_GT(decibels(flicker * flicker_share(CyclesPerDegree(cpd)) / still), 8) << cpd;
+            flicker = std::max(flicker, disc_sensitivity(hz, 0, grey_cdm2, std::sqrt(20 / std::numbers::pi)));
+        EXPECT_GT(decibels(flicker * share_of(cpd) / still), 8) << cpd;
     }
 }
 
 TEST(ChangeJudge, AWidePopIsSeenAlthoughNothingLastsOfIt) {
     constexpr int side = 256;
     constexpr double ppd = 8; // 32 degrees
-    const ChangeJudgement pop = judged(grey(side), blob(side, ppd, 4, 0.005), 0, ppd);
+    const ChangeJudgement pop = judged(grey(side), blob(side, ppd, 4, 0.005), ppd);
     EXPECT_GT(pop.flicker, 1);
     EXPECT_LT(pop.lasting, 1);
     EXPECT_FALSE(pop.visibility < 1);
-    // Glides help, long ones more.
-    const ChangeJudgement glide = judged(grey(side), blob(side, ppd, 4, 0.005), 0.25, ppd),
-                          slow = judged(grey(side), blob(side, ppd, 4, 0.005), 2, ppd);
-    EXPECT_NEAR(glide.flicker / pop.flicker, 0.46, 0.03);
-    EXPECT_NEAR(glide.lasting, pop.lasting, 1e-6);
-    EXPECT_LT(slow.flicker, 0.3 * glide.flicker) << "only what is remembered of it counts";
-    EXPECT_NEAR(slow.lasting / pop.lasting, remembered_s / 2, 1e-3);
 }
 
 TEST(ChangeJudge, OfFineChangesOnlyTheLastingPartIsSeen) {
     constexpr int side = 128;
     constexpr double ppd = 32;
-    const ChangeJudgement fine = judged(grey(side), gabor(side, ppd, 10, 0.15, 0.05), 0, ppd);
+    const ChangeJudgement fine = judged(grey(side), gabor(side, ppd, 10, 0.15, 0.05), ppd);
     EXPECT_GT(fine.lasting, 0.5);
     EXPECT_LT(fine.flicker, 0.5 * fine.lasting);
     EXPECT_LT(fine.visibility, 1.05 * fine.lasting);
@@ -189,7 +167,7 @@ TEST(ChangeJudge, OfFineChangesOnlyTheLastingPartIsSeen) {
 }
 
 TEST(ChangeJudge, NothingIsSeenOfNoChange) {
-    const ChangeJudgement none = judged(grey(64), grey(64), 0, 30);
+    const ChangeJudgement none = judged(grey(64), grey(64), 30);
     EXPECT_EQ(none.visibility, 0);
 }
 
@@ -197,43 +175,39 @@ TEST(ChangeJudge, AViewersTableCountsForFlickerToo) {
     constexpr double ppd = 8;
     JudgeOptions options{.display = display_of(ppd), .gain = 1};
     const Image before = grey(128), after = blob(128, ppd, 2, 0.01);
-    const double plain = judge_change(before, after, 0, options)->flicker;
+    const double plain = judge_pop(before, after, options)->flicker;
     options.csf_table = std::make_shared<const CsfTable>(*CsfTable::standard().scaled(3));
-    EXPECT_NEAR(judge_change(before, after, 0, options)->flicker / plain, 3, 1e-4);
+    EXPECT_NEAR(judge_pop(before, after, options)->flicker / plain, 3, 1e-4);
 }
 
-// A glide in frames is the same as a ramp, and a pop the same in a sequence as alone.
+// What lasts of a glide is what lasts of a pop, and less of it flickers: half, in a quarter of a second.
 TEST(ChangeWatch, FramesOfAGlideAddUp) {
-    constexpr int side = 128;
+    constexpr int side = 128, frames = 15;
     constexpr double ppd = 8, frame_s = 1.0 / 60;
-    const JudgeOptions options{.display = display_of(ppd), .gain = 1};
-    for (const int frames : {1, 15}) {
-        ChangeWatch watch(options);
-        double flicker = 0, lasting = 0;
-        for (int i = 1; i <= frames; ++i) {
-            const auto step =
-                watch.next(blob(side, ppd, 2, 0.02 * (i - 1) / frames), blob(side, ppd, 2, 0.02 * i / frames), frame_s);
-            ASSERT_TRUE(step) << step.error().message;
-            flicker = std::max(flicker, step->flicker);
-            lasting = std::max(lasting, step->lasting);
-        }
-        const ChangeJudgement ramp =
-            judged(grey(side), blob(side, ppd, 2, 0.02), frames == 1 ? 0 : frames * frame_s, ppd);
-        EXPECT_NEAR(flicker / ramp.flicker, 1, 0.1) << frames;
-        EXPECT_NEAR(lasting / ramp.lasting, 1, 0.03) << frames;
-        // What was long ago is forgotten.
-        watch.pass(remembered_s);
-        const auto later = require(watch.next(grey(side), blob(side, ppd, 2, 0.001), 0));
-        EXPECT_NEAR(later->flicker / judged(grey(side), blob(side, ppd, 2, 0.001), 0, ppd).flicker, 1, 1e-3);
-        EXPECT_EQ(watch.next(grey(side), grey(side), frame_s)->visibility, 0);
+    ChangeWatch watch({.display = display_of(ppd), .gain = 1});
+    double flicker = 0, lasting = 0;
+    for (int i = 1; i <= frames; ++i) {
+        const auto step =
+            watch.next(blob(side, ppd, 2, 0.02 * (i - 1) / frames), blob(side, ppd, 2, 0.02 * i / frames), frame_s);
+        ASSERT_TRUE(step) << step.error().message;
+        flicker = std::max(flicker, step->flicker);
+        lasting = std::max(lasting, step->lasting);
     }
+    const ChangeJudgement pop = judged(grey(side), blob(side, ppd, 2, 0.02), ppd);
+    EXPECT_NEAR(flicker / pop.flicker, 0.46, 0.05);
+    EXPECT_NEAR(lasting / pop.lasting, 1, 0.03);
+    // What was long ago is forgotten.
+    watch.pass(remembered_s);
+    const auto later = require(watch.next(grey(side), blob(side, ppd, 2, 0.001), 0));
+    EXPECT_NEAR(later->flicker / judged(grey(side), blob(side, ppd, 2, 0.001), ppd).flicker, 1, 1e-3);
+    EXPECT_EQ(watch.next(grey(side), grey(side), frame_s)->visibility, 0);
 }
 
 TEST(ChangeWatch, AnotherWindowBeginsAnew) {
     ChangeWatch watch({.display = display_of(8), .gain = 1});
     ASSERT_TRUE(watch.next(grey(64), blob(64, 8, 1, 0.02), 0));
     const auto other = require(watch.next(grey(80), blob(80, 8, 1, 0.02), 0));
-    EXPECT_NEAR(other->flicker, judged(grey(80), blob(80, 8, 1, 0.02), 0, 8).flicker, 1e-4);
+    EXPECT_NEAR(other->flicker, judged(grey(80), blob(80, 8, 1, 0.02), 8).flicker, 1e-4);
 }
 
 TEST(ChangeJudge, RefusesWhatIsNoChange) {
@@ -241,13 +215,11 @@ TEST(ChangeJudge, RefusesWhatIsNoChange) {
     const JudgeOptions options{.display = display_of(30)};
     Image dark = here;
     dark.values[3] = -1;
-    EXPECT_THAT(judge_change(here, dark, 0, options).error().message, HasSubstr("pixel (3, 0)"));
-    EXPECT_THAT(judge_change(here, grey(17), 0, options).error().message, HasSubstr("differ in size"));
-    for (const double bad : {-1.0, not_a_number, std::numeric_limits<double>::infinity()}) {
-        EXPECT_THAT(judge_change(here, here, bad, options).error().message, HasSubstr("time"));
-        EXPECT_FALSE(ChangeWatch(options).next(here, here, bad));
-    }
-    EXPECT_THAT(judge_change(here, dark, 0, {.display = display_of(30), .beta = 0}).error().message, HasSubstr("beta"));
+    EXPECT_THAT(judge_pop(here, dark, options).error().message, HasSubstr("pixel (3, 0)"));
+    EXPECT_THAT(judge_pop(here, grey(17), options).error().message, HasSubstr("differ in size"));
+    for (const double bad : {-1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()})
+        EXPECT_THAT(ChangeWatch(options).next(here, here, bad).error().message, HasSubstr("time"));
+    EXPECT_THAT(judge_pop(here, dark, {.display = display_of(30), .beta = 0}).error().message, HasSubstr("beta"));
 }
 
 } // namespace

@@ -18,6 +18,13 @@ using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::VertexTree;
 
+// error_distances() of a tree whose errors these are.
+Result<vdtree::DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
+                                               const vdtree::View& view, const FoldTestOptions& options) {
+    const LitErrors own{&tree, errors};
+    return vdtree::DistanceCriterion::create(tree, criterion_parts({&own, 1}, {}, view, options, {}));
+}
+
 // A noisy height field of n x n quads, each vertex of a grey of its own.
 Mesh noisy_height_field(int n, std::mt19937_64& random) {
     Mesh mesh = shapes::grid(n);
@@ -81,7 +88,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     view.eye = {0.5, 0.5, 3};
     view.fov_y_degrees = physical_field(options.display, view.height).value();
     options.gaze_px = glm::dvec2(100, 100);
-    const auto all = require(criterion_of(sound, {errors, {}}, view, options));
+    const auto all = require(criterion_of(sound, errors, view, options));
     EXPECT_TRUE(all->is_monotone());
     const vdtree::DistanceCriterion::Parts& parts = all->parts();
     const std::size_t bins = parts.eccentricity_bins;
@@ -91,7 +98,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
         std::vector<FoldError> of_height(errors.size());
         for (NodeId node = 0; node < errors.size(); ++node)
             if (heights[node] == height) of_height[node] = errors[node];
-        const auto exact = require(criterion_of(sound, {std::move(of_height), {}}, view, options));
+        const auto exact = require(criterion_of(sound, of_height, view, options));
         const vdtree::DistanceCriterion::Parts& own = exact->parts();
         ASSERT_LT(own.switch_distance.size(), most_rows * bins);
         exact_rows += own.switch_distance.size() / bins;
@@ -148,7 +155,7 @@ TEST(ErrorDistances, CountAreasOfManyDegreesAside) {
         options.scene = {behind, 0.9f};
         std::vector<FoldError> errors(tree.interior_count());
         for (FoldError& e : errors) e.bias = bias;
-        const auto criterion = criterion_of(sound, {errors, {}}, view, options);
+        const auto criterion = criterion_of(sound, errors, view, options);
         EXPECT_TRUE(criterion);
         const vdtree::DistanceCriterion::Parts& parts = criterion->parts();
         const auto bin = static_cast<std::size_t>(50 / parts.bin_degrees);

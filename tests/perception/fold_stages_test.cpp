@@ -2,8 +2,6 @@
 // against surfaces that show nothing, and against the background alone.
 #include "measure/fold_stages.h"
 
-#include "measure/lit_stages.h"
-
 #include <unseen/vdtree/tree_io.h>
 
 #include "fold/fold_errors.h"

@@ -4,7 +4,6 @@
 #include <ctime>
 
 #include "fold/fold_errors.h"
-#include "measure/border_shifts.h"
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"

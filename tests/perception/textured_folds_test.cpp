@@ -9,7 +9,6 @@
 #include "built.h"
 #include "measure/fold_record.h"
 #include "measure/texture_detail.h"
-#include "measure/textured_light.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "testing.h"

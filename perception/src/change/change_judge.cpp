@@ -1,11 +1,6 @@
 // The judge of changes: what lasts by the Judge, and the flicker of the moment by elaTCSF over the whole field.
 #include <unseen/perception/internal/change.h>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <span>
-
 #include "change/flicker.h"
 #include "judge/band_weights.h"
 #include "judge/judge_input.h"
@@ -14,12 +9,6 @@ namespace unseen::perception {
 namespace {
 
 using Values = std::vector<float>;
-
-int mirrored(int i, int n) {
-    if (i < 0) i = -i;
-    if (i >= n) i = 2 * (n - 1) - i;
-    return std::clamp(i, 0, n - 1);
-}
 
 // Both axes by a symmetric kernel, from the middle on; what lies outside of the picture mirrors it.
 Values blurred(const Values& in, int width, int height, std::span<const float> kernel) {
@@ -63,7 +52,7 @@ std::vector<float> gaussian(double sigma_px) {
     return kernel;
 }
 
-// What the flicker of the moment has of a difference: flicker_share() of each frequency.
+// What the flicker of the moment has of a difference: see flicker_blurs.
 Values coarse_part(const Values& difference, int width, int height, double ppd) {
     Values sum(difference.size());
     for (const FlickerBlur& blur : flicker_blurs) {
@@ -84,54 +73,12 @@ Values adaptation(const Image& picture, double ppd, double floor_cdm2) {
     return mean;
 }
 
-// A change of the light and how long ago it was. A ramp: how long it takes.
-struct Change {
-    const Values& coarse;
-    double age_s = 0, ramp_s = 0;
-};
-
 // How much better than by elaTCSF flicker is seen: as still pictures are than by castleCSF.
 double flicker_gain(const JudgeOptions& options) {
     if (!options.csf_table) return options.gain;
     const Luminance middle(to_luminance(options.display, 0.5));
     return options.gain * options.csf_table->peak_sensitivity(Degrees(0), middle) /
            CsfTable::standard().peak_sensitivity(Degrees(0), middle);
-}
-
-// V of all changes together, over the whole field.
-double flicker_of(std::span<const Change> changes, const Image& before, const JudgeOptions& options) {
-    const double ppd = pixels_per_degree(options.display).value();
-    const double gain = flicker_gain(options);
-    const Values luminance = adaptation(before, ppd, contrast_floor(options.display));
-    const Plane aside = eccentricities(before.width, before.height, options);
-    double sum = 0;
-    for (int y = 0; y < before.height; ++y)
-        for (int x = 0; x < before.width; ++x) {
-            const std::size_t i = before.index(x, y, 0);
-            const auto is_changed = [&](const Change& c) { return c.coarse[i] != 0; };
-            if (std::none_of(changes.begin(), changes.end(), is_changed)) continue;
-            const double degrees = aside.values.empty() ? 0 : static_cast<double>(aside.values[i]),
-                         cdm2 = static_cast<double>(luminance[i]);
-            const double speed = flicker_speed(degrees, cdm2);
-            double response = 0;
-            for (const Change& c : changes)
-                response += static_cast<double>(c.coarse[i]) *
-                            (c.ramp_s > 0 ? ramp_peak(speed * c.ramp_s) : step_response(speed * c.age_s));
-            const double thresholds = std::abs(response) / cdm2 * flicker_scale(degrees, cdm2) * gain;
-            sum += std::pow(thresholds, flicker_pooling);
-        }
-    return std::pow(sum / (ppd * ppd) / flicker_pooling_deg2, 1 / flicker_pooling);
-}
-
-Values difference_of(const Image& before, const Image& after, double share) {
-    Values difference(before.values.size());
-    for (std::size_t i = 0; i < difference.size(); ++i)
-        difference[i] = static_cast<float>(share) * (after.values[i] - before.values[i]);
-    return difference;
-}
-
-bool is_zero(const Values& values) {
-    return std::all_of(values.begin(), values.end(), [](float v) { return v == 0; });
 }
 
 // V of what is different where the light of a picture has changed by so much.
@@ -154,41 +101,45 @@ ChangeJudgement pooled(double lasting, double flicker, double beta) {
             flicker};
 }
 
-Result<void> check_change(const Image& before, const Image& after, double seconds, const JudgeOptions& options) {
-    if (auto ok = check(options); !ok) return ok;
-    if (!(seconds >= 0 && std::isfinite(seconds)))
-        return judge_argument_error("judge of changes", "the time must be 0 seconds or more, and finite");
-    return check_luminance_pair("judge of changes", before, after);
-}
-
 } // namespace
-
-Result<ChangeJudgement> judge_change(const Image& before, const Image& after, double seconds,
-                                     const JudgeOptions& options) {
-    if (auto ok = check_change(before, after, seconds, options); !ok) return ok.error();
-    const double ramp_s = std::min(seconds, remembered_s);
-    const Values difference = difference_of(before, after, seconds > 0 ? ramp_s / seconds : 1);
-    auto lasting = lasting_of(before, difference, options);
-    if (!lasting) return lasting.error();
-    const Values coarse =
-        coarse_part(difference, before.width, before.height, pixels_per_degree(options.display).value());
-    const Change change{coarse, 0, ramp_s};
-    return pooled(*lasting, flicker_of({&change, 1}, before, options), options.beta);
-}
 
 void ChangeWatch::pass(double seconds) {
     for (Step& step : steps_) step.age_s += seconds;
     while (!steps_.empty() && !(steps_.front().age_s < remembered_s)) steps_.pop_front();
 }
 
+// V of all changes together, over the whole field.
+double ChangeWatch::flicker(const Image& before) const {
+    const double ppd = pixels_per_degree(options_.display).value();
+    const double gain = flicker_gain(options_);
+    const Values luminance = adaptation(before, ppd, contrast_floor(options_.display));
+    const Plane aside = eccentricities(before.width, before.height, options_);
+    double sum = 0;
+    for (std::size_t i = 0; i < before.values.size(); ++i) {
+        if (std::ranges::none_of(steps_, [&](const Step& step) { return step.coarse[i] != 0; })) continue;
+        const double degrees = aside.values.empty() ? 0 : static_cast<double>(aside.values[i]),
+                     cdm2 = static_cast<double>(luminance[i]);
+        const double speed = flicker_speed(degrees, cdm2);
+        double response = 0;
+        for (const Step& step : steps_)
+            response += static_cast<double>(step.coarse[i]) * step_response(speed * step.age_s);
+        const double thresholds = std::abs(response) / cdm2 * flicker_scale(degrees, cdm2) * gain;
+        sum += std::pow(thresholds, flicker_pooling);
+    }
+    return std::pow(sum / (ppd * ppd) / flicker_pooling_deg2, 1 / flicker_pooling);
+}
+
 Result<ChangeJudgement> ChangeWatch::next(const Image& before, const Image& after, double seconds) {
-    if (auto ok = check_change(before, after, seconds, options_); !ok) return ok.error();
+    if (auto ok = check(options_); !ok) return ok.error();
+    if (!(seconds >= 0 && std::isfinite(seconds)))
+        return judge_argument_error("judge of changes", "the time must be 0 seconds or more, and finite");
+    if (auto ok = check_luminance_pair("judge of changes", before, after); !ok) return ok.error();
     if (before.width != width_ || before.height != height_) steps_.clear(); // another window
-    width_ = before.width;
-    height_ = before.height;
+    width_ = before.width, height_ = before.height;
     pass(seconds);
-    Values difference = difference_of(before, after, 1);
-    if (is_zero(difference)) return ChangeJudgement{};
+    Values difference(before.values.size());
+    for (std::size_t i = 0; i < difference.size(); ++i) difference[i] = after.values[i] - before.values[i];
+    if (std::ranges::all_of(difference, [](float v) { return v == 0; })) return ChangeJudgement{};
 
     Values all = difference;
     for (const Step& step : steps_)
@@ -196,12 +147,9 @@ Result<ChangeJudgement> ChangeWatch::next(const Image& before, const Image& afte
     auto lasting = lasting_of(before, all, options_);
     if (!lasting) return lasting.error();
 
-    const double ppd = pixels_per_degree(options_.display).value();
-    steps_.push_back({0, std::move(difference), {}});
-    steps_.back().coarse = coarse_part(steps_.back().difference, width_, height_, ppd);
-    std::vector<Change> changes;
-    for (const Step& step : steps_) changes.push_back({step.coarse, step.age_s, 0});
-    return pooled(*lasting, flicker_of(changes, before, options_), options_.beta);
+    Values coarse = coarse_part(difference, width_, height_, pixels_per_degree(options_.display).value());
+    steps_.push_back({0, std::move(difference), std::move(coarse)});
+    return pooled(*lasting, flicker(before), options_.beta);
 }
 
 } // namespace unseen::perception

@@ -3,18 +3,18 @@
 #include <unseen/perception/csf.h>
 
 #include <algorithm>
-#include <array>
+#include <cassert>
 #include <cmath>
 #include <limits>
-#include <numbers>
-#include <string>
 #include <utility>
 
 #include <unseen/perception/internal/motion.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "csf/csf_model.h"
 
 namespace unseen::perception {
+
 namespace {
 
 constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> names = {{
@@ -60,8 +60,7 @@ Result<CsfModel> csf_model(std::string_view text) {
         if (text == name) return model;
         known.append(known.empty() ? "" : model == names.back().first ? " or " : ", ").append(name);
     }
-    return Error{ErrorCode::invalid_argument,
-                 "there is no contrast sensitivity model \"" + std::string(text) + "\": use " + known};
+    return invalid_argument("there is no contrast sensitivity model \"" + std::string(text) + "\": use " + known);
 }
 
 bool is_achromatic(CsfModel model) {
@@ -135,6 +134,68 @@ Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency,
             .field = conditions.field,
             .velocity = conditions.velocity,
             .distance = conditions.distance};
+}
+
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+// Daly 1998: the share of a target's speed that the eye keeps up with, its drift, and its greatest speed in pursuit.
+constexpr double pursuit_gain = 0.82;
+constexpr double drift_deg_s = 0.15, greatest_pursuit_deg_s = 80;
+
+bool in_domain(double cpd, double deg_s) { return cpd > 0 && std::isfinite(cpd) && deg_s >= 0 && std::isfinite(deg_s); }
+
+// Laird et al. 2006.
+constexpr double spatial = 0.8404, speed = 0.7986;
+
+// log k(v).
+double log_gain(double deg_s) {
+    const double decades = std::abs(std::log10(speed * deg_s / 3));
+    return std::log(6.1 + 7.3 * decades * decades * decades);
+}
+
+double clamped(DegreesPerSecond velocity) { return std::max(velocity.value(), least_velocity.value()); }
+
+} // namespace
+
+double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity) {
+    if (!in_domain(frequency.value(), velocity.value())) return nan;
+    const double deg_s = clamped(velocity), least = least_velocity.value();
+    if (deg_s == least) return 1; // one expression below, which holds where S underflows
+    const double wave = 2 * std::numbers::pi * spatial * frequency.value();
+    const double rise = log_gain(deg_s) - log_gain(least) + std::log(deg_s / least);
+    return std::exp(rise - 2 * wave * speed * (deg_s - least) / 45.9);
+}
+
+DegreesPerSecond pursuit_velocity(DegreesPerSecond target) {
+    return DegreesPerSecond(std::min(pursuit_gain * target.value() + drift_deg_s, greatest_pursuit_deg_s));
+}
+
+DegreesPerSecond retinal_velocity_of_target(DegreesPerSecond image) {
+    return DegreesPerSecond(std::abs(image.value() - pursuit_velocity(image).value()));
+}
+
+Result<Person> person(std::string_view wanted) {
+    std::string names;
+    for (const Person& p : people) {
+        if (p.name == wanted) return p;
+        names += (names.empty() ? "" : ", ") + std::string(p.name);
+    }
+    return invalid_argument("'" + std::string(wanted) + "' is no observer; there are: " + names + ".");
+}
+
+std::shared_ptr<const CsfTable> csf_of(const Person& person) {
+    const auto made = [](double gain) {
+        Result<CsfTable> table = CsfTable::standard().scaled(gain);
+        assert(table && "the gain is in its range");
+        return std::make_shared<const CsfTable>(*std::move(table));
+    };
+    static const auto median = made(median_person.gain), usual = made(default_person.gain),
+                      strict = made(strict_person.gain);
+    for (const auto& [known, table] :
+         {std::pair{median_person, median}, {default_person, usual}, {strict_person, strict}})
+        if (person.gain == known.gain) return table;
+    return made(person.gain);
 }
 
 } // namespace unseen::perception

@@ -5,7 +5,6 @@
 // area, spatiotemporal frequency, luminance and eccentricity", Journal of Vision 24(4), 2024.
 // stelaCSF: R. K. Mantiuk, M. Ashraf, A. Chapiro, "stelaCSF - A unified model of contrast sensitivity as the function
 // of spatio-temporal frequency, eccentricity, luminance and area", ACM Transactions on Graphics 41(4), 2022.
-#include <unseen/perception/csf.h>
 
 #include <algorithm>
 #include <cmath>

@@ -2,8 +2,6 @@
 // without evaluating all of a form again for every sample.
 #pragma once
 
-#include <vector>
-
 #include <unseen/perception/csf.h>
 
 namespace unseen::perception {

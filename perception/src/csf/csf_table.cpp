@@ -1,17 +1,16 @@
 // The contrast sensitivity table: filled from a model or from samples, interpolated in log space, made monotone for
 // the fold test, and inverted.
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
 
-#include <unseen/perception/csf.h>
 #include <unseen/perception/internal/motion.h>
 
 #include "csf/csf_model.h"
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::perception {
@@ -52,9 +51,7 @@ constexpr double transient_per_decade = 72, transient_decades = 0.8;
 // daly's frequencies scale with 1 + 0.24 e: steps of this in the logarithm of that.
 constexpr double daly_eccentricity_scale = 0.24, daly_log_step = 0.065;
 
-Error bad(std::string message) {
-    return Error{ErrorCode::invalid_argument, "contrast sensitivity table: " + std::move(message)};
-}
+Error bad(std::string message) { return invalid_argument("contrast sensitivity table: " + std::move(message)); }
 
 std::string indexed(std::string_view field, std::initializer_list<std::size_t> indices) {
     std::string text(field);
@@ -77,17 +74,15 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
                         double highest) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const std::string place = indexed(field, {i});
-        if (!std::isfinite(values[i]) || !std::isfinite(positions[i])) {
+        if (!std::isfinite(values[i]) || !std::isfinite(positions[i]))
             return bad(place + " must be a finite number in its range, but is " + number_text(values[i]));
-        }
         if (values[i] > highest)
             return bad(place + " must be at most " + number_text(highest) + ", but is " + number_text(values[i]));
-        if (i > 0 && !(positions[i] - positions[i - 1] >= CsfTable::smallest_spacing)) {
+        if (i > 0 && !(positions[i] - positions[i - 1] >= CsfTable::smallest_spacing))
             return bad(place + " is " + number_text(values[i]) + " after " + number_text(values[i - 1]) +
                        ": the values must rise from sample to sample, by at least " +
                        number_text(CsfTable::smallest_spacing) +
                        (values.data() == positions.data() ? " degrees" : " octaves"));
-        }
     }
     return {};
 }
@@ -212,9 +207,8 @@ void fill(CsfSamples& samples, CsfModel model, VisualField field, MakeStimulus s
         std::ranges::transform(samples.frequency_cpd, remaining.begin(), [&](double cpd) {
             return std::pow(10.0, -decay_per_degree(model, CyclesPerDegree(cpd), field) * degrees);
         });
-        for (std::size_t i = 0; i < foveal.size(); ++i) {
+        for (std::size_t i = 0; i < foveal.size(); ++i)
             samples.sensitivity.push_back(floored(foveal[i] * remaining[i % remaining.size()]));
-        }
     }
 }
 
@@ -240,28 +234,18 @@ void fill_daly(CsfSamples& samples, std::vector<double>& eccentric, std::vector<
     }
 }
 
-// Between samples further apart than these, the monotone form puts columns of its own: the peak over frequency is not
-// linear in eccentricity even where log sensitivity is, and it bends most near the fovea.
-std::vector<double> peak_eccentricities() {
-    std::vector<double> degrees;
-    const auto append = [&](int from, int until, int step) {
-        for (int e = from; e <= until; e += step) degrees.push_back(e);
-    };
-    append(0, 10, 1);
-    append(12, 20, 2);
-    append(25, 60, 5);
-    append(70, 120, 10);
-    return degrees;
-}
-
+// The monotone form puts columns of its own between samples that lie farther apart than these: the peak over frequency is
+// not linear in eccentricity even where log sensitivity is, and it bends most near the fovea.
 std::vector<double> refined(std::span<const double> degrees) {
+    constexpr struct { int from, until, step; } extras[] = {{0, 10, 1}, {12, 20, 2}, {25, 60, 5}, {70, 120, 10}};
     constexpr double clear = 0.1; // degrees between samples and what is put between them
     std::vector<double> all(degrees.begin(), degrees.end());
-    for (const double extra : peak_eccentricities()) {
-        const bool is_inside = extra > degrees.front() && extra < degrees.back();
-        const bool is_clear = std::ranges::none_of(degrees, [&](double e) { return std::abs(e - extra) < clear; });
-        if (is_inside && is_clear) all.push_back(extra);
-    }
+    for (const auto& [from, until, step] : extras)
+        for (int extra = from; extra <= until; extra += step) {
+            const bool is_inside = extra > degrees.front() && extra < degrees.back();
+            if (is_inside && std::ranges::none_of(degrees, [&](double e) { return std::abs(e - extra) < clear; }))
+                all.push_back(extra);
+        }
     std::ranges::sort(all);
     return all;
 }
@@ -397,17 +381,15 @@ Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branch
     constexpr double least_summation = 0.01, most_summation = 100; // far beyond how people differ
     if (!(s.summation >= least_summation && s.summation <= most_summation))
         return bad("summation must be from 0.01 to 100, but is " + number_text(s.summation));
-    if (s.eccentricity_deg.front() != 0) {
+    if (s.eccentricity_deg.front() != 0)
         return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number_text(s.eccentricity_deg.front()));
-    }
 
     const std::size_t columns = s.eccentricity_deg.size() * s.luminance_cdm2.size();
     const std::size_t frequencies = s.frequency_cpd.size();
-    if (s.sensitivity.size() / frequencies != columns || s.sensitivity.size() % frequencies != 0) {
+    if (s.sensitivity.size() / frequencies != columns || s.sensitivity.size() % frequencies != 0)
         return bad("sensitivity has " + std::to_string(s.sensitivity.size()) + " values, but the axes ask for " +
                    std::to_string(s.eccentricity_deg.size()) + " x " + std::to_string(s.luminance_cdm2.size()) + " x " +
                    std::to_string(frequencies));
-    }
     for (std::size_t i = 0; i < s.sensitivity.size(); ++i) {
         if (!(s.sensitivity[i] > 0 && s.sensitivity[i] <= most_sensitive)) {
             const std::size_t column = i / frequencies, luminances = s.luminance_cdm2.size();
@@ -432,12 +414,11 @@ Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& condi
     const auto stimulus = [&](double cpd, double degrees, double cdm2) {
         return stimulus_of(conditions, CyclesPerDegree(cpd), Degrees(degrees), Luminance(cdm2));
     };
-    if (std::isnan(perception::sensitivity(model, stimulus(1, 0, 1)))) {
+    if (std::isnan(perception::sensitivity(model, stimulus(1, 0, 1))))
         return bad("temporal frequency and velocity must be finite and 0 or more, one of them 0, and the distance "
                    "above 0 m, but they are " +
                    number_text(conditions.temporal.value()) + " Hz, " + number_text(conditions.velocity.value()) +
                    " degrees/s and " + number_text(conditions.distance.value()) + " m");
-    }
     CsfSamples samples;
     samples.source = model_source(model, conditions);
     samples.frequency_cpd = model_frequencies(model, conditions);
@@ -561,9 +542,8 @@ void CsfTable::State::prepare_monotone() {
     for (const double degrees : monotone_eccentricity.positions) {
         const Cell e = locate(eccentricity, degrees);
         const double *low = logs.data() + e.first * plane, *high = logs.data() + e.second * plane;
-        for (std::size_t i = 0; i < plane; ++i) {
+        for (std::size_t i = 0; i < plane; ++i)
             log2_monotone.push_back(static_cast<float>(std::lerp(low[i], high[i], e.fraction)));
-        }
     }
     std::vector<float>& v = log2_monotone;
     for (std::size_t row = 0; row < v.size(); row += frequencies)
@@ -636,9 +616,8 @@ double CsfTable::monotone_sensitivity(CyclesPerDegree frequency, Degrees eccentr
     if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
     const Blend column = state_->blend(eccentricity.value(), log2_cdm2);
     const double beyond = log2_cpd - state_->frequency.positions.back();
-    if (beyond > 0 && state_->last_slope < 0) {
+    if (beyond > 0 && state_->last_slope < 0)
         return std::exp2(column[state_->frequency.positions.size() - 1] + state_->last_slope * beyond);
-    }
     const Cell f = locate(state_->frequency, log2_cpd);
     return std::exp2(std::lerp(column[f.first], column[f.second], f.fraction));
 }
@@ -674,9 +653,8 @@ double CsfTable::State::log2_crossing(const Query& q) const {
 }
 
 CyclesPerDegree CsfTable::highest_visible_frequency(double contrast, Degrees eccentricity, Luminance luminance) const {
-    if (!is_valid(contrast, eccentricity.value(), luminance.value())) {
+    if (!is_valid(contrast, eccentricity.value(), luminance.value()))
         return CyclesPerDegree(std::numeric_limits<double>::infinity());
-    }
     std::array<Query, 1> query{
         {{state_->blend(eccentricity.value(), std::log2(luminance.value())), -std::log2(contrast), 0}}};
     state_->bisect(query);
@@ -700,11 +678,10 @@ void CsfTable::highest_visible_log2_frequency(std::span<const float> contrast, s
                                            : Query{state.blend(0, 0), 0, 0};
         }
         state.bisect(queries);
-        for (std::size_t i = begin; i < begin + count; ++i) {
+        for (std::size_t i = begin; i < begin + count; ++i)
             log2_frequency[i] = is_valid(contrast[i], eccentricity_deg[i], luminance_cdm2[i])
                                     ? static_cast<float>(state.log2_crossing(queries[i - begin]))
                                     : std::numeric_limits<float>::infinity();
-        }
     }
 }
 

@@ -1,21 +1,234 @@
 // The fold test by errors in distance form: a switch distance table for patches and for strips, and each node's rows.
 #include "fold/error_distances.h"
 
-#include <algorithm>
-#include <optional>
-#include <span>
-#include <vector>
+#include <utility>
 
-#include "fold/fold_screen.h"
-#include "fold/shown_folds.h"
-#include "fold/stage_distances.h"
-#include "fold/surround.h"
 #include "fold/switch_distances.h"
 
 namespace unseen::perception {
 
+namespace {
+
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
+
+// A pattern of a width, and its row of the table.
+struct ShownFold {
+    Pattern pattern;
+    float length = 0; // mesh units
+    std::uint16_t row = 0;
+};
+struct ShownFolds { // by interior node
+    std::vector<ShownFold> patches, strips;
+};
+
+// Octaves of contrast that a small part of a patch may have over all of it: sharper ones count as this, a sixteenth of
+// the width. They are rare, and each octave is more rows.
+constexpr int steepest_spike = 8 * pattern_contrasts_per_octave;
+
+// An outline that moves by such a share of the mesh's radius is that of a part, which vanishes as a whole.
+constexpr float whole_part = 0.125f;
+
+// The widest mesh there can be, in widths of a node: also where nodes have none.
+constexpr float widest = 1e9f;
+
+// By how much the one must be wider to be seen from as far as the other everywhere.
+float shortfall(const SwitchDistances& switch_distances, const ShownFold& a, const ShownFold& b) {
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    if (b.row == 0) return 1;
+    if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : b.length > 0 ? infinity : 1;
+    const std::span<const float> of_a = switch_distances.switch_distance(a.row),
+                                 of_b = switch_distances.switch_distance(b.row);
+    float factor = 0;
+    for (std::size_t bin = 0; bin < of_a.size(); ++bin) {
+        if (!(of_b[bin] > 0)) continue;
+        if (!(of_a[bin] > 0)) return infinity;
+        factor = std::max(factor, b.length > 0 ? b.length * of_b[bin] / (a.length * of_a[bin]) : 0.0f);
+    }
+    constexpr float rounding = 4e-6f; // of the products, when the criterion is checked
+    return std::max(factor * (1 + rounding), 1.0f);
+}
+
+// From how far it is seen, in all.
+float weight(const SwitchDistances& switch_distances, const ShownFold& shown) {
+    float sum = 0;
+    const std::span<const float> switch_distance = switch_distances.switch_distance(shown.row);
+    for (std::size_t bin = 0; bin < switch_distance.size(); bin += 8)
+        sum += std::log2(1 + std::max(switch_distance[bin], 0.0f) * shown.length);
+    return sum;
+}
+
+// Makes `a` be seen from as far as `b`: wider, or of more contrast, whichever adds less.
+void cover(SwitchDistances& switch_distances, ShownFold& a, const ShownFold& b) {
+    if (a.row == 0) {
+        if (b.row != 0) a = {b.pattern, std::max(a.length, b.length), b.row};
+        return;
+    }
+    if (a.row == b.row) a.length = std::max(a.length, b.length);
+    const float factor = shortfall(switch_distances, a, b);
+    if (factor <= 1) return;
+    ShownFold wider = a, richer = a;
+    wider.length *= factor;
+    richer.pattern = above(a.pattern, b.pattern);
+    richer.length = std::max(a.length, b.length);
+    richer.row = switch_distances.row(richer.pattern);
+    // Biases of different widths are told at different octaves.
+    richer.length *= std::max(shortfall(switch_distances, richer, a), shortfall(switch_distances, richer, b));
+    if (!std::isfinite(wider.length) && !std::isfinite(richer.length)) {
+        richer.pattern.fading = 0; // then the larger bias is above both everywhere
+        richer.length = std::max(a.length, b.length);
+        richer.row = switch_distances.row(richer.pattern);
+    }
+    const bool is_wider_less =
+        !std::isfinite(richer.length) || weight(switch_distances, wider) <= weight(switch_distances, richer);
+    a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
+}
+
+// Of a textured tree: by how much the light of a ring's vertices differs where the texture is brightest. What is moved
+// of the texture is measured.
+double spread_of_vertices(const vdtree::SoundTree& tree, NodeId node) {
+    constexpr float least_texture = 1.0f / 64; // that tells the vertices' luminance well
+    const vdtree::LuminanceRange drawn = tree.ring_luminance()[node], texture = tree.ring_texture()[node];
+    if (!(texture.hi > 0)) return 0;
+    const NodeId around = node > 0 ? tree.parents()[node] : node;
+    const float darkest = texture.lo >= least_texture ? drawn.lo / texture.lo
+                                                      : vdtree::LuminanceRange(tree.support_luminance()[around]).lo;
+    return static_cast<double>(std::max(drawn.hi - darkest * texture.hi, 0.0f));
+}
+
+// Makes the patterns of single nodes.
+class PatternFinder {
+public:
+    PatternFinder(const vdtree::SoundTree& tree, const FoldTestOptions& options, const CsfTable& csf,
+                  double highest_cpd, SwitchDistances& switch_distances)
+        : tree_(tree), levels_(options.display), switch_distances_(switch_distances),
+          darkest_(levels_.in_cdm2(options.scene.darkest)), brightest_(levels_.in_cdm2(options.scene.brightest)),
+          object_radius_(tree.support_spheres()[vdtree::VertexTree::root()].radius) {
+        const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
+        whole_ = levels_.luminance_level(levels_.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
+        whole_peak_ = csf.peak_sensitivity(Degrees(0), Luminance(levels_.luminance(whole_))) *
+                      summation_gain(CyclesPerDegree(highest_cpd), disc(180), csf.samples().summation);
+    }
+
+    ShownFold patch(const LitErrors& lit, NodeId node) const {
+        const FoldError& error = lit.errors[node];
+        const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
+        const double middle = (levels_.in_cdm2(range.lo) + levels_.in_cdm2(range.hi)) / 2;
+        const double moved = moved_light(lit, node);
+        ShownFold patch;
+        Pattern& pattern = patch.pattern;
+        pattern.luminance = levels_.luminance_level(middle);
+        pattern.largest = levels_.contrast_level(change(node, error.luminance, moved, error.distance), middle);
+        const double shift = factors::amplitude_of_shift_mean * static_cast<double>(error.mean_distance);
+        const int typical = levels_.contrast_level(change(node, error.wide_luminance, moved, shift), middle);
+        if (pattern.largest != no_contrast)
+            pattern.typical = std::clamp(typical, std::max(pattern.largest - steepest_spike, 0), pattern.largest);
+        patch.length = std::max(tree_.support_spheres()[node].radius, error.extent);
+        const int bias = levels_.contrast_level(static_cast<double>(error.bias), 1);
+        if (bias != no_contrast && PatternLevels::contrast(bias) * whole_peak_ > 1) {
+            pattern.luminance = std::max(pattern.luminance, whole_);
+            pattern.bias = bias, pattern.fading = error.fading;
+            pattern.quarters = static_cast<int>(
+                std::ceil(4 * std::log2(std::max(std::min(widest, object_radius_ / patch.length), 1.0f))));
+        }
+        pattern = switch_distances_.simplified(pattern);
+        patch.row = switch_distances_.row(pattern);
+        return patch;
+    }
+
+    ShownFold strip(const LitErrors& lit, NodeId node) const {
+        const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
+        const double lo = levels_.in_cdm2(range.lo), hi = levels_.in_cdm2(range.hi);
+        ShownFold strip;
+        for (const auto& [bright, dark] : {std::pair(brightest_, lo), std::pair(hi, darkest_)}) {
+            const double mean = (bright + dark) / 2;
+            const Pattern own{.luminance = levels_.luminance_level(mean),
+                              .largest = levels_.contrast_level(bright - dark, mean),
+                              .is_strip = true};
+            strip.pattern = above(strip.pattern, own);
+        }
+        strip.length = lit.errors[node].outline;
+        strip.pattern.course = strip.length >= whole_part * object_radius_           ? Course::one_way
+                               : tree_.bounds()[node].flags & vdtree::irregular_ring ? Course::as_made
+                                                                                     : Course::to_and_fro;
+        strip.row = switch_distances_.row(strip.pattern);
+        return strip;
+    }
+
+private:
+    // cd/m2: the largest difference of light between places of the ring, or at the edge of a shadow.
+    double moved_light(const LitErrors& lit, NodeId node) const {
+        const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
+        const double of_vertices = tree_.texture().empty()
+                                       ? levels_.in_cdm2(range.hi) - levels_.in_cdm2(range.lo)
+                                       : levels_.difference_in_cdm2(spread_of_vertices(*lit.tree, node));
+        return std::max(of_vertices, levels_.difference_in_cdm2(lit.edge_of_shadow(node)));
+    }
+    // cd/m2: by how much the fold changes light where it changes luminance by this much and shifts by this distance.
+    double change(NodeId node, float luminance, double moved, double distance) const {
+        if (tree_.bounds()[node].flags & vdtree::translucent_ring)
+            return brightest_ - darkest_; // anything may show through
+        const double radius = tree_.bounds()[node].ring.radius;
+        return levels_.difference_in_cdm2(luminance) + moved * (radius > 0 ? std::min(1.0, distance / radius) : 1.0);
+    }
+
+    const vdtree::SoundTree& tree_; // all that does not depend on the light
+    PatternLevels levels_;
+    SwitchDistances& switch_distances_;
+    double darkest_, brightest_; // cd/m2
+    float object_radius_;
+    int whole_;         // luminance level of the whole mesh
+    double whole_peak_; // the sensitivity to it
+};
+
+// What each fold shows, no less than its children's: a patch, and a strip where it is an outline. If one tree is given
+// under several lights, the light that shows more counts. `highest_cpd`: what the display can show. Empty if there are
+// more patterns than rows: then coarsen the rows and ask again.
+std::optional<ShownFolds> find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& options,
+                                     const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances) {
+    const vdtree::SoundTree& tree = *as_lit.front().tree;
+    const PatternFinder patterns(tree, options, csf, highest_cpd, switch_distances);
+    ShownFolds shown{std::vector<ShownFold>(tree.interior_count()), std::vector<ShownFold>(tree.interior_count())};
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        ShownFold patch = patterns.patch(as_lit.front(), node), strip = patterns.strip(as_lit.front(), node);
+        for (const LitErrors& lit : as_lit.subspan(1)) {
+            cover(switch_distances, patch, patterns.patch(lit, node));
+            cover(switch_distances, strip, patterns.strip(lit, node));
+        }
+        cover(switch_distances, patch, shown.patches[node]); // the children's
+        shown.patches[node] = patch;
+        cover(switch_distances, strip, shown.strips[node]);
+        shown.strips[node] = strip;
+        if (node > 0) {
+            const NodeId parent = tree.parents()[node];
+            cover(switch_distances, shown.patches[parent], patch);
+            cover(switch_distances, shown.strips[parent], strip);
+        }
+        if (switch_distances.has_too_few()) return std::nullopt;
+    }
+    return shown;
+}
+
+// Gives a node its stage's pattern, one of `stages`, where that is seen from no farther than the node's own from
+// anywhere, unless a child would then be seen from farther.
+void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
+                    const SwitchDistances& switch_distances, std::span<const ShownFold> stages,
+                    std::span<ShownFold> shown) {
+    std::vector<bool> may_take(shown.size(), true);
+    for (std::size_t node = shown.size(); node-- > 0;) {
+        const std::size_t number = errors[node].stage;
+        if (may_take[node] && shortfall(switch_distances, shown[node], stages[number]) <= 1) {
+            shown[node] = stages[number]; // no more than the parent's own, nor its stage
+            continue;
+        }
+        if (node == 0) return;
+        const NodeId parent = tree.parents()[node];
+        const std::size_t above = errors[parent].stage;
+        if (!(shortfall(switch_distances, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+    }
+}
+
+} // namespace
 
 DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std::span<const FoldStage> measured_stages,
                                          const vdtree::View& view, const FoldTestOptions& options,
@@ -73,21 +286,10 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
     return parts;
 }
 
-Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
-                                       const vdtree::View& view, const FoldTestOptions& options) {
-    const LitErrors own{&tree, measured.of_nodes};
-    return DistanceCriterion::create(tree, criterion_parts({&own, 1}, measured.stages, view, options, {}));
-}
-
 Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                           const FoldTestOptions& options) {
-    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
-    if (const auto valid = validate(options.model); !valid) return valid.error();
-    const auto sound = vdtree::SoundTree::of(tree);
-    if (!sound) return sound.error();
-    const auto errors = fold_errors_of(*sound, options.model);
-    if (!errors) return errors.error();
-    return criterion_of(*sound, *errors, view, options);
+    const TreeAsLit own{tree.share(), {}};
+    return error_distances(std::span(&own, 1), view, options);
 }
 
 Result<DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, const vdtree::View& view,

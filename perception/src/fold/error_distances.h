@@ -1,23 +1,22 @@
 // The test by errors, of errors that are given.
 #pragma once
 
-#include <span>
-
-#include <unseen/perception/criterion.h>
-
-#include "fold/band_elevation.h"
 #include "fold/fold_errors.h"
-#include "fold/lit_trees.h"
+#include "fold/fold_screen.h"
 
 namespace unseen::perception {
 
-// error_distances() of a tree whose errors these are: with sound arguments, and errors that are numbers and nest.
-Result<vdtree::DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
-                                               const vdtree::View& view, const FoldTestOptions& options);
-
-// error_distances() of these, where something masks what folds change, as parts of a criterion.
+// error_distances() of these errors, which are numbers and nest, where something masks what folds change, as parts of a criterion.
 vdtree::DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std::span<const FoldStage> stages,
                                                  const vdtree::View& view, const FoldTestOptions& options,
                                                  const BandElevation& masking);
+
+// Distances in mesh units, [stage * bins + bin], from a point of the mesh: beyond, a picture of that stage cannot be
+// told from one of the mesh. They grow with the stage, do not grow with the bin, and are infinite where no distance
+// will do. Never less than the diameter of the mesh's sphere: from nearer the eye may be among what the pictures show
+// from outside. Empty where there are no stages.
+std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages,
+                                   const Screen& screen, const FoldTestOptions& options, const BandElevation& masking,
+                                   std::size_t bins);
 
 } // namespace unseen::perception

@@ -1,18 +1,12 @@
 // What a fold can be taken for at the worst, in classes, and the rows of the table that the classes in use get.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
 #include <unordered_map>
-#include <vector>
 
-#include <glm/common.hpp>
-
-#include <unseen/perception/display.h>
 #include <unseen/perception/internal/chroma.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/luminance_classes.h"
 

@@ -1,23 +1,7 @@
 // The fold tests after Luebke and Hallen in distance form: a table of switch distances by class and eccentricity.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numbers>
-#include <optional>
-#include <unordered_map>
-#include <vector>
-
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
-
-#include <unseen/perception/criterion.h>
 
 #include "fold/fold_classes.h"
-#include "fold/fold_screen.h"
 #include "fold/largest_extents.h"
-#include "fold/safe_rings.h"
-#include "fold/surround.h"
 
 namespace unseen::perception {
 
@@ -147,20 +131,6 @@ struct Row {
     }
 };
 
-// Of grey rows whose extents are the spheres' own, all at once.
-void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins, std::span<double> extents) {
-    std::array<float, fine_bins.count> contrast, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(bins.at(bin));
-    contrast.fill(static_cast<float>(row.contrast));
-    luminance.fill(static_cast<float>(row.luminance_cdm2));
-    csf.highest_visible_log2_frequency(
-        std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
-        std::span(luminance).first(extents.size()), std::span(log2_frequency).first(extents.size()));
-    // Infinite where not even the peak is seen.
-    for (std::size_t bin = 0; bin < extents.size(); ++bin)
-        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
-}
-
 void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities,
                 const Screen& screen, const Sensitivities& see) {
     const std::size_t bins = parts.eccentricity_bins;
@@ -181,21 +151,10 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
                 screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
         } else if (is_new) {
-            find_largest_extents(row, see.luminance, eccentricities, extents);
+            find_grey_extents(row.contrast, row.luminance_cdm2, see.luminance, eccentricities.degrees, extents);
         }
-        float* const switch_distance = &parts.switch_distance[(i + 1) * bins];
-        float* const least_cost = &parts.least_cost[(i + 1) * bins];
-        for (std::size_t bin = 0; bin < bins; ++bin) {
-            // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
-            const double eccentricity_deg = eccentricities.at(bin);
-            switch_distance[bin] = switch_distance_of(extents[bin], screen, is_around_spheres);
-            least_cost[bin] = static_cast<float>(
-                std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
-            // The table's own rounding must not make anything grow with the eccentricity.
-            if (bin == 0) continue;
-            switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
-            least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
-        }
+        set_row(parts, i + 1, extents, screen,
+                [&](std::size_t bin) { return row.shift_visibility(see, eccentricities.at(bin)); });
     }
 }
 
@@ -307,8 +266,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
     const Bins& bins = is_fine ? fine_bins : coarse_bins;
     if (!tree.texture().empty() && options.chroma)
-        return Error{ErrorCode::invalid_argument,
-                     "The colours of textures are not looked at: leave the chroma out, or the texture."};
+        return invalid_argument("The colours of textures are not looked at: leave the chroma out, or the texture.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bins.count : 1;
@@ -347,8 +305,7 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
     if (options.chroma) {
         if (cut_rings.chroma.empty() && tree.texture().empty() && has_chroma(tree))
-            return Error{ErrorCode::invalid_argument,
-                         "The rings were bounded without their colours, which are to be looked at."};
+            return invalid_argument("The rings were bounded without their colours, which are to be looked at.");
         rings.chroma = cut_rings.chroma;
         rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }

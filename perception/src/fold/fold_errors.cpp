@@ -1,14 +1,13 @@
 #include "fold/fold_errors.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <string>
+
+#include <glm/geometric.hpp>
+
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "fold/fold_factors.h"
-#include "fold/pooling.h"
-#include "measure/measurement.h"
 #include "measure/pyramid.h"
 
 namespace unseen::perception {
@@ -123,15 +122,12 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
     const auto settings = tree.attribute<float>(settings_name);
     const auto textures = tree.attribute<FoldTexture>(texture_name);
     if (records.empty())
-        return Error{
-            ErrorCode::invalid_argument,
-            Message::of(
-                "The errors of the tree's folds are not measured: measure them with {perception::measure_folds()}.")};
+        return invalid_argument(Message::of(
+            "The errors of the tree's folds are not measured: measure them with {perception::measure_folds()}."));
     if (!std::ranges::equal(settings, measurement::settings))
-        return Error{
-            ErrorCode::unsupported,
+        return unsupported(
             Message::of("The tree's folds were measured with other settings than this program knows: measure them "
-                        "again with {perception::measure_folds()}.")};
+                        "again with {perception::measure_folds()}."));
     const std::size_t nodes = tree.interior_count();
     if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
         textures.size() != (tree.texture().empty() ? 0 : nodes))
@@ -158,6 +154,75 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
             if (!std::isfinite(value)) return refused("an error of node " + std::to_string(node) + " is too large.");
     }
     return all;
+}
+
+using vdtree::NodeId;
+
+double LitErrors::edge_of_shadow(NodeId node) const {
+    double sum = 0;
+    for (const vdtree::LightSource& light : casting) {
+        double most = light.intensity;
+        if (light.kind != vdtree::LightSource::Kind::directional) {
+            const vdtree::Sphere ring = tree->bounds()[node].ring;
+            const double nearest =
+                glm::length(light.position - glm::dvec3(ring.centre)) - static_cast<double>(ring.radius);
+            most = nearest > 0 ? most * (light.distance / nearest) * (light.distance / nearest) : 1;
+        }
+        sum += most;
+    }
+    return std::min(sum * largest_albedo, 1.0); // luminances end there
+}
+
+Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel& model) {
+    if (trees.empty()) return invalid_argument("fold test: there is no tree under lights to look at");
+    double albedo = 0;
+    const vdtree::VertexTree& first = trees.front().tree;
+    for (NodeId node = 0; node < first.node_count(); ++node)
+        albedo = std::max(albedo, static_cast<double>(vdtree::albedo_of(first, node)));
+    LitTrees all;
+    all.sound_.reserve(trees.size()), all.errors_.reserve(trees.size()); // they are referred to
+    for (const TreeAsLit& one : trees) {
+        if (one.tree.interior_count() != first.interior_count())
+            return invalid_argument("fold test: the trees under lights are not of one tree");
+        auto tree = vdtree::SoundTree::of(one.tree);
+        if (!tree) return tree.error();
+        all.sound_.push_back(std::move(*tree));
+        auto measured = fold_errors_of(all.sound_.back(), model);
+        if (!measured) return measured.error();
+        all.errors_.push_back(std::move(*measured));
+        all.lit_.push_back({&all.sound_.back(), all.errors_.back().of_nodes, {}, albedo});
+        for (const vdtree::LightSource& light : one.lighting.lights)
+            if (light.casts_shadow) all.lit_.back().casting.push_back(light);
+    }
+    // Parts of the mesh may be lit in either way: no contrast is larger than the larger one of both (LitStages).
+    const std::span<const FoldStage> own = all.errors_.front().stages;
+    all.stages_.assign(own.begin(), own.end());
+    for (const FoldErrors& errors : all.errors_) {
+        if (errors.stages.size() != own.size()) all.stages_.clear(); // somewhere no light is left
+        for (std::size_t i = 0; i < all.stages_.size(); ++i) include(errors.stages[i], all.stages_[i]);
+    }
+    return all;
+}
+
+double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
+    const auto& at = FoldModel::needed_at_degrees;
+    const double e = std::clamp(eccentricity.value(), at.front(), at.back());
+    std::size_t i = 0;
+    while (i + 2 < at.size() && e > at[i + 1]) ++i;
+    return std::lerp(model.needed[i], model.needed[i + 1], (e - at[i]) / (at[i + 1] - at[i]));
+}
+
+Result<void> validate(const FoldModel& m) {
+    for (const double factor : {m.neighbourhood, m.needed_by_outlines, m.contact_reach, m.least_sine})
+        if (!(factor >= 0 && std::isfinite(factor)))
+            return invalid_argument("fold test: the model's factors must be finite, and 0 or more");
+    for (std::size_t i = 0; i < m.needed.size(); ++i)
+        if (!(m.needed[i] > 0 && m.needed[i] <= (i > 0 ? m.needed[i - 1] : 1e3)))
+            return invalid_argument("fold test: the sensitivity needed, model.needed[" + std::to_string(i) +
+                                    "], must be above 0 and not rise with the eccentricity");
+    if (m.neighbourhood == 0 || m.needed_by_outlines == 0)
+        return invalid_argument("fold test: the model's neighbourhood and needed_by_outlines must be above 0");
+    return {};
 }
 
 } // namespace unseen::perception

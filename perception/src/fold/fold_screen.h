@@ -1,13 +1,15 @@
-// What fold tests in distance form know of the camera and the display.
+// What fold tests in distance form know of the camera, the display, and what is around and behind a mesh.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
+
+#include <glm/geometric.hpp>
 
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/csf.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 
@@ -34,15 +36,13 @@ inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOpti
     if (auto ok = vdtree::validate(view); !ok) return ok;
     // The eye that stands for such a view is so far away that floats do not tell apart where it looks.
     if (options.gaze_px && view.orthographic_height)
-        return Error{
-            ErrorCode::invalid_argument,
-            "fold test: an orthographic view has no gaze; leave it out, and all of the view counts as looked at"};
+        return invalid_argument(
+            "fold test: an orthographic view has no gaze; leave it out, and all of the view counts as looked at");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y)))
-        return Error{ErrorCode::invalid_argument, "fold test: the gaze must be a finite position in pixels"};
+        return invalid_argument("fold test: the gaze must be a finite position in pixels");
     const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{});
     for (const float relative : {options.scene.darkest, options.scene.brightest, behind.lo, behind.hi})
-        if (!std::isfinite(relative))
-            return Error{ErrorCode::invalid_argument, "fold test: the scene's luminances must be finite"};
+        if (!std::isfinite(relative)) return invalid_argument("fold test: the scene's luminances must be finite");
     return {};
 }
 
@@ -79,5 +79,50 @@ struct Screen {
         least_magnification = std::min(scale, at_edge);
     }
 };
+
+class BandElevation {
+public:
+    BandElevation() = default; // of nothing that masks
+    // Nominal frequencies, falling, and elevations, 1 or more.
+    BandElevation(std::vector<double> cpd, std::vector<double> elevation)
+        : cpd_(std::move(cpd)), elevation_(std::move(elevation)) {}
+
+    // The least of the two bands around.
+    double at(double cpd) const {
+        if (cpd_.empty()) return 1;
+        std::size_t below = 0;
+        while (below < cpd_.size() && cpd_[below] > cpd) ++below;
+        const double under = elevation_[std::min(below, cpd_.size() - 1)];
+        return below > 0 ? std::min(elevation_[below - 1], under) : under;
+    }
+
+private:
+    std::vector<double> cpd_, elevation_;
+};
+
+struct Surround {
+    double darkest_cdm2 = 0;
+    double coverage = 1; // share of its sphere's disc that the mesh covers, from all sides in the mean
+
+    // The mean light of a neighbourhood of which the mesh, of this luminance, covers the coverage times so much.
+    double mean_cdm2(double luminance_cdm2, double share) const {
+        if (!(darkest_cdm2 < luminance_cdm2)) return luminance_cdm2;
+        return std::lerp(darkest_cdm2, luminance_cdm2, std::min(1.0, coverage * share));
+    }
+};
+
+// A quarter of a convex surface's area is what it covers. Cost: one pass over the triangles.
+inline Surround surround_of(const vdtree::SoundTree& tree, const FoldTestOptions& options) {
+    const vdtree::NodeId leaves = tree.interior_count();
+    double area = 0;
+    for (const vdtree::Triangle& triangle : tree.triangles()) {
+        const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[leaves + triangle[k]]); };
+        area += 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
+    }
+    const double radius = static_cast<double>(tree.bounding_sphere().radius), disc = std::numbers::pi * radius * radius;
+    const float darkest = options.scene.behind ? options.scene.behind->lo : options.scene.darkest;
+    return {to_luminance(options.display, static_cast<double>(darkest)).value(),
+            disc > 0 ? std::min(1.0, area / 4 / disc) : 1};
+}
 
 } // namespace unseen::perception

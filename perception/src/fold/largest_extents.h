@@ -1,10 +1,10 @@
-// From how far folds go unseen: the largest extents of which a row of a table shows nothing.
+// From how far folds go unseen: the largest extents of which a row of a table shows nothing, and the lengths of folds in
+// all cuts.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
+
+#include <unseen/perception/internal/cut_rings.h>
 
 #include "fold/fold_screen.h"
 
@@ -60,12 +60,68 @@ private:
     int step_; // not seen, or smaller than anything that matters
 };
 
+// The extents, by bins so many degrees apart, of what has this contrast and luminance alone and is no larger than its
+// sphere, all at once. Infinite where not even the peak is seen.
+inline void find_grey_extents(double contrast, double luminance_cdm2, const CsfTable& csf, double bin_degrees,
+                              std::span<double> extents) {
+    std::array<float, 2 * bin_count> contrasts, eccentricity, luminance, log2_frequency;
+    const auto used = [&](auto& all) { return std::span(all).first(extents.size()); };
+    for (std::size_t bin = 0; bin < extents.size(); ++bin)
+        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * bin_degrees);
+    contrasts.fill(static_cast<float>(contrast));
+    luminance.fill(static_cast<float>(luminance_cdm2));
+    csf.highest_visible_log2_frequency(used(contrasts), used(eccentricity), used(luminance), used(log2_frequency));
+    for (std::size_t bin = 0; bin < extents.size(); ++bin)
+        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
+}
+
 // The distance, in lengths, from which an extent is no larger than this on the screen.
 inline float switch_distance_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
     if (std::isinf(extent_deg)) return 0; // only from inside
     const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
     const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
     return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + distance_rounding));
+}
+
+inline constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
+
+// Fills a row of a table by its extents. `visibility`: by bin, of what shows from whatever distance.
+template <class Visibility>
+void set_row(vdtree::DistanceCriterion::Parts& parts, std::size_t row, std::span<const double> extents,
+             const Screen& screen, const Visibility& visibility) {
+    const std::size_t bins = parts.eccentricity_bins;
+    float *const switch_distance = &parts.switch_distance[row * bins], *const least_cost =
+                                                                           &parts.least_cost[row * bins];
+    for (std::size_t bin = 0; bin < bins; ++bin) {
+        switch_distance[bin] = switch_distance_of(extents[bin], screen, !parts.lengths.empty());
+        // No fold is drawn smaller than a pixel.
+        least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], visibility(bin)));
+        // The table's own rounding must not make anything grow with the eccentricity.
+        if (bin == 0) continue;
+        switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
+        least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
+    }
+}
+
+// Half the extents of folds, mesh units: the change is largest within the support and fades to nothing at the ring's
+// border. No less than the children's.
+inline std::vector<float> safe_lengths(const vdtree::SoundTree& tree, const CutRings& rings) {
+    std::vector<float> lengths(tree.interior_count(), 0.0f);
+    for (vdtree::NodeId node = tree.interior_count(); node-- > 0;) {
+        const float around = 0.5f * (tree.support_spheres()[node].radius + rings.radius[node]) * (1 + length_rounding);
+        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
+        if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
+    }
+    return lengths;
+}
+
+// The directions that make nodes outlines; empty: the tree's. Where another part is near, any.
+inline std::vector<vdtree::NormalSlabs> safe_facing(const vdtree::VertexTree& tree, const CutRings& rings) {
+    std::vector<vdtree::NormalSlabs> facing;
+    if (!rings.meets_another.empty())
+        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+            facing.push_back(rings.meets_another[node] ? vdtree::NormalSlabs::everything() : tree.bounds()[node].slabs);
+    return facing;
 }
 
 } // namespace unseen::perception

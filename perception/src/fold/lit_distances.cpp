@@ -1,20 +1,10 @@
 // The fold test under lights in distance form: a table of switch distances for every class of contrast, luminance and
 // eccentricity.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <memory>
-#include <span>
 
-#include <unseen/perception/criterion.h>
-#include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 
-#include "fold/fold_screen.h"
 #include "fold/largest_extents.h"
 #include "fold/luminance_classes.h"
-#include "fold/safe_rings.h"
 
 namespace unseen::perception {
 
@@ -23,53 +13,26 @@ namespace {
 using vdtree::ContrastClasses;
 using vdtree::DistanceCriterion;
 
-// The largest extents of a class, by eccentricity.
-void find_extents(double contrast, double luminance_cdm2, const Screen& screen, const CsfTable& csf,
-                  bool is_around_spheres, std::span<double> extents) {
-    if (is_around_spheres) {
-        LargestExtents largest(
-            [&](double frequency, double eccentricity) {
-                return contrast * csf.monotone_sensitivity(CyclesPerDegree(frequency), Degrees(eccentricity),
-                                                           Luminance(luminance_cdm2));
-            },
-            screen, is_around_spheres);
-        for (std::size_t bin = 0; bin < extents.size(); ++bin)
-            extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
-        return;
-    }
-    const std::size_t bins = extents.size();
-    std::array<float, bin_count> contrasts, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < bins; ++bin)
-        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
-    contrasts.fill(static_cast<float>(contrast));
-    luminance.fill(static_cast<float>(luminance_cdm2));
-    csf.highest_visible_log2_frequency(std::span(contrasts).first(bins), std::span(eccentricity).first(bins),
-                                       std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
-    // Infinite where not even the peak is seen.
-    for (std::size_t bin = 0; bin < bins; ++bin)
-        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
-}
-
 void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& classes, const Screen& screen,
                 const CsfTable& csf) {
     const std::size_t bins = parts.eccentricity_bins;
-    const bool is_around_spheres = !parts.lengths.empty();
     parts.switch_distance.assign(ContrastClasses::class_count * bins, DistanceCriterion::never_visible);
     parts.least_cost.assign(ContrastClasses::class_count * bins, 0);
-    std::array<double, bin_count> extents;
+    std::vector<double> extents(bins);
     for (std::size_t number = 1; number < ContrastClasses::class_count; ++number) {
-        find_extents(ContrastClasses::contrast(number), classes.level(number), screen, csf, is_around_spheres,
-                     std::span(extents).first(bins));
-        float* const switch_distance = &parts.switch_distance[number * bins];
-        float* const least_cost = &parts.least_cost[number * bins]; // that of a pixel, below which nothing is drawn
-        for (std::size_t bin = 0; bin < bins; ++bin) {
-            switch_distance[bin] = switch_distance_of(extents[bin], screen, is_around_spheres);
-            least_cost[bin] = static_cast<float>(screen.pixel_deg / extents[bin]);
-            // The table's own rounding must not make anything grow with the eccentricity.
-            if (bin == 0) continue;
-            switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
-            least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
+        const double contrast = ContrastClasses::contrast(number), luminance_cdm2 = classes.level(number);
+        if (parts.lengths.empty()) {
+            find_grey_extents(contrast, luminance_cdm2, csf, degrees_per_bin, extents);
+        } else {
+            const auto visibility = [&](double frequency, double eccentricity) {
+                return contrast * csf.monotone_sensitivity(CyclesPerDegree(frequency), Degrees(eccentricity),
+                                                           Luminance(luminance_cdm2));
+            };
+            LargestExtents largest(visibility, screen, true);
+            for (std::size_t bin = 0; bin < bins; ++bin)
+                extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
         }
+        set_row(parts, number, extents, screen, [](std::size_t) { return 0.0; });
     }
 }
 
@@ -124,8 +87,8 @@ Result<DistanceCriterion> lit_safe_distances(const vdtree::VertexTree& tree, con
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();
     if (rings.radius.size() != tree.interior_count() || !bounds || bounds->radii().size() != tree.interior_count())
-        return Error{ErrorCode::invalid_argument,
-                     "The rings, or what lights make of them (bound_lit_cut_rings()), are not those of the tree."};
+        return invalid_argument(
+            "The rings, or what lights make of them (bound_lit_cut_rings()), are not those of the tree.");
     DistanceCriterion::Parts parts;
     parts.lengths = safe_lengths(*sound, rings);
     parts.facing = safe_facing(tree, rings);

@@ -2,19 +2,12 @@
 // for one such way. So a few ways are chosen that most nodes are masked by at least; for each there is a table, and
 // each node goes by one that masks no more than what it has. What comes out is the unmasked criterion with shorter
 // lengths.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
 #include <limits>
 #include <map>
-#include <vector>
 
 #include <unseen/perception/masking.h>
 
-#include "fold/band_elevation.h"
 #include "fold/error_distances.h"
-#include "fold/fold_screen.h"
 
 namespace unseen::perception {
 namespace {
@@ -177,7 +170,7 @@ Result<DistanceCriterion> masked_error_distances(std::span<const TreeAsLit> as_l
                                                  const MaskingPicture& masking, const vdtree::View& view,
                                                  const FoldTestOptions& options) {
     if (masking.view().width != view.width || masking.view().height != view.height)
-        return Error{ErrorCode::invalid_argument, "masking: the picture is of another window than the view"};
+        return invalid_argument("masking: the picture is of another window than the view");
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     if (const auto valid = validate(options.model); !valid) return valid.error();
     const auto trees = LitTrees::of(as_lit, options.model);

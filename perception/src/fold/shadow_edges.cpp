@@ -1,12 +1,7 @@
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <map>
-#include <vector>
 
 #include <unseen/perception/internal/shadow_edges.h>
 
-#include "fold/fold_screen.h"
 #include "fold/pattern_eye.h"
 
 namespace unseen::perception {
@@ -24,8 +19,7 @@ double illuminance_at(int i) {
 Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTestOptions& options, double ambient) {
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     if (const auto valid = validate(options.model); !valid) return valid.error();
-    if (!(ambient >= 0 && ambient <= 1))
-        return Error{ErrorCode::invalid_argument, "fold test: the ambient light must be from 0 to 1"};
+    if (!(ambient >= 0 && ambient <= 1)) return invalid_argument("fold test: the ambient light must be from 0 to 1");
     const Screen screen(view, options);
     const PatternLevels levels(options.display);
     const CsfTable& csf = csf_of(options);

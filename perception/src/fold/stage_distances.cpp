@@ -1,13 +1,9 @@
 // A stage is seen at the distance at which the contrasts of its pictures, in thresholds, masked by the mesh's own and
 // pooled over the bands, come to 1. The nearer the eye, the lower the frequencies of all bands: one table of
 // sensitivities serves all stages.
-#include "fold/stage_distances.h"
+#include "fold/error_distances.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "fold/fold_factors.h"
 #include "judge/modern_masking.h"

@@ -1,15 +1,8 @@
 // The rows of a switch distance table: from how far each pattern is invisible, by eccentricity.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
-#include <span>
-#include <vector>
-
-#include <unseen/vdtree/criteria.h>
 
 #include "fold/pattern_eye.h"
 

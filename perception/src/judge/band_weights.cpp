@@ -1,14 +1,6 @@
 #include "judge/band_weights.h"
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstdint>
 #include <limits>
-#include <numbers>
-#include <optional>
-#include <string>
 
 #include "judge/fast_math.h"
 #include "judge/judge_input.h"
@@ -338,9 +330,8 @@ Range eccentricity_range(int width, int height, const JudgeOptions& options) {
 std::vector<std::size_t> nearest_samples(int pixels, int level, int samples) {
     std::vector<std::size_t> nearest(static_cast<std::size_t>(pixels));
     const std::size_t half = level == 0 ? 0 : std::size_t{1} << (level - 1);
-    for (std::size_t x = 0; x < nearest.size(); ++x) {
+    for (std::size_t x = 0; x < nearest.size(); ++x)
         nearest[x] = std::min((x + half) >> level, static_cast<std::size_t>(samples - 1));
-    }
     return nearest;
 }
 
@@ -353,9 +344,8 @@ Result<void> check(const JudgeOptions& options) {
         return judge_argument_error("judge", "the observer's gain must lie between 0.001 and 1000");
     if (!(options.beta >= least_beta && options.beta <= largest_beta))
         return judge_argument_error("judge", "beta must lie between 1 and 8");
-    if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
+    if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y)))
         return judge_argument_error("judge", "the gaze must be a finite position in pixels");
-    }
     return {};
 }
 

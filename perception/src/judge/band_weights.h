@@ -11,17 +11,7 @@
 //   pooling and the CSF, by luminance and eccentricity.
 #pragma once
 
-#include <cstddef>
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <unseen/perception/csf.h>
-#include <unseen/perception/image.h>
 #include <unseen/perception/internal/judge_tables.h>
-#include <unseen/perception/judge.h>
-#include <unseen/vdtree/result.h>
 
 #include "judge/plane.h"
 

@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include <unseen/perception/image.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
 
@@ -18,10 +16,9 @@ inline Error judge_argument_error(const std::string& judge, const std::string& m
 inline Result<void> check_luminance(const std::string& judge, const Image& image, const std::string& which) {
     const auto width = static_cast<std::size_t>(std::max(image.width, 0));
     const auto pixels = width * static_cast<std::size_t>(std::max(image.height, 0));
-    if (pixels == 0 || image.channels != 1 || image.values.size() != pixels) {
+    if (pixels == 0 || image.channels != 1 || image.values.size() != pixels)
         return judge_argument_error(judge,
                                     "the " + which + " is not a luminance image (one channel, one pixel or more)");
-    }
     for (std::size_t i = 0; i < pixels; ++i) {
         if (image.values[i] >= 0 && std::isfinite(image.values[i])) continue;
         return judge_argument_error(judge, "luminance of the " + which + " at pixel (" + std::to_string(i % width) +

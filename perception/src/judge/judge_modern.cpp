@@ -3,15 +3,10 @@
 // decides how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of
 // area (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The
 // bands are pooled.
-#include <unseen/perception/judge.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <vector>
 
 #include "judge/band_weights.h"
-#include "judge/fast_math.h"
 #include "judge/judge_input.h"
 #include "judge/modern_masking.h"
 #include "judge/summation.h"
@@ -21,13 +16,6 @@ namespace unseen::perception {
 namespace {
 
 // ---- images -------------------------------------------------------------------------------------------------------
-
-// Mirrored about the outermost pixels; an image narrower than the kernel repeats its last one.
-int mirrored(int i, int n) {
-    if (i < 0) i = -i;
-    if (i >= n) i = 2 * (n - 1) - i;
-    return std::clamp(i, 0, n - 1);
-}
 
 constexpr auto middle = static_cast<float>(kernel_middle), near = static_cast<float>(kernel_near),
                far = static_cast<float>(kernel_far);

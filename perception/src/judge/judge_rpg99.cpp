@@ -3,15 +3,8 @@
 // judge: the field in degrees, not the pixels of a degree, chooses the adaptation level; its "pyramid" blurs at full
 // resolution, so the bands are no octaves; with `masked_by_both` the error masks itself.
 #include <unseen/perception/internal/judge_tables.h>
-#include <unseen/perception/judge.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <numbers>
-#include <string>
-#include <vector>
 
 #include "csf/csf_model.h"
 #include "judge/judge_input.h"
@@ -105,9 +98,8 @@ Bands make_bands(double field_degrees, int width) {
         bands.frequency[i] = frequency;
         bands.frequency_factor[i] = csf(csf_peak_frequency) / csf(frequency);
     }
-    for (double pixels = 1; bands.adaptation_level + 1 < level_count && pixels <= degrees; pixels *= 2) {
+    for (double pixels = 1; bands.adaptation_level + 1 < level_count && pixels <= degrees; pixels *= 2)
         ++bands.adaptation_level;
-    }
     return bands;
 }
 
@@ -116,9 +108,8 @@ double elevation(const std::array<double, band_count>& contrast, const Bands& ba
     double sum = 0, weighted = 0;
     for (std::size_t i = 0; i < band_count; ++i) {
         sum += contrast[i];
-        if (contrast[i] > 0) {
+        if (contrast[i] > 0)
             weighted += contrast[i] * bands.frequency_factor[i] * masking(contrast[i] * csf(bands.frequency[i]));
-        }
     }
     return std::clamp(weighted / std::max(sum, contrast_floor), 1.0, largest_elevation);
 }

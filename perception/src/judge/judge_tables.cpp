@@ -1,7 +1,5 @@
 #include <unseen/perception/internal/judge_tables.h>
 
-#include <cmath>
-
 #include "judge/band_weights.h"
 #include "judge/judge_input.h"
 #include "judge/modern_masking.h"

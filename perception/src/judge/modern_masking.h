@@ -1,9 +1,6 @@
 // Contrast masking: what is seen less of, where there is much of its kind.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
 #include "judge/fast_math.h"
 
 namespace unseen::perception {

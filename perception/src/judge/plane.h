@@ -1,6 +1,7 @@
 // A grid of numbers.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -18,5 +19,12 @@ struct Plane {
         return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
     }
 };
+
+// Mirrored about the outermost pixels; an image narrower than the kernel repeats its last one.
+inline int mirrored(int i, int n) {
+    if (i < 0) i = -i;
+    if (i >= n) i = 2 * (n - 1) - i;
+    return std::clamp(i, 0, n - 1);
+}
 
 } // namespace unseen::perception

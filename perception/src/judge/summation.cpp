@@ -1,8 +1,6 @@
 #include "judge/summation.h"
 
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace unseen::perception {
 namespace {

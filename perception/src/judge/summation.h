@@ -6,9 +6,6 @@
 // at the distance r: a disc of area A holds A / (A + Ac) of it, and all of the plane holds 1.
 #pragma once
 
-#include <array>
-#include <vector>
-
 #include <unseen/perception/internal/judge_tables.h>
 
 #include "judge/plane.h"

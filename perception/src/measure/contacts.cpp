@@ -1,10 +1,7 @@
 #include "measure/contacts.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -311,12 +308,6 @@ private:
 
 std::vector<Contact> find_contacts(std::span<const SoundTree> trees, MeasuringProgress& progress) {
     return ContactFinder(trees).run(progress);
-}
-
-std::vector<Contact> find_contacts(std::span<const SoundTree> trees) {
-    const Progress nobody;
-    MeasuringProgress progress(nobody);
-    return find_contacts(trees, progress);
 }
 
 } // namespace unseen::perception

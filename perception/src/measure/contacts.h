@@ -1,7 +1,6 @@
 // Where parts of a surface touch or pass through each other without sharing a vertex.
 #pragma once
 
-#include <algorithm>
 #include <limits>
 #include <span>
 #include <vector>
@@ -29,6 +28,5 @@ struct Contact {
 // `trees`: one at least, the same but for their luminances; what looks alike does so in all of them.
 // Adds the triangles to what is done; where that says to stop, the answer is of no use.
 std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees, MeasuringProgress& progress);
-std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees);
 
 } // namespace unseen::perception

@@ -2,15 +2,14 @@
 // at once.
 #include <unseen/perception/internal/cut_rings.h>
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <type_traits>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/packed_range.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
@@ -20,8 +19,6 @@
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "measure/contacts.h"
-#include "measure/ring_chroma.h"
-#include "measure/ring_neighbours.h"
 
 namespace unseen::perception {
 
@@ -32,6 +29,8 @@ namespace {
 // Trees are some tens of nodes deep. Where one is deeper than this, as only made-up ones are, whatever is above counts
 // as reaching everywhere, so that no tree costs the square of its depth.
 constexpr int most_steps = 1024;
+// Likewise for the pairs of nodes in two such chains, of which usual trees have some hundreds.
+constexpr std::size_t most_added = 4096;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -47,6 +46,43 @@ struct Box {
         const glm::dvec3 p(point);
         return glm::length(glm::max(glm::abs(glm::dvec3(low) - p), glm::abs(glm::dvec3(high) - p)));
     }
+};
+
+// What decides which proxies a ring can have in a cut.
+class Neighbours {
+public:
+    explicit Neighbours(const SoundTree& tree)
+        : g_(*tree.data().geometry), interior_(tree.interior_count()), parts_(links_of(g_)) {
+        parts_.assign_triangles(g_.first_triangle, g_.triangles);
+    }
+
+protected:
+    bool supports(NodeId node, Index leaf) const { return g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node]; }
+    // Ties go by number, so that of two nodes one is the larger.
+    bool is_larger(NodeId a, NodeId b) const {
+        const float ra = g_.support_spheres[a].radius, rb = g_.support_spheres[b].radius;
+        return ra != rb ? ra > rb : a < b;
+    }
+    NodeId parent_of_leaf(Index leaf) const { return g_.parents[interior_ + leaf]; }
+    // From a node up, the first that the part owns: what is true of it is true of all above. Or no_node.
+    NodeId lowest_owned(const TreePart& part, NodeId node) const {
+        while (node != no_node && !parts_.owns(part, node)) node = parts_.is_top(node) ? no_node : g_.parents[node];
+        return node;
+    }
+    // Calls f(part, corner, next, last) for each corner of each triangle.
+    template <class F>
+    void for_each_corner(F&& f) {
+        parts_.for_each_triangle([&](const TreePart& part) {
+            return [&](Index triangle) {
+                const Triangle& t = g_.triangles[triangle];
+                for (std::size_t k = 0; k < 3; ++k) f(part, t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
+            };
+        });
+    }
+
+    const TreeGeometry& g_;
+    NodeId interior_;
+    TreeParts parts_;
 };
 
 // An area, and what is drawn there times the area.
@@ -114,7 +150,7 @@ struct ColouredVertices {
 };
 
 template <class Vertices>
-class RingBounder {
+class RingBounder : Neighbours {
     using Light = typename Vertices::Light;
     using Lit = perception::Lit<Light>;
     static constexpr bool has_chroma = std::is_same_v<Light, glm::dvec3>;
@@ -122,11 +158,8 @@ class RingBounder {
 
 public:
     RingBounder(const SoundTree& tree, std::vector<ChromaRange> ring_chroma)
-        : tree_(tree), ring_chroma_(std::move(ring_chroma)), g_(*tree.data().geometry), l_(*tree.data().light),
-          interior_(tree.interior_count()), vertices_(tree), parts_(links_of(g_)), around_(interior_),
-          left_(interior_) {
-        parts_.assign_triangles(g_.first_triangle, g_.triangles);
-    }
+        : Neighbours(tree), ring_chroma_(std::move(ring_chroma)), l_(*tree.data().light), vertices_(tree),
+          around_(interior_), left_(interior_) {}
 
     CutRings run() {
         rings_.luminance.assign(g_.bounds.size(), {});
@@ -142,16 +175,10 @@ public:
         }
         if constexpr (is_textured) begin_texture();
         sum_up_triangles();
-        parts_.for_each_triangle([&](const TreePart& part) {
-            return [&](Index triangle) {
-                const Triangle& t = g_.triangles[triangle];
-                for (std::size_t k = 0; k < 3; ++k) {
-                    const Index here = t[k], next = t[(k + 1) % 3], last = t[(k + 2) % 3];
-                    bound_along(part, here, next);
-                    bound_along(part, here, last);
-                    add_light(part, here, next, last);
-                }
-            };
+        for_each_corner([&](const TreePart& part, Index here, Index next, Index last) {
+            bound_along(part, here, next);
+            bound_along(part, here, last);
+            add_light(part, here, next, last);
         });
         if constexpr (is_textured) bound_texture();
         find_mean_shifts();
@@ -161,10 +188,6 @@ public:
     }
 
 private:
-    bool supports(NodeId node, Index leaf) const { return perception::supports(g_, node, leaf); }
-    bool is_larger(NodeId a, NodeId b) const { return perception::is_larger(g_, a, b); }
-    NodeId parent_of_leaf(Index leaf) const { return g_.parents[interior_ + leaf]; }
-
     // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.
     void bound_along(const TreePart& part, Index here, Index neighbour) {
         NodeId other = parent_of_leaf(neighbour);
@@ -205,9 +228,8 @@ private:
         }
     }
 
-    // What is true of the lowest node that the part owns is true of all above.
-    void reach_everywhere(const TreePart& part, NodeId node) {
-        while (node != no_node && !parts_.owns(part, node)) node = parts_.is_top(node) ? no_node : g_.parents[node];
+    void reach_everywhere(const TreePart& part, NodeId above) {
+        const NodeId node = lowest_owned(part, above);
         if (node == no_node) return;
         rings_.luminance[node] = {{0}, {Unorm16::largest}};
         if constexpr (is_textured) {
@@ -342,7 +364,7 @@ private:
     // Running sums: over the triangles in their order, and over the leaves of a third of the areas around each.
     void sum_up_triangles() {
         before_triangle_.resize(g_.triangles.size() + 1);
-        std::vector<double> of_leaf(tree_.leaf_count(), 0.0);
+        std::vector<double> of_leaf(l_.luminance.size() - interior_, 0.0);
         for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
             const Triangle& corners = g_.triangles[t];
             const Lit light = light_of(interior_ + corners[0], interior_ + corners[1], interior_ + corners[2]);
@@ -392,13 +414,9 @@ private:
         }
     }
 
-    const SoundTree& tree_;
     std::vector<ChromaRange> ring_chroma_; // where colours are looked at
-    const TreeGeometry& g_;
     const TreeLuminance& l_;
-    NodeId interior_;
     Vertices vertices_;
-    TreeParts parts_;
     CutRings rings_;
     std::vector<Lit> around_,
         left_; // by node: of the triangles with one corner in the support, before and after its fold
@@ -409,6 +427,42 @@ private:
     std::vector<UvBox> footprints_;
     TextureFits fits_;
     std::vector<double> residuals_; // mesh units
+};
+
+// The vertices of all cuts' rings, one by one: RingBounder has their luminances' ranges, which lights change.
+class ChainWalker : Neighbours {
+public:
+    ChainWalker(const SoundTree& tree, const LightBounds::FurtherVertex& add) : Neighbours(tree), add_(add) {}
+
+    void run() {
+        for_each_corner([&](const TreePart& part, Index here, Index next, Index last) {
+            walk(part, here, next);
+            walk(part, here, last);
+        });
+    }
+
+private:
+    // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.
+    void walk(const TreePart& part, Index here, Index neighbour) {
+        thread_local std::vector<NodeId> others;
+        others.clear();
+        NodeId other = parent_of_leaf(neighbour);
+        std::size_t added = 0;
+        for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour);
+             node = g_.parents[node]) {
+            for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other])
+                others.push_back(other);
+            added += others.size() + 1;
+            if (added > most_added) { // whatever is above counts as reaching everywhere
+                if (const NodeId owned = lowest_owned(part, node); owned != no_node) add_(owned, no_node);
+                return;
+            }
+            if (!parts_.owns(part, node)) continue;
+            for (const NodeId vertex : others) add_(node, vertex);
+        }
+    }
+
+    const LightBounds::FurtherVertex& add_;
 };
 
 } // namespace
@@ -427,12 +481,22 @@ Result<CutRings> bound_cut_rings(const VertexTree& tree, bool with_chroma) {
                      : chroma.empty() ? RingBounder<GreyVertices>(*sound, {}).run()
                                       : RingBounder<ColouredVertices>(*sound, std::move(chroma)).run();
     // What comes as near as a quarter of a triangle is in the way of any fold.
-    const std::vector<Contact> contacts = find_contacts(std::span(&*sound, 1));
+    const Progress nobody;
+    MeasuringProgress progress(nobody);
+    const std::vector<Contact> contacts = find_contacts(std::span(&*sound, 1), progress);
     if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
         rings.meets_another.resize(contacts.size());
         std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));
     }
     return rings;
+}
+
+Result<LightBounds> bound_lit_cut_rings(const VertexTree& tree, const CutRings& rings) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    if (rings.radius.size() != tree.interior_count()) return invalid_argument("The rings are not those of the tree.");
+    return LightBounds::measure(tree, rings.radius,
+                                [&](const LightBounds::FurtherVertex& add) { ChainWalker(*sound, add).run(); });
 }
 
 } // namespace unseen::perception

@@ -1,8 +1,5 @@
-#include "measure/find_stages.h"
+#include "measure/whole_mesh.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <numeric>
 
 #include <glm/geometric.hpp>
@@ -10,13 +7,7 @@
 
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/lighting.h>
 
-#include "measure/lit_stages.h"
-#include "measure/luminance_bias.h"
-#include "measure/measurement.h"
-#include "measure/pyramid.h"
-#include "measure/stage_contrasts.h"
 #include "measure/stage_picture.h"
 
 namespace unseen::perception {

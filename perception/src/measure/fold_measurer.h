@@ -1,32 +1,16 @@
 // Compares every fold with the surface before it, by points and by small pictures, from the leaves up.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
 #include <optional>
-#include <span>
 #include <utility>
-#include <vector>
-
-#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/internal/simd.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 #include "fold/fold_factors.h"
-#include "measure/border_shifts.h"
 #include "measure/contacts.h"
 #include "measure/fold_neighbours.h"
-#include "measure/fold_picture.h"
-#include "measure/leaf_triangles.h"
 #include "measure/measure_folds.h"
-#include "measure/measurement.h"
-#include "measure/measuring_progress.h"
-#include "measure/nearest_points.h"
-#include "measure/ring_layout.h"
+#include "measure/open_border.h"
 #include "measure/texture_change.h"
 
 namespace unseen::perception {

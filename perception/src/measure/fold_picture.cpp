@@ -1,15 +1,11 @@
 #include "measure/fold_picture.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/simd.h>
-
 #include "measure/pyramid.h"
+#include "measure/registers.h"
 #include "pyramid_kernel.h"
 
 namespace unseen::perception {
@@ -42,7 +38,7 @@ struct Canvas {
 // Cells of a row are looked at by registers, `Floats`, whether they lie in the triangle or not.
 template <class Floats, std::size_t count>
 UNSEEN_INLINE void draw_rows(const Shown<count>& t, const Canvas<count>& on) {
-    constexpr std::size_t width = sizeof(Floats) / sizeof(float);
+    constexpr std::size_t width = width_of<Floats>;
     static_assert(side % width == 0);
     Floats lane;
     for (std::size_t i = 0; i < width; ++i) lane[i] = static_cast<float>(i);
@@ -56,36 +52,17 @@ UNSEEN_INLINE void draw_rows(const Shown<count>& t, const Canvas<count>& on) {
             const Floats x = lane + static_cast<float>(begin), dx = x + 0.5f - t.x;
             const Floats v = dx * t.vx + v_here, w = dx * t.wx + w_here;
             const Floats h = t.height + v * t.height_v + w * t.height_w;
-            Floats old_height;
-            std::memcpy(&old_height, height, sizeof(Floats));
+            const Floats old_height = floats_at<Floats>(height);
             const auto is_seen = (x >= from) & (x < to) & (v >= 0) & (w >= 0) & (v + w <= 1) & (h > old_height);
-            const Floats new_height = is_seen ? h : old_height;
-            std::memcpy(height, &new_height, sizeof(Floats));
+            store<Floats>(is_seen ? h : old_height, height);
             for (std::size_t i = 0; i < count; ++i) {
                 float* const luminance = on.luminance[i] + cell;
                 const Floats l = t.luminance[i] + v * t.luminance_v[i] + w * t.luminance_w[i];
-                Floats old_luminance;
-                std::memcpy(&old_luminance, luminance, sizeof(Floats));
-                const Floats new_luminance = is_seen ? l : old_luminance;
-                std::memcpy(luminance, &new_luminance, sizeof(Floats));
+                store<Floats>(is_seen ? l : floats_at<Floats>(luminance), luminance);
             }
         }
     }
 }
-template <std::size_t count>
-void draw_plain(const Shown<count>& t, const Canvas<count>& on) {
-    draw_rows<vdtree::Float4>(t, on);
-}
-#if defined(UNSEEN_EIGHT_WIDE)
-template <std::size_t count>
-UNSEEN_AVX2 void draw_avx2(const Shown<count>& t, const Canvas<count>& on) {
-    draw_rows<vdtree::Float8>(t, on);
-}
-#else
-template <std::size_t count>
-constexpr auto draw_avx2 = draw_plain<count>;
-#endif
-
 // ---- bands of frequency
 
 // Of the pyramid, of which no cell is left out; by distance in steps.
@@ -106,21 +83,6 @@ struct Worktop {
     Framed difference, seen, mean_seen, smooth, half_smooth;
 };
 thread_local Worktop worktop;
-
-// What follows is written for registers, `Floats`.
-template <class Floats>
-inline constexpr std::size_t width_of = sizeof(Floats) / sizeof(float);
-
-template <class Floats>
-UNSEEN_INLINE Floats floats_at(const float* from) {
-    Floats to;
-    std::memcpy(&to, from, sizeof to);
-    return to;
-}
-template <class Floats>
-UNSEEN_INLINE void store(const Floats& values, float* to) {
-    std::memcpy(to, &values, sizeof values);
-}
 
 // Calls f(y, x) for the first cell of each register.
 template <class Floats, class F>
@@ -223,20 +185,6 @@ UNSEEN_INLINE void compare_cells(const Compared<count>& c, typename FoldPictureO
         split<Floats>(on, c.weights, difference.amplitudes[i].data());
     }
 }
-template <std::size_t count>
-void compare_plain(const Compared<count>& c, typename FoldPictureOf<count>::Difference& difference) {
-    compare_cells<vdtree::Float4>(c, difference);
-}
-#if defined(UNSEEN_EIGHT_WIDE)
-template <std::size_t count>
-UNSEEN_AVX2 void compare_avx2(const Compared<count>& c, typename FoldPictureOf<count>::Difference& difference) {
-    compare_cells<vdtree::Float8>(c, difference);
-}
-#else
-template <std::size_t count>
-constexpr auto compare_avx2 = compare_plain<count>;
-#endif
-
 using vdtree::Float4;
 using vdtree::Int4;
 
@@ -325,7 +273,7 @@ void FoldPictureOf<count>::draw(Layer layer, const Place& a, const Place& b, con
     Picture& picture = pictures_[static_cast<std::size_t>(layer)];
     Canvas<count> on{picture.height.data(), {}};
     for (std::size_t i = 0; i < count; ++i) on.luminance[i] = picture.luminance[i].data();
-    (vdtree::has_avx2() ? draw_avx2<count> : draw_plain<count>)(t, on);
+    on_widest([&]<class Floats>() UNSEEN_INLINE_LAMBDA { draw_rows<Floats>(t, on); });
 }
 
 template <std::size_t count>
@@ -349,7 +297,7 @@ typename FoldPictureOf<count>::Difference FoldPictureOf<count>::difference(std::
         compared.mesh_luminance[i] = mesh.luminance[i].data();
         compared.folded_luminance[i] = folded.luminance[i].data();
     }
-    (vdtree::has_avx2() ? compare_avx2<count> : compare_plain<count>)(compared, difference);
+    on_widest([&]<class Floats>() UNSEEN_INLINE_LAMBDA { compare_cells<Floats>(compared, difference); });
     for (auto& of_luminance : difference.amplitudes)
         for (std::size_t band = 0; band < bands; ++band) of_luminance[band] /= gains[band];
     return difference;

@@ -2,8 +2,6 @@
 // how much of the difference of their luminances lies in which band of spatial frequency.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <limits>
 
 #include <glm/mat3x3.hpp>

@@ -2,8 +2,6 @@
 // them, and none includes the children's; <fold_errors.h> makes errors of them. The exceptions say so.
 #pragma once
 
-#include <cmath>
-#include <cstdint>
 #include <string_view>
 
 #include <unseen/vdtree/vertex_tree.h>

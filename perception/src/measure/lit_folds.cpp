@@ -1,28 +1,22 @@
 // Luminances in the pictures are (2 + a n_k) / 4: what measures them takes them for positive.
 #include <unseen/perception/internal/lit_folds.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/spot_share.h>
 
-#include "measure/fold_record.h"
-#include "measure/lit_stages.h"
 #include "measure/measure_folds.h"
-#include "measure/measurement.h"
 
 namespace unseen::perception {
 
@@ -69,8 +63,12 @@ struct LitRecord {
 };
 static_assert(sizeof(LitRecord) == 37 * sizeof(float));
 
-constexpr float LitRecord::*lengths[] = {&LitRecord::shift, &LitRecord::farthest, &LitRecord::mean_distance,
-                                         &LitRecord::extent, &LitRecord::border};
+constexpr std::pair<float LitRecord::*, float FoldRecord::*> lengths[] = {
+    {&LitRecord::shift, &FoldRecord::shift},
+    {&LitRecord::farthest, &FoldRecord::farthest},
+    {&LitRecord::mean_distance, &FoldRecord::mean_distance},
+    {&LitRecord::extent, &FoldRecord::extent},
+    {&LitRecord::border, &FoldRecord::border}};
 
 bool is_sound(const Shades& shades) {
     bool sound = true;
@@ -83,25 +81,19 @@ bool is_sound(const Shades& shades) {
 
 bool is_sound(const LitRecord& record) {
     bool sound = record.gap >= 0 && record.sine >= 0 && record.sine <= 1;
-    for (const auto length : lengths) sound &= record.*length >= 0 && std::isfinite(record.*length);
+    for (const auto& [length, its] : lengths) sound &= record.*length >= 0 && std::isfinite(record.*length);
     for (const Shades& shades : record.of_axis) sound &= is_sound(shades);
     return sound;
 }
 
 Shades shades_of(const FoldRecord& record) {
     Shades shades{record.largest_luminance, record.mean_luminance, {}};
-    std::copy(&record.amplitudes[0][0],
-              &record.amplitudes[0][0] + std::size(shades.amplitudes) * measurement::picture_bands,
-              &shades.amplitudes[0][0]);
+    std::memcpy(shades.amplitudes, record.amplitudes, sizeof shades.amplitudes);
     return shades;
 }
 
 void include(const FoldRecord& other, LitRecord& record) {
-    record.shift = std::max(record.shift, other.shift);
-    record.farthest = std::max(record.farthest, other.farthest);
-    record.mean_distance = std::max(record.mean_distance, other.mean_distance);
-    record.extent = std::max(record.extent, other.extent);
-    record.border = std::max(record.border, other.border);
+    for (const auto& [length, its] : lengths) record.*length = std::max(record.*length, other.*its);
     record.gap = std::min(record.gap, other.gap), record.sine = std::min(record.sine, other.sine);
 }
 
@@ -240,11 +232,10 @@ std::span<const float> lit_measurement_settings() noexcept { return settings; }
 
 Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     if (!has_lit_folds(tree))
-        return Error{ErrorCode::invalid_argument,
-                     "What the tree's folds change under lights has not been measured (LitFolds::measure)."};
+        return invalid_argument("What the tree's folds change under lights has not been measured (LitFolds::measure).");
     if (!std::ranges::equal(tree.attribute<float>(lit_settings_name), settings))
-        return Error{ErrorCode::unsupported, "What the tree's folds change under lights was measured with other "
-                                             "settings than this program knows: measure it again."};
+        return unsupported("What the tree's folds change under lights was measured with other "
+                           "settings than this program knows: measure it again.");
     const auto folds = tree.attribute<LitRecord>(lit_record_name);
     const auto facing = tree.attribute<FoldFacing>(lit_facing_name);
     const auto albedo = tree.attribute<Shades>(lit_albedo_name);
@@ -284,27 +275,25 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
 Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
     if (state_->folds.size() != tree.interior_count() || state_->albedo.empty() == has_albedo(tree) ||
         state_->textures.empty() != tree.texture().empty())
-        return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
-    auto with = tree.with_attribute(lit_settings_name, AttributeDomain::tree,
-                                    std::vector<float>(settings.begin(), settings.end()));
-    if (with) with = with->with_attribute(lit_record_name, AttributeDomain::interior_node, state_->folds);
-    if (with) with = with->with_attribute(lit_facing_name, AttributeDomain::interior_node, state_->facing);
-    if (with && !state_->albedo.empty())
-        with = with->with_attribute(lit_albedo_name, AttributeDomain::interior_node, state_->albedo);
-    if (with && !state_->textures.empty())
-        with = with->with_attribute(lit_texture_name, AttributeDomain::interior_node, state_->textures);
-    if (with) with = with->with_attribute(lit_stage_of_name, AttributeDomain::interior_node, state_->stage_of);
-    if (with) with = with->with_attribute(lit_stages_name, AttributeDomain::tree, state_->stages.by_share);
+        return invalid_argument("What folds change under lights was measured of another tree.");
+    Result<VertexTree> with = tree.share();
+    add_attribute(with, lit_settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
+    add_attribute(with, lit_record_name, AttributeDomain::interior_node, state_->folds);
+    add_attribute(with, lit_facing_name, AttributeDomain::interior_node, state_->facing);
+    if (!state_->albedo.empty()) add_attribute(with, lit_albedo_name, AttributeDomain::interior_node, state_->albedo);
+    if (!state_->textures.empty())
+        add_attribute(with, lit_texture_name, AttributeDomain::interior_node, state_->textures);
+    add_attribute(with, lit_stage_of_name, AttributeDomain::interior_node, state_->stage_of);
+    add_attribute(with, lit_stages_name, AttributeDomain::tree, state_->stages.by_share);
     return with;
 }
 
 Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& lighting) const {
     if (const auto valid = validate(lighting); !valid) return valid.error();
     if (lighting.specular > 0)
-        return Error{ErrorCode::unsupported,
-                     "What folds change of highlights is not measured, for these follow the eye."};
+        return unsupported("What folds change of highlights is not measured, for these follow the eye.");
     if (state_->folds.size() != tree.interior_count())
-        return Error{ErrorCode::invalid_argument, "What folds change under lights was measured of another tree."};
+        return invalid_argument("What folds change under lights was measured of another tree.");
     const auto lit = tree.shaded(
         [&](NodeId node) {
             return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
@@ -339,8 +328,8 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
             return painted + scale * of_axes;
         };
         FoldRecord& fold = folds[node];
-        fold.shift = record.shift, fold.farthest = record.farthest, fold.mean_distance = record.mean_distance;
-        fold.extent = record.extent, fold.border = record.border, fold.gap = record.gap, fold.sine = record.sine;
+        for (const auto& [length, its] : lengths) fold.*its = record.*length;
+        fold.gap = record.gap, fold.sine = record.sine;
         const auto set = [&](float& to, float value) { to = std::min(1.0f, value); }; // luminances end there
         set(fold.largest_luminance, uneven + combined([](const Shades& s) { return s.largest; }));
         set(fold.mean_luminance, uneven + combined([](const Shades& s) { return s.mean; }));

@@ -1,25 +1,16 @@
 #include "measure/measure_folds.h"
 
-#include <algorithm>
 #include <cassert>
-#include <cmath>
-#include <optional>
-#include <string>
 
-#include <glm/vec3.hpp>
 #include <tbb/task_arena.h>
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/colour.h>
-#include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/scaled_geometry.h>
-#include <unseen/vdtree/internal/texture_pyramid.h>
-#include <unseen/vdtree/internal/vertex_tree_data.h>
 
-#include "fold/fold_errors.h"
-#include "measure/find_stages.h"
 #include "measure/fold_measurer.h"
-#include "measure/luminance_bias.h"
+#include "measure/whole_mesh.h"
 
 namespace unseen::perception {
 
@@ -40,21 +31,6 @@ bool scale_back(FoldRecord& record, float scale) {
     scale_lengths(record, 1 / scale);
     return is_sound(record);
 }
-
-// The tree with these attributes, one after the other.
-class Attributes {
-public:
-    explicit Attributes(VertexTree tree) : tree_(std::move(tree)) {}
-
-    template <class T>
-    void add(std::string_view name, AttributeDomain domain, std::vector<T> values) {
-        if (tree_) tree_ = tree_->with_attribute(name, domain, std::move(values));
-    }
-    Result<VertexTree> take() { return std::move(tree_); }
-
-private:
-    Result<VertexTree> tree_;
-};
 
 // The colour that all vertices have but for their brightness; none where they have several. Black ones have any.
 std::optional<glm::vec3> common_tint(const VertexTree& tree) {
@@ -78,8 +54,8 @@ Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const VertexTree&
     if (tree.texture().empty()) return std::shared_ptr<const TextureDetail>();
     const auto tint = common_tint(tree);
     if (!tint)
-        return Error{ErrorCode::unsupported, "What folds change of a texture over vertices of several hues is not "
-                                             "measured: take another fold test, or the tree without its texture."};
+        return unsupported("What folds change of a texture over vertices of several hues is not "
+                           "measured: take another fold test, or the tree without its texture.");
     return std::make_shared<const TextureDetail>(tree.texture(), *tint);
 }
 
@@ -165,8 +141,8 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
     for (MeasuredFolds& found : all.found)
         for (NodeId node = 0; node < nodes; ++node)
             if (!scale_back(found.folds[node], scale))
-                return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
-                                                         " changes is beyond all numbers: the mesh is too large."};
+                return unsupported("What folding node " + std::to_string(node) +
+                                   " changes is beyond all numbers: the mesh is too large.");
     return all;
 }
 
@@ -263,15 +239,15 @@ Result<void> add_luminance_bias(const VertexTree& tree, const TextureDetail* tex
 
 Result<VertexTree> with_records(const VertexTree& tree, MeasuredFolds measured, std::vector<std::uint8_t> stage_of,
                                 std::vector<FoldStage> stages) {
-    Attributes with(tree.share());
-    with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
-    with.add(record_name, AttributeDomain::interior_node, std::move(measured.folds));
-    with.add(facing_name, AttributeDomain::interior_node, std::move(measured.facing));
+    Result<VertexTree> with = tree.share();
+    add_attribute(with, settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
+    add_attribute(with, record_name, AttributeDomain::interior_node, std::move(measured.folds));
+    add_attribute(with, facing_name, AttributeDomain::interior_node, std::move(measured.facing));
     if (!measured.textures.empty())
-        with.add(texture_name, AttributeDomain::interior_node, std::move(measured.textures));
-    with.add(stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
-    with.add(stages_name, AttributeDomain::tree, std::move(stages));
-    return with.take();
+        add_attribute(with, texture_name, AttributeDomain::interior_node, std::move(measured.textures));
+    add_attribute(with, stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
+    add_attribute(with, stages_name, AttributeDomain::tree, std::move(stages));
+    return with;
 }
 
 } // namespace unseen::perception

@@ -2,15 +2,11 @@
 #pragma once
 
 #include <memory>
-#include <span>
-#include <vector>
 
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/result.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/fold_record.h"
-#include "measure/lit_stages.h"
 #include "measure/texture_detail.h"
 
 namespace unseen::perception {
@@ -46,6 +42,13 @@ Result<void> add_luminance_bias(const vdtree::VertexTree& tree, const TextureDet
 
 // Of the tree's texture; null where there is none. Fails where knows_texture() is false.
 Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const vdtree::VertexTree& tree);
+
+// Nothing where there is no tree.
+template <class T>
+void add_attribute(Result<vdtree::VertexTree>& tree, std::string_view name, vdtree::AttributeDomain domain,
+                   std::vector<T> values) {
+    if (tree) tree = tree->with_attribute(name, domain, std::move(values));
+}
 
 // The tree with these as measure_folds() keeps them.
 Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured,

@@ -2,19 +2,14 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstring>
-#include <limits>
 #include <span>
 #include <vector>
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/simd.h>
-
 #include "measure/fold_picture.h"
+#include "measure/registers.h"
 
 namespace unseen::perception {
 
@@ -80,20 +75,11 @@ public:
             const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
             const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
             const float determinant = bb * cc - bc * bc;
-            const float inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
-            PreparedTriangle& t = triangles_.emplace_back(PreparedTriangle{a.position,
-                                                                           ab,
-                                                                           ac,
-                                                                           {},
-                                                                           {},
-                                                                           {},
-                                                                           bb,
-                                                                           bc,
-                                                                           cc,
-                                                                           divisor(bb),
-                                                                           divisor(cc),
-                                                                           divisor(bb - 2 * bc + cc),
-                                                                           inverse});
+            PreparedTriangle& t = triangles_.emplace_back();
+            t.a = a.position, t.b = ab, t.c = ac;
+            t.bb = bb, t.bc = bc, t.cc = cc;
+            t.along_b = divisor(bb), t.along_c = divisor(cc), t.along_bc = divisor(bb - 2 * bc + cc);
+            t.inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
             for (std::size_t i = 0; i < count; ++i) {
                 t.luminance[i] = a.luminance[i];
                 t.luminance_b[i] = b.luminance[i] - a.luminance[i], t.luminance_c[i] = c.luminance[i] - a.luminance[i];
@@ -104,7 +90,11 @@ public:
 
     // How the points differ from the nearest ones of the surface; of equally near ones, those of the first triangle.
     void compare(ComparedPoints<count>& points) const {
-        for (Block& block : points.blocks()) (vdtree::has_avx2() ? find_avx2 : find_plain)(triangles_, block);
+        for (Block& block : points.blocks())
+            on_widest([&]<class Floats>() UNSEEN_INLINE_LAMBDA {
+                for (std::size_t first = 0; first < ComparedPoints<count>::lanes; first += width_of<Floats>)
+                    find<Floats>(triangles_, block, first);
+            });
     }
 
 private:
@@ -126,14 +116,13 @@ private:
     // or of an edge. `Floats`: a register's.
     template <class Floats>
     static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Block& points, std::size_t first) {
-        const auto load = [&](const float* column, Floats& to)
-                              UNSEEN_INLINE_LAMBDA { std::memcpy(&to, column + first, sizeof(Floats)); };
         const auto share = [](const Floats& part, float whole) UNSEEN_INLINE_LAMBDA {
             const Floats s = part / whole, above = s > 0 ? s : Floats{};
             return above < 1 ? above : Floats{} + 1;
         };
-        Floats x, y, z, nearest = Floats{} + infinitely_far, nearest_luminance[count] = {};
-        load(points.x, x), load(points.y, y), load(points.z, z);
+        const Floats x = floats_at<Floats>(points.x + first), y = floats_at<Floats>(points.y + first),
+                     z = floats_at<Floats>(points.z + first);
+        Floats nearest = Floats{} + infinitely_far, nearest_luminance[count] = {};
         for (const PreparedTriangle& t : triangles) {
             const Floats px = x - t.a.x, py = y - t.a.y, pz = z - t.a.z;
             const Floats pb = px * t.b.x + py * t.b.y + pz * t.b.z, pc = px * t.c.x + py * t.c.y + pz * t.c.z;
@@ -161,21 +150,9 @@ private:
                 nearest_luminance[i] = is_nearer ? luminance : nearest_luminance[i];
             }
         }
-        std::memcpy(points.squared + first, &nearest, sizeof(Floats));
-        for (std::size_t i = 0; i < count; ++i)
-            std::memcpy(points.luminance[i] + first, &nearest_luminance[i], sizeof(Floats));
+        store(nearest, points.squared + first);
+        for (std::size_t i = 0; i < count; ++i) store(nearest_luminance[i], points.luminance[i] + first);
     }
-    static void find_plain(std::span<const PreparedTriangle> triangles, Block& points) {
-        for (const std::size_t first : {std::size_t{0}, std::size_t{4}}) find<vdtree::Float4>(triangles, points, first);
-    }
-#if defined(UNSEEN_EIGHT_WIDE)
-    UNSEEN_AVX2 static void find_avx2(std::span<const PreparedTriangle> triangles, Block& points) {
-        find<vdtree::Float8>(triangles, points, 0);
-    }
-#else
-    static constexpr auto find_avx2 = find_plain;
-#endif
-
     std::vector<PreparedTriangle> triangles_;
 };
 

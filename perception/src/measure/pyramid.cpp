@@ -1,6 +1,5 @@
 #include "measure/pyramid.h"
 
-#include <cmath>
 #include <numbers>
 
 #include "pyramid_kernel.h"

@@ -1,9 +1,8 @@
-#include "measure/ring_chroma.h"
+#include <unseen/perception/internal/chroma.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/colour.h>

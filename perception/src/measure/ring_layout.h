@@ -1,15 +1,7 @@
 // The triangles around a node before and after its fold.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
 #include <iterator>
-#include <span>
-#include <vector>
-
-#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/slab_axes.h>
 #include <unseen/vdtree/vertex_tree.h>

@@ -1,14 +1,9 @@
-#include "measure/stage_contrasts.h"
+#include "measure/stage_picture.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <numbers>
 #include <utility>
 
-#include <unseen/vdtree/internal/simd.h>
-
-#include "measure/pyramid.h"
+#include "measure/registers.h"
 
 namespace unseen::perception {
 
@@ -23,11 +18,12 @@ double share_in_cells(double frequency) {
 
 // The largest contrasts of a band. `Floats`: a register's, each lane with places of its own.
 template <class Floats>
-UNSEEN_INLINE void find_contrasts(const StageBands::Band& mesh, const StageBands::Band& difference, float inverse_gain,
-                                  std::size_t band, const StageSurround& around, FoldStage& stage) {
+UNSEEN_INLINE void find_contrasts(const StageBands::Band& mesh, const StageBands::Band& difference, std::size_t band,
+                                  const StageSurround& around, FoldStage& stage) {
     constexpr auto& masks = FoldStage::masks;
-    constexpr std::size_t backgrounds = FoldStage::backgrounds.size(), width = sizeof(Floats) / sizeof(float);
+    constexpr std::size_t backgrounds = FoldStage::backgrounds.size(), width = width_of<Floats>;
     const auto magnitude = [](const Floats& v) UNSEEN_INLINE_LAMBDA { return v < 0 ? -v : v; };
+    const float inverse_gain = 1 / static_cast<float>(band_gain(band) * share_in_cells(nominal_frequency(band)));
     Floats most[backgrounds][masks.size()] = {};
     const std::size_t count = difference.light.values.size();
     for (std::size_t first = 0; first < count; first += width) {
@@ -62,20 +58,6 @@ UNSEEN_INLINE void find_contrasts(const StageBands::Band& mesh, const StageBands
             for (std::size_t i = 0; i < width; ++i)
                 stage.contrast[k][band][row] = std::max(stage.contrast[k][band][row], most[k][row][i]);
 }
-void find_contrasts_plain(const StageBands::Band& mesh, const StageBands::Band& difference, float inverse_gain,
-                          std::size_t band, const StageSurround& around, FoldStage& stage) {
-    find_contrasts<Float4>(mesh, difference, inverse_gain, band, around, stage);
-}
-#if defined(UNSEEN_EIGHT_WIDE)
-UNSEEN_AVX2 void find_contrasts_avx2(const StageBands::Band& mesh, const StageBands::Band& difference,
-                                     float inverse_gain, std::size_t band, const StageSurround& around,
-                                     FoldStage& stage) {
-    find_contrasts<Float8>(mesh, difference, inverse_gain, band, around, stage);
-}
-#else
-constexpr auto find_contrasts_avx2 = find_contrasts_plain;
-#endif
-
 } // namespace
 
 StageBands::StageBands(const StagePicture& picture) {
@@ -111,9 +93,8 @@ void StageBands::set_to_sum(const StageBands& picture, float share, const StageB
 void add_contrasts(const StageBands& mesh, const StageBands& difference, const StageSurround& around,
                    FoldStage& stage) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b)
-        (has_avx2() ? find_contrasts_avx2 : find_contrasts_plain)(
-            mesh[b], difference[b], 1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b))), b,
-            around, stage);
+        on_widest([&]<class Floats>()
+                      UNSEEN_INLINE_LAMBDA { find_contrasts<Floats>(mesh[b], difference[b], b, around, stage); });
 }
 
 } // namespace unseen::perception

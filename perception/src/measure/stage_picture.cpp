@@ -1,15 +1,14 @@
 #include "measure/stage_picture.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
-#include <cstring>
 #include <functional>
 #include <limits>
 #include <string_view>
 #include <type_traits>
 
 #include <glm/geometric.hpp>
+
+#include "measure/registers.h"
 
 namespace unseen::perception {
 
@@ -51,8 +50,6 @@ struct ShownTexture {
 
 template <class Floats>
 using Ints = std::conditional_t<sizeof(Floats) == sizeof(Float4), Int4, Int8>;
-template <class Floats>
-constexpr std::size_t width_of = sizeof(Floats) / sizeof(float);
 
 template <class Floats>
 UNSEEN_INLINE Floats lanes() {
@@ -113,23 +110,18 @@ UNSEEN_INLINE void draw_row(const Shown<lights>& t, const ShownTexture* texture,
         const Floats x = lanes<Floats>() + static_cast<float>(begin), px = x + offset - t.a[0];
         const Floats v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
         const Floats h = u * t.a[2] + v * t.b[2] + w * t.c[2];
-        Floats old_height;
-        std::memcpy(&old_height, height, sizeof(Floats));
+        const Floats old_height = floats_at<Floats>(height);
         const auto is_seen = (x >= from) & (x < to) & (h > old_height);
         Floats its_texture{};
         if (texture)
             for (std::size_t i = 0; i < width; ++i)
                 if (is_seen[i]) its_texture[i] = texture->at(v[i], w[i]);
-        const Floats new_height = is_seen ? h : old_height;
-        std::memcpy(height, &new_height, sizeof(Floats));
+        store<Floats>(is_seen ? h : old_height, height);
         for (std::size_t k = 0; k < lights; ++k) {
             float* const light = surfaces.light[k].data() + first;
             const Floats own = u * t.of_a[k] + v * t.of_b[k] + w * t.of_c[k],
                          l = texture ? texture->light.with_texture(own, its_texture) : own;
-            Floats old_light;
-            std::memcpy(&old_light, light, sizeof(Floats));
-            const Floats new_light = is_seen ? l : old_light;
-            std::memcpy(light, &new_light, sizeof(Floats));
+            store<Floats>(is_seen ? l : floats_at<Floats>(light), light);
         }
     }
 }
@@ -163,20 +155,6 @@ UNSEEN_INLINE void draw_rows(const Shown<lights>& t, const ShownTexture* texture
         }
     }
 }
-template <std::size_t lights>
-void draw_plain(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
-    draw_rows<Float4>(t, texture, surfaces);
-}
-#if defined(UNSEEN_EIGHT_WIDE)
-template <std::size_t lights>
-UNSEEN_AVX2 void draw_avx2(const Shown<lights>& t, const ShownTexture* texture, StageSurfaces& surfaces) {
-    draw_rows<Float8>(t, texture, surfaces);
-}
-#else
-template <std::size_t lights>
-constexpr auto draw_avx2 = draw_plain<lights>;
-#endif
-
 // A triangle's plane at the corners of a tile.
 struct AtCorners {
     Float4 u, v, w;
@@ -302,7 +280,8 @@ std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> tr
         std::optional<ShownTexture> texture;
         if (light_.texture)
             texture.emplace(t, light_, std::array{uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]});
-        (has_avx2() ? draw_avx2<lights> : draw_plain<lights>)(t, texture ? &*texture : nullptr, surfaces_);
+        on_widest([&]<class Floats>()
+                      UNSEEN_INLINE_LAMBDA { draw_rows<Floats>(t, texture ? &*texture : nullptr, surfaces_); });
         if (covers || surfaces_.drawn <= most_layers * samples * samples) continue;
         covers.emplace();
         for (std::size_t later = number + 1; later < triangles.size(); ++later)
@@ -349,7 +328,7 @@ std::array<StagePicture, lights> StagePainter::cells() const {
                 for (const Float4& column : columns) sum += of_sample(column);
             }
             sum *= share;
-            std::memcpy(to.values.data() + cell, &sum, sizeof sum);
+            store(sum, to.values.data() + cell);
         };
         mean(
             surfaces_.height,

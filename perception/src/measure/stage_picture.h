@@ -1,25 +1,16 @@
-// Pictures of the whole mesh, folded or not: what a stage of folds changes is measured on these.
+// Pictures of the whole mesh, folded or not, and the contrasts between two of them in bands of frequency: what a stage of
+// folds changes is measured on these.
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <span>
 #include <unordered_set>
-#include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/internal/simd.h>
-#include <unseen/vdtree/vertex_tree.h>
 
-#include "measure/lit_stages.h"
+#include "measure/fold_stages.h"
 #include "measure/measurement.h"
 #include "measure/pyramid.h"
-#include "measure/textured_light.h"
+#include "measure/texture_detail.h"
 
 namespace unseen::perception {
 
@@ -123,5 +114,36 @@ extern template std::array<StagePicture, 3>
 StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 3>(vdtree::NodeId)>&);
 extern template std::array<StagePicture, 4>
 StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 4>(vdtree::NodeId)>&);
+
+// A picture, split into bands.
+class StageBands {
+public:
+    struct Band {
+        Raster light, cover;           // less the means
+        Raster mean_light, mean_cover; // over wider areas
+    };
+
+    StageBands() = default;
+    explicit StageBands(const StagePicture& picture);
+    const Band& operator[](std::size_t band) const { return bands_[band]; }
+
+    // Becomes the bands of a picture of the same surfaces with `share` times the one's light and `other_share` times
+    // the other's.
+    void set_to_sum(const StageBands& picture, float share, const StageBands& other, float other_share);
+
+private:
+    static Raster split(Raster& plane, Raster& mean); // takes the mean away; returns the next level
+
+    std::array<Band, FoldStage::band_count> bands_;
+};
+
+// What the contrasts are relative to; relative luminances.
+struct StageSurround {
+    float brightest = 1;            // of what is behind the mesh
+    float black = FoldStage::black; // added to the local mean
+};
+
+// Raises the stage's contrasts to those of a difference of pictures.
+void add_contrasts(const StageBands& mesh, const StageBands& difference, const StageSurround& around, FoldStage& stage);
 
 } // namespace unseen::perception

@@ -1,25 +1,13 @@
 // What a fold changes of a texture: by how far it slides over the surface, and the contrasts of its detail.
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
-#include <unseen/vdtree/vertex_tree.h>
 
-#include "measure/fold_picture.h"
 #include "measure/fold_record.h"
-#include "measure/fold_stages.h"
-#include "measure/measurement.h"
 #include "measure/ring_layout.h"
-#include "measure/texture_density.h"
-#include "measure/textured_light.h"
+#include "measure/texture_detail.h"
 
 namespace unseen::perception {
 

@@ -1,16 +1,20 @@
-// A texture as the measurement of folds looks at it: its relative luminance by mip level, and how much contrast lies at
-// which level around a place.
+// A texture as the measurement of folds looks at it: its relative luminance by mip level, how much contrast lies at
+// which level around a place, what it makes of vertices, and how densely it lies on the surface.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/mesh.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 
@@ -68,5 +72,48 @@ inline float TextureDetail::nearest(std::size_t number, glm::vec2 uv) const {
     if (!(x >= 0 && y >= 0 && x < width && y < height)) return nearest_outside(level, x, y); // repeated, or no number
     return level.means[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)];
 }
+
+struct TexturedLight {
+    const TextureDetail* texture = nullptr; // none: luminances are the vertices' alone
+    float dark = 0;                         // the luminance of what is black
+
+    // Floats, or registers of them.
+    template <class Floats>
+    UNSEEN_INLINE Floats with_texture(Floats luminance, Floats its_texture) const {
+        return dark + (luminance - dark) * its_texture;
+    }
+
+    // Over a triangle, of its corners' luminances and texture coordinates. There must be a texture.
+    float mean(const std::array<float, 3>& luminance, const std::array<glm::vec2, 3>& uv) const;
+};
+
+// Texels a mesh unit, along the surface's direction with the fewest and with the most: the squares' means by area.
+struct TextureDensity {
+    float least = 0, most = 0;
+    float mean = 0; // of the texture's luminance there, by area
+};
+
+class TextureDensities {
+public:
+    // Cost: one pass over the triangles.
+    TextureDensities(const vdtree::SoundTree& tree, const TextureDetail& texture);
+
+    // Of the mesh's triangles that vanish under a node, and of these others around it.
+    TextureDensity of(vdtree::NodeId node, std::span<const vdtree::Index> around) const;
+
+private:
+    struct Sum {
+        double area = 0, least = 0, most = 0, light = 0; // the others times the area
+        Sum& operator+=(const Sum& other) {
+            area += other.area, least += other.least, most += other.most, light += other.light;
+            return *this;
+        }
+    };
+    Sum between(vdtree::Index first, vdtree::Index end) const; // triangles
+
+    std::vector<Sum> before_triangle_;
+    std::span<const vdtree::NodeId> subtree_end_;
+    std::span<const vdtree::Index> first_triangle_;
+};
 
 } // namespace unseen::perception

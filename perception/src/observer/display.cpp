@@ -3,15 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 namespace {
 
-Error bad(std::string message) { return Error{ErrorCode::invalid_argument, "display: " + std::move(message)}; }
+Error bad(std::string message) { return invalid_argument("display: " + std::move(message)); }
 
 // !(value > 0) is true for NaN as well.
 bool positive(double value) { return value > 0 && std::isfinite(value); }
@@ -105,32 +105,26 @@ Result<void> validate(const Display& d) {
     if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
     if (d.height_px > most_pixels)
         return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
-    if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m)) {
+    if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m))
         return bad(
             "pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " +
             number_text(d.pixel_pitch.value()));
-    }
-    if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m)) {
+    if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m))
         return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number_text(d.distance.value()));
-    }
-    if (!positive(pixels_per_degree(d).value())) {
+    if (!positive(pixels_per_degree(d).value()))
         return bad("pixel_pitch_m " + number_text(d.pixel_pitch.value()) + " m at viewing_distance_m " +
                    number_text(d.distance.value()) + " m gives no finite number of pixels per degree");
-    }
     if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
         return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number_text(d.peak.value()));
-    if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak)) {
+    if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak))
         return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number_text(d.peak.value()) +
                    " cd/m2, but is " + number_text(d.black.value()));
-    }
     if (auto ok = check_transfer(d); !ok) return ok;
     if (auto ok = check_lens(d); !ok) return ok;
-    if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux)) {
+    if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux))
         return bad("ambient_lux must be 0 to 1e6 lux, but is " + number_text(d.ambient.value()));
-    }
-    if (!(d.reflectivity >= 0 && d.reflectivity <= 1)) {
+    if (!(d.reflectivity >= 0 && d.reflectivity <= 1))
         return bad("reflectivity must lie in 0..1, but is " + number_text(d.reflectivity));
-    }
     return {};
 }
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
-#include <string>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>

@@ -2,11 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include <unseen/perception/gaze.h>
 #include <unseen/vdtree/internal/input_file.h>
@@ -304,9 +300,10 @@ private:
         std::vector<std::size_t> flags;
         for (std::size_t i = 0; i < columns_.size(); ++i) {
             const Column& column = columns_[i];
-            if (column.eye != eye) continue;
+            if (column.eye != eye && column.eye != Eye::both) continue;
             if (column.role >= Role::confidence && column.role <= Role::blink_id) flags.push_back(i);
-            if ((column.role != Role::x && column.role != Role::y) || column.unit != unit) continue;
+            if (column.eye != eye || (column.role != Role::x && column.role != Role::y) || column.unit != unit)
+                continue;
             std::optional<std::size_t>& axis = column.role == Role::x ? x : y;
             if (axis)
                 return malformed(i, "says the same as column " + std::to_string(*axis + 1) + ": rename one of them");
@@ -326,11 +323,6 @@ private:
                     if (*found) eyes_.push_back(std::move(**found));
                 }
                 if (eyes_.empty()) continue;
-                // Of both eyes alike.
-                for (std::size_t i = 0; i < columns_.size() && eyes != std::vector{Eye::both}; ++i)
-                    if (columns_[i].eye == Eye::both && columns_[i].role >= Role::confidence &&
-                        columns_[i].role <= Role::blink_id)
-                        for (EyeColumns& eye : eyes_) eye.flags.push_back(i);
                 unit_ = unit == Unit::share && has(Role::on_surface) ? Unit::share_up : unit;
                 return {};
             }

@@ -3,8 +3,10 @@
 
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
@@ -38,5 +40,13 @@ bool has_chroma(const vdtree::VertexTree& tree);
 // of these alone. Includes the children's. Empty where has_chroma() is false. Cost: one pass over the triangles and the
 // nodes, in parallel; so a tree for which nobody asks pays nothing. Fails where VertexTree::check() does.
 Result<std::vector<ChromaRange>> ring_chroma(const vdtree::VertexTree& tree);
+
+// How a vertex is drawn: its colour scaled to its luminance.
+glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance);
+
+inline constexpr ChromaRange no_chroma_yet{glm::vec2(1e30f), glm::vec2(-1e30f)};
+inline ChromaRange unite(const ChromaRange& a, const ChromaRange& b) {
+    return {glm::min(a.lo, b.lo), glm::max(a.hi, b.hi)};
+}
 
 } // namespace unseen::perception

@@ -1,7 +1,4 @@
-#include "measure/lit_stages.h"
-
-#include <algorithm>
-#include <cmath>
+#include "measure/fold_stages.h"
 
 namespace unseen::perception {
 

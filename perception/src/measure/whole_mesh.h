@@ -1,16 +1,10 @@
-// Folds a tree in stages, and measures what pictures of them show.
+// What folds change of the whole mesh: what pictures of it show, folded in stages, and what the errors of many folds add
+// up to.
 #pragma once
 
-#include <span>
-#include <vector>
-
-#include <unseen/vdtree/vertex_tree.h>
-
 #include "fold/fold_errors.h"
-#include "measure/fold_stages.h"
-#include "measure/lit_stages.h"
 #include "measure/measuring_progress.h"
-#include "measure/textured_light.h"
+#include "measure/texture_detail.h"
 
 namespace unseen::perception {
 
@@ -27,5 +21,15 @@ std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, const Textured
 LitStages find_lit_stages(const vdtree::SoundTree& tree, const TexturedLight& texture,
                           std::span<const FoldTexture> textures, std::span<FoldError> errors,
                           MeasuringProgress& progress);
+
+// Reads the luminance errors and extents, and adds the bias. Cost: as of folding the mesh once, one node after the
+// other. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that.
+void find_luminance_bias(const vdtree::SoundTree& tree, const TexturedLight& light,
+                         std::span<const FoldTexture> textures, std::span<FoldError> errors);
+
+// The radius of what a fold of the node changes, in mesh units.
+inline float changed_radius(const vdtree::VertexTree& tree, std::span<const FoldError> errors, vdtree::NodeId node) {
+    return std::max(tree.support_spheres()[node].radius, errors[node].extent);
+}
 
 } // namespace unseen::perception
