@@ -2,6 +2,9 @@
 // nothing is left behind, and memory is bounded by what a file can justify.
 #include <sys/stat.h>
 
+#include <nlohmann/json.hpp>
+
+#include "mesh_files.h"
 #include "run_command.h"
 
 namespace unseen::app::testing {
@@ -81,6 +84,23 @@ TEST_F(HostileFilesTest, OverwriteNothingThatTheModelNames) {
     }
     EXPECT_EQ(files(), before);
     EXPECT_TRUE(read_text(path("tex.png")) == texture && read_text(path("ball.mtl")) == library);
+}
+
+TEST_F(HostileFilesTest, AreNotQuotedAtLength) {
+    nlohmann::json scene = nlohmann::json::parse(mesh_files::gltf_triangle_json(
+        R"([{"mesh":0,"name":"a"},{"mesh":0,"name":"b"}])", R"({"byteLength":42,"uri":"triangle.bin"})"));
+    write_text(path("triangle.bin"), mesh_files::gltf_triangle_data());
+    const auto printed_of = [&](const nlohmann::json& document) {
+        write_text(path("long.gltf"), document.dump());
+        const Outcome outcome = run({"info", "long.gltf", "--as", "scene"});
+        return outcome.out.size() + outcome.err.size();
+    };
+    const std::size_t usual = printed_of(scene);
+    nlohmann::json named = scene, typed = scene, extended = scene;
+    named["nodes"][0]["name"] = std::string(1'000'000, 'n');
+    typed["accessors"][0]["type"] = std::string(100'000, 't');
+    for (int i = 0; i < 10'000; ++i) extended["extensionsUsed"].push_back("extension " + std::to_string(i));
+    for (const nlohmann::json& document : {named, typed, extended}) EXPECT_LT(printed_of(document), usual + 5000);
 }
 
 TEST_F(HostileFilesTest, RefuseEmptyValues) {
