@@ -12,7 +12,6 @@
 
 #include <unseen/vdtree/internal/team.h>
 
-#include "build/help_cluster.h"
 #include "build/quadric_contraction.h"
 #include "build/surface.h"
 #include "clustering_tools.h"
@@ -229,7 +228,7 @@ TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
             for (int rank = 1; rank < members; ++rank)
                 others.emplace_back([&, rank] {
                     ThreadTeam team(mail, rank, members);
-                    EXPECT_TRUE(help_cluster_quadric(task.input(), team));
+                    EXPECT_TRUE(cluster_quadric(task.input(), {}, &team));
                 });
             ThreadTeam team(mail, 0, members);
             const auto together = cluster_quadric(task.input(), {}, &team);
@@ -238,46 +237,6 @@ TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
             EXPECT_TRUE(equal(alone, *together)) << members << " members";
             EXPECT_TRUE(mail.all_empty());
         }
-    }
-}
-
-TEST(SurfaceAnalysis, IsTheSameWithATeamOfAnySize) {
-    for (const Hard& hard : hard_meshes) {
-        SCOPED_TRACE(hard.name);
-        const Mesh mesh = hard.make();
-        const std::vector<Index> coincident = find_coincident(mesh.positions);
-        const Surface alone = analyse_surface(mesh.view(), coincident);
-        const auto expect_same = [&](const Result<Surface>& surface) {
-            ASSERT_TRUE(surface) << surface.error().message;
-            EXPECT_EQ(surface->closedness, alone.closedness);
-            EXPECT_EQ(surface->irregular, alone.irregular);
-            EXPECT_EQ(surface->areas, alone.areas);
-            EXPECT_EQ(surface->normals, alone.normals);
-        };
-        for (const int members : {1, 3}) {
-            Mailboxes mail;
-            std::vector<std::thread> others;
-            const auto analyse = [&](int rank) {
-                ThreadTeam team(mail, rank, members);
-                expect_same(analyse_surface(mesh.view(), coincident, team));
-            };
-            for (int rank = 1; rank < members; ++rank) others.emplace_back(analyse, rank);
-            analyse(0);
-            for (std::thread& other : others) other.join();
-            EXPECT_TRUE(mail.all_empty());
-        }
-    }
-}
-
-TEST(SurfaceAnalysis, RefusesWhatIsNoMessageOfTheTeam) {
-    const Mesh mesh = shapes::bumpy_sphere(3);
-    for (const std::size_t length : {0u, 7u, 8u, 100u}) {
-        Mailboxes mail;
-        mail.put(1, 0, std::vector<std::byte>(length, std::byte{0xff}));
-        ThreadTeam team(mail, 0, 2);
-        const auto surface = analyse_surface(mesh.view(), find_coincident(mesh.positions), team);
-        ASSERT_FALSE(surface);
-        EXPECT_EQ(surface.error().code, ErrorCode::malformed_data);
     }
 }
 
@@ -452,7 +411,7 @@ TEST(QuadricParts, KeepTheEdgesThatLeaveThemUntilTheyAreJoined) {
     const auto go_on = [](std::size_t) { return true; };
     const Contraction left = contract_part(s.left, 6, go_on), right = contract_part(s.right, 6, go_on);
     EXPECT_LE(left.live.size(), 6u);
-    EXPECT_EQ(left.merges.size() + left.live.size(), 16u);
+    EXPECT_EQ(left.record.merges.size() + left.live.size(), 16u);
     ASSERT_FALSE(left.outer_edges.empty());
     for (const auto& edge : left.outer_edges) EXPECT_TRUE(edge.far_slot == 16 || edge.far_slot == 17);
     ASSERT_EQ(left.border_slots.size(), 2u);
@@ -461,7 +420,7 @@ TEST(QuadricParts, KeepTheEdgesThatLeaveThemUntilTheyAreJoined) {
 
     // Joined without any contraction, the edges between the two are pairs now.
     const Contraction both = join(left, right, 100, go_on);
-    EXPECT_TRUE(both.merges.empty());
+    EXPECT_TRUE(both.record.merges.empty());
     EXPECT_TRUE(both.outer_edges.empty());
     EXPECT_EQ(both.live.size(), left.live.size() + right.live.size());
     const auto shift = static_cast<Index>(left.live.size());
@@ -470,8 +429,8 @@ TEST(QuadricParts, KeepTheEdgesThatLeaveThemUntilTheyAreJoined) {
 
     const Contraction all = join(left, right, 1, go_on);
     EXPECT_EQ(all.live.size(), 1u);
-    EXPECT_EQ(all.merges.size() + left.merges.size() + right.merges.size(), 31u);
-    EXPECT_EQ(all.round_ends.back(), all.merges.size());
+    EXPECT_EQ(all.record.merges.size() + left.record.merges.size() + right.record.merges.size(), 31u);
+    EXPECT_EQ(all.record.round_ends.back(), all.record.merges.size());
 }
 
 TEST(QuadricParts, StopWhenToldTo) {

@@ -9,21 +9,22 @@
 #include <optional>
 #include <string>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <tbb/global_control.h>
 
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
-#include "build/help_cluster.h"
 #include "build/order_nodes.h"
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
+#include "build/spatial_order.h"
 #include "build/surface.h"
 #include "tree/mask_pool.h"
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/texture_fit.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
@@ -43,30 +44,6 @@ constexpr double smallest_size = 1e-36;
 
 // Places that doubles tell apart along the mesh, at least: fewer, far away from the origin, leave no surface.
 constexpr double fewest_places = 256;
-
-// Tells the caller how far the build is.
-class Reporter {
-public:
-    explicit Reporter(const Progress& progress) : progress_(progress) {}
-    bool cancelled(double share, const char* stage) { return progress_ && !progress_(share, stage); }
-
-private:
-    const Progress& progress_; // of the build's options
-};
-
-// How many threads may work, from its last use until it is destroyed.
-class ThreadLimit {
-public:
-    // 0: no limit.
-    void set(int threads) {
-        control_.reset();
-        if (threads > 0)
-            control_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-    }
-
-private:
-    std::optional<tbb::global_control> control_;
-};
 
 // Gives memory back that is not needed any more.
 template <class T>
@@ -122,13 +99,11 @@ CleanMesh clean(const MeshView& mesh) {
     }
     std::vector<std::uint8_t> used(mesh.positions.size(), 0);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        if (uses_a_vertex_twice(mesh.triangles[t])) {
-            ++out.dropped;
-            continue;
-        }
+        if (uses_a_vertex_twice(mesh.triangles[t])) continue;
         out.source_triangles.push_back(static_cast<Index>(t));
         for (const Index v : mesh.triangles[t]) used[v] = 1;
     }
+    out.dropped = mesh.triangles.size() - out.source_triangles.size();
     std::vector<Index> clean_number(mesh.positions.size(), 0);
     for (std::size_t v = 0; v < used.size(); ++v) {
         clean_number[v] = static_cast<Index>(out.source_vertices.size());
@@ -152,13 +127,10 @@ CleanMesh clean(const MeshView& mesh) {
 // sign and the largest is at most twice the smallest, their differences are exact (Sterbenz), else the axis keeps 0.
 // Coordinates of double precision then lose at most half a unit in the last place of a float of the extent's size.
 glm::dvec3 choose_origin(std::span<const glm::dvec3> positions) {
-    glm::dvec3 low = positions[0], high = low, origin(0);
-    for (const glm::dvec3& p : positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
+    const Box box = box_around(positions);
+    glm::dvec3 origin(0);
     for (int axis = 0; axis < 3; ++axis) {
-        const double a = low[axis], b = high[axis];
+        const double a = box.low[axis], b = box.high[axis];
         if (a > 0 && b <= 2 * a) origin[axis] = static_cast<double>(static_cast<float>(a));
         if (b < 0 && a >= 2 * b) origin[axis] = static_cast<double>(static_cast<float>(b));
     }
@@ -171,30 +143,30 @@ bool fits_floats(glm::dvec3 p) {
 }
 
 Result<void> check(const Clustering& c, std::size_t vertices) {
-    const auto invalid = [](const std::string& what) { return Error{ErrorCode::invalid_argument, what}; };
     if (c.parents.size() <= vertices)
-        return invalid("The clustering of " + std::to_string(vertices) + " vertices has only " +
-                       std::to_string(c.parents.size()) + " clusters; it needs the vertices and a root.");
-    if (c.parents.size() >= no_node) return invalid("The clustering has more than 2^32 - 2 clusters.");
+        return invalid_argument("The clustering of " + std::to_string(vertices) + " vertices has only " +
+                                std::to_string(c.parents.size()) + " clusters; it needs the vertices and a root.");
+    if (c.parents.size() >= no_node) return invalid_argument("The clustering has more than 2^32 - 2 clusters.");
     if (!c.positions.empty() && c.positions.size() != c.parents.size() - vertices)
-        return invalid("The clustering has " + std::to_string(c.positions.size()) + " proxies for " +
-                       std::to_string(c.parents.size() - vertices) + " clusters.");
+        return invalid_argument("The clustering has " + std::to_string(c.positions.size()) + " proxies for " +
+                                std::to_string(c.parents.size() - vertices) + " clusters.");
     const std::size_t root = c.parents.size() - 1;
     if (c.parents[root] != root)
-        return invalid("The last cluster, " + std::to_string(root) + ", is the root and has the parent " +
-                       std::to_string(c.parents[root]) + "; the root's is its own number.");
+        return invalid_argument("The last cluster, " + std::to_string(root) + ", is the root and has the parent " +
+                                std::to_string(c.parents[root]) + "; the root's is its own number.");
     for (std::size_t i = 0; i < root; ++i) {
         if (!(c.parents[i] > i && c.parents[i] <= root) || c.parents[i] < vertices)
-            return invalid("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
-                           "; a parent is a cluster with a higher number.");
+            return invalid_argument("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
+                                    "; a parent is a cluster with a higher number.");
     }
     std::vector<std::uint8_t> has_child(c.parents.size(), 0);
     for (std::size_t i = 0; i < root; ++i) has_child[c.parents[i]] = 1;
     for (std::size_t i = vertices; i <= root; ++i)
-        if (!has_child[i]) return invalid("Cluster " + std::to_string(i) + " has no children.");
+        if (!has_child[i]) return invalid_argument("Cluster " + std::to_string(i) + " has no children.");
     for (std::size_t i = 0; i < c.positions.size(); ++i)
         if (!fits_floats(c.positions[i]))
-            return invalid("The proxy of cluster " + std::to_string(vertices + i) + " is not finite or too far away.");
+            return invalid_argument("The proxy of cluster " + std::to_string(vertices + i) +
+                                    " is not finite or too far away.");
     return {};
 }
 
@@ -203,8 +175,8 @@ Result<void> check(const Light& light) {
     constexpr float unit_slack = 1e-3f; // directions given with three digits
     if (!(std::abs(length - 1) <= unit_slack) || !(light.ambient >= 0 && light.ambient <= 1) ||
         !(light.fill >= 0 && light.fill <= 1))
-        return Error{ErrorCode::invalid_argument,
-                     "The light needs a direction of length 1, and shares of ambient and fill light from 0 to 1."};
+        return invalid_argument(
+            "The light needs a direction of length 1, and shares of ambient and fill light from 0 to 1.");
     return {};
 }
 
@@ -212,25 +184,22 @@ Result<void> check(const Light& light) {
 // point are as they are meant to be.
 Result<void> check_size(std::span<const glm::dvec3> positions) {
     if (positions.empty()) return {};
-    glm::dvec3 low = positions.front(), high = low;
-    for (const glm::dvec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
-    const glm::dvec3 sides = high - low;
-    const double size = std::max({sides.x, sides.y, sides.z});
+    const Box box = box_around(positions);
+    const double size = box.extent();
     if (size == 0) return {};
     const auto text = [](double value) { return rounded(value, 3); };
     if (size < smallest_size)
-        return Error{ErrorCode::invalid_argument, "The mesh is " + text(size) + " units large, and at least " +
-                                                      text(smallest_size) +
-                                                      " are needed: scale it up, or write it in a smaller unit."};
+        return invalid_argument("The mesh is " + text(size) + " units large, and at least " + text(smallest_size) +
+                                " are needed: scale it up, or write it in a smaller unit.");
     for (int axis = 0; axis < 3; ++axis) {
-        const double farthest = std::max(std::abs(low[axis]), std::abs(high[axis]));
+        const double farthest = std::max(std::abs(box.low[axis]), std::abs(box.high[axis]));
         const double step = std::nextafter(farthest, std::numeric_limits<double>::infinity()) - farthest;
-        const double places = sides[axis] > 0 ? fewest_places : 1; // flat walls are as exact there as anywhere
+        const double places = box.size()[axis] > 0 ? fewest_places : 1; // flat walls are as exact there as anywhere
         if (step * places > size)
-            return Error{ErrorCode::invalid_argument,
-                         "The mesh is " + text(size) + " units large and lies " + text(farthest) +
-                             " from the origin, where coordinates are " + text(step) +
-                             " apart, so that its shape is lost: move it nearer to the origin where it is made."};
+            return invalid_argument(
+                "The mesh is " + text(size) + " units large and lies " + text(farthest) +
+                " from the origin, where coordinates are " + text(step) +
+                " apart, so that its shape is lost: move it nearer to the origin where it is made.");
     }
     return {};
 }
@@ -262,15 +231,18 @@ Result<void> check_attributes(const MeshView& mesh) {
 // Moves what was measured to the tree's arrays.
 class TreeBuilder {
 public:
-    TreeBuilder(const MeshView& source, const CleanMesh& mesh, const BuildOptions& options, Reporter& reporter,
-                ThreadLimit& limit)
-        : source_(source), mesh_(mesh.view), clean_(mesh), options_(options), reporter_(reporter), limit_(limit) {}
+    TreeBuilder(const MeshView& source, const BuildOptions& options) : source_(source), options_(options) {}
 
     Result<VertexTree> build(const Clusterer& clusterer);
     Result<void> help();
 
 private:
-    Result<void> analyse();
+    bool is_cancelled(double share, const char* stage) const {
+        return options_.progress && !options_.progress(share, stage);
+    }
+    void limit_threads(int threads);
+    Result<void> clean_up();
+    void analyse();
     std::vector<float> find_luminance() const;
     Result<Clustering> cluster(const Clusterer& clusterer);
     void order(const Clustering& clustering);
@@ -282,11 +254,10 @@ private:
     std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
 
     const MeshView& source_;
-    const MeshView& mesh_;
-    const CleanMesh& clean_;
     const BuildOptions& options_;
-    Reporter& reporter_;
-    ThreadLimit& limit_;
+    std::optional<tbb::global_control> limit_;
+    CleanMesh clean_;
+    const MeshView& mesh_ = clean_.view;
 
     bool prelit_ = false;
     std::vector<Index> coincident_;
@@ -296,21 +267,37 @@ private:
     std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
 };
 
+// 0: no limit. Until the tree is built.
+void TreeBuilder::limit_threads(int threads) {
+    limit_.reset();
+    if (threads > 0) limit_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+}
+
+Result<void> TreeBuilder::clean_up() {
+    if (const auto valid = check_buildable(source_, options_); !valid) return valid.error();
+    limit_threads(options_.threads);
+    clean_ = clean(source_);
+    if (mesh_.triangles.empty())
+        return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
+    return {};
+}
+
 Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
-    if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
-    if (const auto analysed = analyse(); !analysed) return analysed.error();
-    if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
+    if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+    if (is_cancelled(0.0, "analysing")) return cancelled_error();
+    analyse();
+    if (is_cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
         const Result<Clustering> clustering = cluster(clusterer);
         if (!clustering) return clustering.error();
-        if (options_.team) limit_.set(options_.threads_alone);
-        if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
+        if (options_.team) limit_threads(options_.threads_alone);
+        if (is_cancelled(clustering_ends, "ordering")) return cancelled_error();
         order(*clustering);
         place_vertices(*clustering);
         release(surface_.areas); // bounding is what takes most memory
         release(surface_.normals);
     }
-    if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
+    if (is_cancelled(0.8, "bounding")) return cancelled_error();
     bound();
     if (is_textured()) lay_texture();
 
@@ -322,27 +309,23 @@ Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     data->light = std::make_shared<TreeLuminance>(
         derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured(), nullptr));
     data->geometry = std::move(g_);
-    if (reporter_.cancelled(1.0, "done")) return cancelled_error();
+    if (is_cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));
 }
 
 Result<void> TreeBuilder::help() {
-    if (const auto analysed = analyse(); !analysed) return analysed.error();
+    if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+    analyse();
     const std::vector<float> luminance = find_luminance();
-    return help_cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, *options_.team);
+    const auto helped =
+        cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, {}, options_.team);
+    return helped ? Result<void>() : helped.error();
 }
 
-Result<void> TreeBuilder::analyse() {
+void TreeBuilder::analyse() {
     prelit_ = options_.prelit && (!mesh_.colours.empty() || is_textured());
     coincident_ = find_coincident(mesh_.positions);
-    if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
-        surface_ = analyse_surface(mesh_, coincident_);
-        return {};
-    }
-    auto together = analyse_surface(mesh_, coincident_, *options_.team);
-    if (!together) return together.error();
-    surface_ = std::move(*together);
-    return {};
+    surface_ = analyse_surface(mesh_, coincident_);
 }
 
 std::vector<float> TreeBuilder::find_luminance() const {
@@ -487,24 +470,6 @@ void TreeBuilder::bound() {
     g_->triangles = std::move(triangles.triangles);
 }
 
-// Hands the mesh without what cannot be built on to `work`.
-template <class Value, class Work>
-Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Work&& work) {
-    if (const auto valid = check_buildable(mesh, options); !valid) return valid.error();
-    ThreadLimit limit;
-    limit.set(options.threads);
-    const CleanMesh cleaned = clean(mesh);
-    if (cleaned.view.triangles.empty())
-        return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
-    Reporter reporter(options.progress);
-    TreeBuilder builder(mesh, cleaned, options, reporter, limit);
-    return work(builder);
-}
-
-Result<VertexTree> build_with(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
-    return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
-}
-
 } // namespace
 
 std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadric ? "quadric" : "octree"; }
@@ -514,22 +479,22 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
     if (const auto valid = check_attributes(mesh); !valid) return valid.error();
     if (const auto valid = check(options.light); !valid) return valid.error();
     if (options.threads < 0 || options.threads_alone < 0)
-        return Error{ErrorCode::invalid_argument, "The number of threads must be 0 or more."};
+        return invalid_argument("The number of threads must be 0 or more.");
     return {};
 }
 
 Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
     if (options.team)
-        return Error{ErrorCode::invalid_argument,
-                     "A team helps with quadric clustering only: leave it out where the clustering is your own."};
-    return build_with(mesh, clusterer, options);
+        return invalid_argument(
+            "A team helps with quadric clustering only: leave it out where the clustering is your own.");
+    return TreeBuilder(mesh, options).build(clusterer);
 }
 
 Result<void> help_build_tree(const MeshView& mesh, const BuildOptions& options) {
     if (!options.team || options.team->rank() < 1)
-        return Error{ErrorCode::invalid_argument, "Only members of a team other than its first help to build a tree."};
+        return invalid_argument("Only members of a team other than its first help to build a tree.");
     if (options.clusterer != ClustererKind::quadric) return check_buildable(mesh, options);
-    return with_builder<void>(mesh, options, [](TreeBuilder& builder) { return builder.help(); });
+    return TreeBuilder(mesh, options).help();
 }
 
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options) {
@@ -537,13 +502,10 @@ Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options)
         return options.progress(clustering_begins + share * (clustering_ends - clustering_begins), stage);
     };
     const Progress progress = options.progress ? Progress(report) : Progress();
-    return build_with(
-        mesh,
-        [&](const ClusterInput& input) {
-            return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)
-                                                              : cluster_quadric(input, progress, options.team);
-        },
-        options);
+    return TreeBuilder(mesh, options).build([&](const ClusterInput& input) {
+        return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)
+                                                          : cluster_quadric(input, progress, options.team);
+    });
 }
 
 } // namespace unseen::vdtree

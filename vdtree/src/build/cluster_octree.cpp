@@ -9,8 +9,7 @@
 #include <bit>
 #include <numeric>
 #include <span>
-
-#include <glm/common.hpp>
+#include <utility>
 
 #include <unseen/vdtree/internal/parallel.h>
 
@@ -88,19 +87,13 @@ private:
     // points that are farthest apart along some axis from each other, and each is 2^21 times finer than the last, so
     // that this ends within a hundred grids, where doubles end.
     ClusterRef build_cell(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
-        glm::dvec3 low = positions_[items[0].index], high = low;
-        for (const CodedIndex& item : items) {
-            low = glm::min(low, positions_[item.index]);
-            high = glm::max(high, positions_[item.index]);
-        }
-        const glm::dvec3 size = high - low;
-        const double extent = std::max({size.x, size.y, size.z});
-        if (!(extent > 0)) {
+        const Box box = box_around(items, [&](const CodedIndex& item) { return positions_[item.index]; });
+        if (!(box.extent() > 0)) {
             std::vector<ClusterRef> vertices;
             for (const CodedIndex& item : items) vertices.push_back(item.index);
             return join(vertices);
         }
-        const MortonGrid grid(low, extent);
+        const MortonGrid grid(box);
         for (CodedIndex& item : items) item.code = grid.code(positions_[item.index]);
         return build(items, scratch);
     }
@@ -144,17 +137,6 @@ private:
                       [&](std::size_t chunk) { f(chunk, chunk * chunk_size, std::min(n, (chunk + 1) * chunk_size)); });
     }
 
-    MortonGrid bounding_cube() const {
-        glm::dvec3 low = positions_[0], high = low;
-        for (const glm::dvec3& p : positions_) {
-            low = glm::min(low, p);
-            high = glm::max(high, p);
-        }
-        const glm::dvec3 size = high - low;
-        const double extent = std::max({size.x, size.y, size.z});
-        return {low + (size - extent) * 0.5, extent};
-    }
-
     // Codes the vertices and sorts them into buckets by their first digits; the order within a bucket is the vertices'.
     void deal() {
         const std::size_t n = positions_.size();
@@ -163,7 +145,8 @@ private:
         const int shift = code_bits - digit_bits * digits;
         const std::size_t buckets = std::size_t{1} << (digit_bits * digits);
         const std::size_t chunks = (n + chunk_size - 1) / chunk_size;
-        const MortonGrid grid = bounding_cube();
+        const Box box = box_around(positions_);
+        const MortonGrid grid(box.low + (box.size() - box.extent()) * 0.5, box.extent()); // the cube around it
         ParallelArray<CodedIndex> coded(n, Unfilled());
         std::vector<Index> next(chunks * buckets, 0);
         for_each_chunk([&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -175,11 +158,8 @@ private:
         Index sum = 0;
         for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
             if (bucket_begin_.empty() || sum != bucket_begin_.back()) bucket_begin_.push_back(sum);
-            for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-                const Index count = next[chunk * buckets + bucket];
-                next[chunk * buckets + bucket] = sum;
-                sum += count;
-            }
+            for (std::size_t chunk = 0; chunk < chunks; ++chunk)
+                sum += std::exchange(next[chunk * buckets + bucket], sum);
         }
         if (sum != bucket_begin_.back()) bucket_begin_.push_back(sum);
         items_ = ParallelArray<CodedIndex>(n, Unfilled());

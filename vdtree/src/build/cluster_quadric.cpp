@@ -23,7 +23,6 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/team.h>
 
-#include "build/help_cluster.h"
 #include "build/progress_counter.h"
 #include "build/quadric.h"
 #include "build/quadric_contraction.h"
@@ -94,19 +93,6 @@ private:
         glm::dvec3 at;
         Index slot;
     };
-    struct Box {
-        glm::dvec3 low, size;
-        double extent() const { return std::max({size.x, size.y, size.z}); }
-    };
-    static Box box(std::span<const Item> items) {
-        glm::dvec3 low = items[0].at, high = low;
-        for (const Item& item : items) {
-            low = glm::min(low, item.at);
-            high = glm::max(high, item.at);
-        }
-        return {low, high - low};
-    }
-
     // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are
     // in one of the two arrays.
     void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
@@ -125,8 +111,8 @@ private:
     // compared.
     static void halve(std::span<const Item> from, std::span<Item> to, std::size_t left) {
         constexpr std::size_t slices = 2048;
-        const Box bounds = box(from);
-        const glm::dvec3 size = bounds.size;
+        const Box bounds = box_around(from, &Item::at);
+        const glm::dvec3 size = bounds.size();
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
         const double low = bounds.low[axis], slices_per_length = slices / size[axis];
         const double scale = std::isfinite(slices_per_length) ? slices_per_length : 0;
@@ -153,8 +139,7 @@ private:
 
     // Equal codes by vertex number.
     static void sort_along_curve(std::span<const Item> items, std::span<Index> slots) {
-        const Box bounds = box(items);
-        const MortonGrid grid(bounds.low, bounds.extent());
+        const MortonGrid grid(box_around(items, &Item::at));
         std::vector<CodedIndex> keys(items.size()), scratch(items.size());
         for (std::size_t i = 0; i < items.size(); ++i) keys[i] = {grid.code(items[i].at), items[i].slot};
         sort_by_code(keys, scratch);
@@ -298,14 +283,9 @@ private:
 };
 
 void PartMaker::measure() {
-    glm::dvec3 low = input_.mesh.positions[0], high = low;
-    for (const glm::dvec3& p : input_.mesh.positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
-    }
-    const glm::dvec3 size = high - low;
-    const double extent = std::max({size.x, size.y, size.z});
-    centre_ = low + size * 0.5;
+    const Box box = box_around(input_.mesh.positions);
+    const double extent = box.extent();
+    centre_ = box.low + box.size() * 0.5;
     scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
     double largest = 0;
     for (const double a : input_.areas) largest = std::max(largest, a);
@@ -363,11 +343,7 @@ void PartMaker::list_triangles() {
     std::size_t sum = 0;
     for (std::size_t part = 0; part < parts; ++part) {
         first_triangle_[part] = sum;
-        for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-            const std::size_t uses = next[chunk * parts + part];
-            next[chunk * parts + part] = sum;
-            sum += uses;
-        }
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sum += std::exchange(next[chunk * parts + part], sum);
     }
     first_triangle_[parts] = sum;
     triangles_.resize(sum);
@@ -453,31 +429,16 @@ PartMesh PartMaker::make(std::size_t part) const {
 
 // ---- the whole
 
-// What a contraction leaves when it has been joined into another.
-struct MergeRecord {
-    std::vector<Merge> merges;
-    std::vector<glm::dvec3> places;
-    std::vector<float> deviations;
-    std::vector<Index> round_ends;
-    std::vector<Contraction::Vanishing> vanishings;
-};
-
-MergeRecord take_record(Contraction& c) {
-    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends),
-            std::move(c.vanishings)};
-}
-
-// Everything that is in a record, or in a contraction without its record, for a MessageWriter or a MessageReader.
+// A contraction's record, or everything else of it, for a MessageWriter or a MessageReader.
 template <class Record, class Message>
 void exchange_record(Record& r, Message& message) {
-    message(r.merges), message(r.places), message(r.deviations), message(r.round_ends), message(r.vanishings);
+    message(r.merges), message(r.round_ends), message(r.vanishings);
 }
 
 template <class Joinable, class Message>
 void exchange_joinable(Joinable& c, Message& message) {
     message(c.first_slot), message(c.end_slot), message(c.channels);
-    message(c.live.names), message(c.live.places), message(c.live.references), message(c.live.deviations);
-    message(c.live.made_by), message(c.live.vanishing), message(c.live.quadrics);
+    message(c.live.clusters), message(c.live.places), message(c.live.references), message(c.live.quadrics);
     message(c.pairs), message(c.outer_edges), message(c.border_slots);
 }
 
@@ -526,7 +487,7 @@ private:
                         next[i] = join(current[2 * i], current[2 * i + 1], target, after_round);
                         current[2 * i] = current[2 * i + 1] = {};
                     }
-                    level[i] = take_record(next[i]);
+                    level[i] = std::exchange(next[i].record, {});
                 }
             },
             tbb::simple_partitioner());
@@ -577,7 +538,7 @@ private:
     // Without the last triangles nothing is left of the model: that strays as far as it is large.
     void finish(const Contraction& whole) {
         constexpr float whole_extent = 1;
-        const Index last = whole.live.vanishing[0];
+        const Index last = whole.live[0].vanishing;
         if (last != no_merge) levels_.back()[0].vanishings.push_back({last, whole_extent});
     }
 
@@ -641,8 +602,8 @@ private:
             Index parent = first_of_round_[number][round];
             for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i, ++parent) {
                 const Merge& merge = record.merges[i];
-                result_.positions[parent - vertices()] = maker_.from_unit_box(record.places[i]);
-                result_.deviations[parent - vertices()] = maker_.length_from_unit_box(record.deviations[i]);
+                result_.positions[parent - vertices()] = maker_.from_unit_box(merge.place);
+                result_.deviations[parent - vertices()] = maker_.length_from_unit_box(merge.deviation);
                 result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
                 cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
             }
@@ -692,6 +653,7 @@ private:
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
     const std::size_t slots = slot_count(input.coincident);
     const Members members{team, part_count(slots)};
+    if (!members.has_part()) return Clustering();
     ProgressCounter counter(progress, (slots - 1) / members.count()); // each counts its own merges
     if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
     const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
@@ -699,20 +661,8 @@ Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& pr
     const PartMaker maker(input, *numbering);
     auto levels = PartContractor(maker, members, counter).run();
     if (!levels) return levels.error();
+    if (members.rank() != 0) return Clustering();
     return ClusteringWriter(input, *numbering, maker).write(*levels);
-}
-
-Result<void> help_cluster_quadric(const ClusterInput& input, Team& team) {
-    const std::size_t slots = slot_count(input.coincident);
-    const Members members{&team, part_count(slots)};
-    if (!members.has_part()) return {};
-    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
-    if (!numbering) return numbering.error();
-    const PartMaker maker(input, *numbering);
-    ProgressCounter counter({}, slots - 1);
-    const auto levels = PartContractor(maker, members, counter).run();
-    if (!levels) return levels.error();
-    return {};
 }
 
 } // namespace unseen::vdtree

@@ -85,14 +85,10 @@ private:
 
     void make_clusters() {
         LiveClusters& live = result_.live;
-        live.names.resize(own_);
-        std::iota(live.names.begin(), live.names.end(), part_.first_slot);
+        for (Index s = 0; s < own_; ++s) live.clusters.push_back({part_.first_slot + s, 0});
         live.places.assign(part_.positions.begin(), part_.positions.begin() + own_);
         live.quadrics.assign(own_ * stride_, 0);
         live.references.assign(own_ * channels_, 0);
-        live.deviations.assign(own_, 0);
-        live.made_by.assign(own_, no_merge);
-        live.vanishing.assign(own_, no_merge);
         for (Index v = 0; v < part_.slot_of_vertex.size() && slot(v) < own_;) {
             Index end = v;
             float* reference = live.references.data() + slot(v) * channels_;
@@ -105,6 +101,12 @@ private:
             static_cast<Index>(std::lower_bound(part_.slot_of_vertex.begin(), part_.slot_of_vertex.end(), own_) -
                                part_.slot_of_vertex.begin());
         vertex_weights_.assign(own_vertices_, static_cast<float>(least_weight));
+    }
+
+    static void add_plane(float* q, float strength, glm::vec3 n) {
+        using namespace quadric;
+        q[xx] += strength * n.x * n.x, q[xy] += strength * n.x * n.y, q[xz] += strength * n.x * n.z;
+        q[yy] += strength * n.y * n.y, q[yz] += strength * n.y * n.z, q[zz] += strength * n.z * n.z;
     }
 
     // The plane, and each channel's linear function on it, seen from each own corner.
@@ -133,13 +135,11 @@ private:
             if (s >= own_) continue;
             vertex_weights_[v] += area;
             float* q = quadric_of(s);
-            q[xx] += area * n.x * n.x, q[xy] += area * n.x * n.y, q[xz] += area * n.x * n.z;
-            q[yy] += area * n.y * n.y, q[yz] += area * n.y * n.z, q[zz] += area * n.z * n.z;
+            add_plane(q, area, n);
             for (std::size_t c = 0; c < channels_; ++c) {
                 const glm::vec3 g = gradients[c];
                 const float cw = weights[c], wd = cw * (values(v)[c] - result_.live.references[s * channels_ + c]);
-                q[xx] += cw * g.x * g.x, q[xy] += cw * g.x * g.y, q[xz] += cw * g.x * g.z;
-                q[yy] += cw * g.y * g.y, q[yz] += cw * g.y * g.z, q[zz] += cw * g.z * g.z;
+                add_plane(q, cw, g);
                 q[hx] += wd * g.x, q[hy] += wd * g.y, q[hz] += wd * g.z;
                 float* channel = q + first_channel + c * channel_size;
                 channel[gx] += cw * g.x, channel[gy] += cw * g.y, channel[gz] += cw * g.z;
@@ -234,7 +234,6 @@ private:
 
     // A plane through the edge, at a right angle to its triangle.
     void add_boundary(Index low, Index high, Index side, double edge_weight) {
-        using namespace quadric;
         const Triangle& t = part_.triangles[side / 3];
         const glm::dvec3 p = corner(t[side % 3]), edge = corner(t[(side + 1) % 3]) - p,
                          inner = corner(t[(side + 2) % 3]) - p;
@@ -244,12 +243,8 @@ private:
         if (!(length > 0) || !(squared > 0)) return;
         const glm::vec3 n(normal / length);
         const float strength = static_cast<float>(edge_weight * squared * part_.area_scale);
-        for (const Index s : {low, high}) {
-            if (s >= own_) continue;
-            float* q = quadric_of(s);
-            q[xx] += strength * n.x * n.x, q[xy] += strength * n.x * n.y, q[xz] += strength * n.x * n.z;
-            q[yy] += strength * n.y * n.y, q[yz] += strength * n.y * n.z, q[zz] += strength * n.z * n.z;
-        }
+        for (const Index s : {low, high})
+            if (s < own_) add_plane(quadric_of(s), strength, n);
     }
 
     // Two triangles that meet at an edge with different vertices: where the values differ, the seam is a contour too.
@@ -285,36 +280,29 @@ private:
 class Contractor {
 public:
     explicit Contractor(Contraction& c)
-        : c_(c), live_(c.live), channels_(c.channels), stride_(quadric_stride(c.channels)) {}
+        : c_(c), live_(c.live), merges_(c.record.merges), channels_(c.channels), stride_(quadric_stride(c.channels)) {}
 
     void run(Index target, const RoundCallback& after_round) {
         const std::size_t wanted = std::max<Index>(target, 1);
         if (live_.size() <= wanted) return;
-        c_.merges.reserve(live_.size() - wanted);
-        c_.places.reserve(live_.size() - wanted);
-        c_.errors.reserve(live_.size() - wanted);
-        c_.deviations.reserve(live_.size() - wanted);
+        merges_.reserve(live_.size() - wanted);
         find_components();
         for (std::size_t round = 0; live_.size() > wanted; ++round) {
-            const std::size_t before = c_.merges.size(), clusters = live_.size();
+            const std::size_t before = merges_.size(), clusters = live_.size();
             if (impatient_ || round % rounds_to_absorb == 1) release_components();
             contract_round();
-            const std::size_t made = c_.merges.size() - before;
+            const std::size_t made = merges_.size() - before;
             // Clusters that wait for edges out of the range must not hold up the rest.
             impatient_ = made < clusters / least_round_share + 1;
             if (made == 0) continue;
-            c_.round_ends.push_back(static_cast<Index>(c_.merges.size()));
+            c_.record.round_ends.push_back(static_cast<Index>(merges_.size()));
             close_gaps();
             if (!after_round(made)) return;
         }
-        std::sort(c_.outer_edges.begin(), c_.outer_edges.end(), [](const auto& x, const auto& y) {
-            return x.cluster != y.cluster ? x.cluster < y.cluster : x.far_slot < y.far_slot;
-        });
-        c_.outer_edges.erase(std::unique(c_.outer_edges.begin(), c_.outer_edges.end(),
-                                         [](const auto& x, const auto& y) {
-                                             return x.cluster == y.cluster && x.far_slot == y.far_slot;
-                                         }),
-                             c_.outer_edges.end());
+        const auto key = [](const Contraction::OuterEdge& edge) { return std::pair(edge.cluster, edge.far_slot); };
+        std::ranges::sort(c_.outer_edges, {}, key);
+        const auto repeated = std::ranges::unique(c_.outer_edges, {}, key);
+        c_.outer_edges.erase(repeated.begin(), repeated.end());
     }
 
 private:
@@ -423,7 +411,7 @@ private:
         if (released || !impatient_) return;
         // Nothing is near enough, or nothing else is left.
         for (Index s = 0; s < count; ++s)
-            if (is_held(s)) return release(component_of(s), live_.deviations[s]);
+            if (is_held(s)) return release(component_of(s), live_[s].deviation);
     }
 
     // Whether a contraction now leaves a triangle where one is to stay.
@@ -436,7 +424,7 @@ private:
     void note_components(ClusterPair p) {
         const Index a = component_of(p.a), b = component_of(p.b);
         if (a == b && components_[a].released && components_[a].clusters == 3)
-            c_.vanishings.push_back({live_.names[p.b], components_[a].gap});
+            c_.record.vanishings.push_back({live_[p.b].name, components_[a].gap});
         --components_[unite(a, b)].clusters;
     }
 
@@ -497,16 +485,13 @@ private:
             std::copy_n(found, count, errors + i);
         }
     }
-    void errors_by_fours(std::span<const ClusterPair> pairs, float* errors) const {
-        errors_of_all<Float4>(pairs, errors);
-    }
     UNSEEN_AVX2 void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const {
         errors_of_all<Float8>(pairs, errors);
     }
     // Neither has fused operations, so both give the same bits.
     void find_errors(std::span<const ClusterPair> pairs, float* errors) const {
         if (has_avx2()) errors_by_eights(pairs, errors);
-        else errors_by_fours(pairs, errors);
+        else errors_of_all<Float4>(pairs, errors);
     }
 
     // Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
@@ -547,13 +532,7 @@ private:
     // ---- pairs across gaps
 
     void order_along_curve() {
-        glm::dvec3 low = live_.places[0], high = low;
-        for (const glm::dvec3& p : live_.places) {
-            low = glm::min(low, p);
-            high = glm::max(high, p);
-        }
-        const glm::dvec3 size = high - low;
-        const MortonGrid grid(low, std::max({size.x, size.y, size.z}));
+        const MortonGrid grid(box_around(live_.places));
         curve_.resize(live_.size());
         curve_scratch_.resize(live_.size());
         for (Index s = 0; s < live_.size(); ++s) curve_[s] = {grid.code(live_.places[s]), s};
@@ -594,8 +573,8 @@ private:
         connect_lone_clusters();
         compete(edges_, true);
 
-        const std::size_t before = c_.merges.size();
-        const auto too_few = [&] { return c_.merges.size() - before < clusters / least_round_share; };
+        const std::size_t before = merges_.size();
+        const auto too_few = [&] { return merges_.size() - before < clusters / least_round_share; };
         contract_mutually_best();
         if (too_few()) contract_second_best();
         if (too_few()) contract_rivals();
@@ -606,23 +585,17 @@ private:
 
     // The merges from `first` on, all of one round. (They were made in spatial order, which is kinder to the cache.)
     void order_by_error(std::size_t first) {
-        const std::size_t count = c_.merges.size() - first;
+        const std::size_t count = merges_.size() - first;
         order_.resize(count);
         order_scratch_.resize(count);
         // Floats that are not negative compare like their bits.
         for (std::size_t i = 0; i < count; ++i)
-            order_[i] = {std::bit_cast<std::uint32_t>(c_.errors[first + i]), static_cast<Index>(first + i)};
+            order_[i] = {std::bit_cast<std::uint32_t>(merges_[first + i].error), static_cast<Index>(first + i)};
         sort_by_code(order_, order_scratch_);
-        const auto reorder = [&](auto& values) {
-            std::remove_reference_t<decltype(values)> sorted;
-            sorted.reserve(count);
-            for (const CodedIndex& item : order_) sorted.push_back(values[item.index]);
-            std::copy(sorted.begin(), sorted.end(), values.begin() + static_cast<std::ptrdiff_t>(first));
-        };
-        reorder(c_.merges);
-        reorder(c_.places);
-        reorder(c_.errors);
-        reorder(c_.deviations);
+        std::vector<Merge> sorted;
+        sorted.reserve(count);
+        for (const CodedIndex& item : order_) sorted.push_back(merges_[item.index]);
+        std::ranges::copy(sorted, merges_.begin() + static_cast<std::ptrdiff_t>(first));
     }
 
     void contract_mutually_best() {
@@ -665,20 +638,19 @@ private:
 
     // Two clusters span no triangle, so a connected part's last triangles go with the merge before its last.
     void note_vanishing(ClusterPair p, bool gap) {
-        Index &a = live_.vanishing[p.a], b = live_.vanishing[p.b];
+        LiveCluster &to = live_[p.a], &from = live_[p.b];
+        Index &a = to.vanishing, b = from.vanishing;
         if (gap && is_held(p.a) != is_held(p.b)) {
             a = none; // it is known already when they vanish
         } else if (gap) {
             if (quadric_of(p.a)[quadric::weight] < quadric_of(p.b)[quadric::weight]) std::swap(a, b);
-            if (b != no_merge) c_.vanishings.push_back({b, glm::length(offset(p))});
+            if (b != no_merge) c_.record.vanishings.push_back({b, glm::length(offset(p))});
             if (a == no_merge) a = b;
         } else {
-            const Index made_a = live_.made_by[p.a], made_b = live_.made_by[p.b];
-            const bool a_later =
-                made_b == no_merge || (made_a != no_merge && live_.deviations[p.a] > live_.deviations[p.b]);
-            a = a_later ? made_a : made_b;
+            const bool a_later = from.made_by == no_merge || (to.made_by != no_merge && to.deviation > from.deviation);
+            a = a_later ? to.made_by : from.made_by;
         }
-        live_.made_by[p.a] = live_.names[p.b];
+        to.made_by = from.name;
     }
 
     // Joins b to a: a's slot holds the new cluster.
@@ -697,12 +669,10 @@ private:
         recentre(sum, best.x, best.y, best.z, references, channels_);
         std::copy_n(sum, stride_, quadric_of(p.a));
         live_.places[p.a] += glm::dvec3(best.x, best.y, best.z);
-        c_.merges.push_back({live_.names[p.a], live_.names[p.b]});
-        c_.places.push_back(live_.places[p.a]);
-        c_.errors.push_back(error);
         const float deviation = std::sqrt(error / sum[quadric::weight]);
-        live_.deviations[p.a] = std::max({deviation, live_.deviations[p.a], live_.deviations[p.b]});
-        c_.deviations.push_back(live_.deviations[p.a]);
+        LiveCluster& made = live_[p.a];
+        made.deviation = std::max({deviation, made.deviation, live_[p.b].deviation});
+        merges_.push_back({made.name, live_[p.b].name, error, made.deviation, live_.places[p.a]});
     }
 
     // Renumbers the clusters without those that were joined to others, and the edges with them.
@@ -713,12 +683,9 @@ private:
             if (into_[s] != s) continue;
             new_number_[s] = kept | (taken_[s] ? is_new : 0);
             if (kept != s) {
-                live_.names[kept] = live_.names[s];
+                live_[kept] = live_[s];
                 live_.places[kept] = live_.places[s];
-                live_.deviations[kept] = live_.deviations[s];
                 component_[kept] = component_[s];
-                live_.made_by[kept] = live_.made_by[s];
-                live_.vanishing[kept] = live_.vanishing[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
                 std::copy_n(live_.references.data() + s * channels_, channels_,
                             live_.references.data() + kept * channels_);
@@ -727,12 +694,9 @@ private:
         }
         for (Index s = 0; s < live_.size(); ++s) // `into_` of a cluster that was joined is one that was not
             if (into_[s] != s) new_number_[s] = new_number_[into_[s]];
-        live_.names.resize(kept);
+        live_.clusters.resize(kept);
         live_.places.resize(kept);
-        live_.deviations.resize(kept);
         component_.resize(kept);
-        live_.made_by.resize(kept);
-        live_.vanishing.resize(kept);
         live_.quadrics.resize(kept * stride_);
         live_.references.resize(kept * channels_);
         for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster] & ~is_new;
@@ -774,6 +738,7 @@ private:
 
     Contraction& c_;
     LiveClusters& live_;
+    std::vector<Merge>& merges_;
     std::size_t channels_, stride_;
     struct Nearest {
         Index component;
@@ -805,12 +770,9 @@ private:
 
 void append(LiveClusters& to, const LiveClusters& from) {
     const auto add = [](auto& x, const auto& y) { x.insert(x.end(), y.begin(), y.end()); };
-    add(to.names, from.names);
+    add(to.clusters, from.clusters);
     add(to.places, from.places);
     add(to.references, from.references);
-    add(to.deviations, from.deviations);
-    add(to.made_by, from.made_by);
-    add(to.vanishing, from.vanishing);
     add(to.quadrics, from.quadrics);
 }
 
@@ -845,8 +807,7 @@ Contraction join(const Contraction& left, const Contraction& right, Index target
                                              [](const auto& b, Index slot) { return b.slot < slot; });
         c.pairs.push_back({edge.cluster, border->cluster + shift});
     }
-    std::sort(c.pairs.begin(), c.pairs.end(),
-              [](const ClusterPair& x, const ClusterPair& y) { return x.a != y.a ? x.a < y.a : x.b < y.b; });
+    std::sort(c.pairs.begin(), c.pairs.end());
     c.pairs.erase(std::unique(c.pairs.begin(), c.pairs.end()), c.pairs.end());
     for (const ClusterPair& p : right.pairs) c.pairs.push_back({p.a + shift, p.b + shift});
     // Border slots whose edges all lead to the other side are no border any more; telling them apart is not worth it.

@@ -12,6 +12,7 @@
 // Lengths are in units of the mesh's extent ("unit box"), weights are areas over the largest vertex area.
 #pragma once
 
+#include <compare>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -39,41 +40,38 @@ struct PartMesh {
 
 inline constexpr Index no_merge = 0xffffffffu;
 
+struct LiveCluster {
+    Index name;      // a slot in the cluster, under which merges know it
+    float deviation; // see Merge
+    // Merges, known by the cluster that they joined; or no_merge. `made_by`: the one that made the cluster. `vanishing`:
+    // the one at which the last triangles of its connected part go, or, of several parts that were joined across gaps,
+    // of the part that is to stay longest.
+    Index made_by = no_merge, vanishing = no_merge;
+};
+
 // Clusters that are still to be contracted. They lie in spatial order.
 struct LiveClusters {
-    std::vector<Index> names; // a slot in the cluster, under which merges know it
+    std::vector<LiveCluster> clusters;
     std::vector<glm::dvec3> places;
     std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
-    std::vector<float> deviations; // by cluster, see Contraction
-    // Merges, known by the cluster that they joined; or no_merge. `made_by`: the one that made the
-    // cluster. `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that
-    // were joined across gaps, of the part that is to stay longest.
-    std::vector<Index> made_by, vanishing;
-    std::vector<float> quadrics; // quadric_stride(channels) each, see quadric.h
-    std::size_t size() const { return names.size(); }
+    std::vector<float> quadrics;   // quadric_stride(channels) each, see quadric.h
+    std::size_t size() const { return clusters.size(); }
+    LiveCluster& operator[](std::size_t i) { return clusters[i]; }
+    const LiveCluster& operator[](std::size_t i) const { return clusters[i]; }
 };
 
 struct Merge {
     Index kept, joined; // names of the two clusters; the new one is known as `kept`
+    float error;        // quadric error of the new cluster, weight times unit-box length squared
+    float deviation;    // its square root over the weight, unit-box length; at least the parts'
+    glm::dvec3 place;
 };
 
-struct ClusterPair {
-    Index a, b; // live clusters, a < b
-    bool operator==(const ClusterPair&) const = default;
-};
-
-// What contracting a part, or joining two, has led to.
-struct Contraction {
-    Index first_slot = 0, end_slot = 0;
-    std::size_t channels = 0;
-
-    // The merges made here (not those of the parts that were joined), round by round, and in a round by ascending
-    // error; two merges of one round do not touch the same cluster.
+// The merges of a contraction, not those of the parts that were joined. Round by round, and in a round by ascending error;
+// two merges of one round do not touch the same cluster.
+struct MergeRecord {
     std::vector<Merge> merges;
-    std::vector<glm::dvec3> places; // by merge
-    std::vector<float> errors;      // by merge: quadric error of the new cluster, weight times unit-box length squared
-    std::vector<float> deviations;  // by merge: its square root over the weight, unit-box length; at least the parts'
-    std::vector<Index> round_ends;  // by round: the number of merges up to its end
+    std::vector<Index> round_ends; // by round: the number of merges up to its end
     // Where two parts of the surface were joined across a gap, the lighter one goes first: what it then strays is the
     // width of the gap. So of many loose parts those that stay are spread out.
     struct Vanishing {
@@ -81,7 +79,19 @@ struct Contraction {
         float deviation; // that the merge has at least; unit-box length
     };
     std::vector<Vanishing> vanishings;
+};
 
+struct ClusterPair {
+    Index a, b; // live clusters, a < b
+    auto operator<=>(const ClusterPair&) const = default;
+};
+
+// What contracting a part, or joining two, has led to.
+struct Contraction {
+    Index first_slot = 0, end_slot = 0;
+    std::size_t channels = 0;
+
+    MergeRecord record;
     LiveClusters live;
     std::vector<ClusterPair> pairs; // edges between live clusters, by a
     // Edges that leave the range: from a live cluster to a slot outside, and, for the other side, which cluster each of

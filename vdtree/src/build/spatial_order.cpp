@@ -24,11 +24,7 @@ void sort_by_code(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
         std::array<std::size_t, 256> next{};
         for (const CodedIndex& item : from) ++next[item.code >> shift & 0xff];
         std::size_t sum = 0;
-        for (std::size_t& n : next) {
-            const std::size_t count = n;
-            n = sum;
-            sum += count;
-        }
+        for (std::size_t& n : next) sum += std::exchange(n, sum);
         for (const CodedIndex& item : from) to[next[item.code >> shift & 0xff]++] = item;
         std::swap(from, to);
     }

@@ -1,18 +1,36 @@
-// Space-filling order of points: Morton codes, and a radix sort for them.
+// Where points lie: boxes, Morton codes, and a radix sort for these.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
-#include <vector>
 
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
 #include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {
+
+struct Box {
+    glm::dvec3 low, high;
+    glm::dvec3 size() const { return high - low; }
+    double extent() const { return std::max({size().x, size().y, size().z}); }
+};
+
+// Around points, or around those that `at` finds in items; there is at least one.
+template <class Items, class At = std::identity>
+Box box_around(const Items& items, At at = {}) {
+    Box box{std::invoke(at, items[0]), std::invoke(at, items[0])};
+    for (const auto& item : items) {
+        const glm::dvec3 p = std::invoke(at, item);
+        box.low = glm::min(box.low, p), box.high = glm::max(box.high, p);
+    }
+    return box;
+}
 
 struct CodedIndex {
     std::uint64_t code;
@@ -27,6 +45,7 @@ class MortonGrid {
 public:
     // `extent`: the cube's side; with 0 every point has code 0.
     MortonGrid(glm::dvec3 low, double extent) : low_(low), extent_(extent) {}
+    explicit MortonGrid(const Box& box) : MortonGrid(box.low, box.extent()) {}
 
     std::uint64_t code(glm::dvec3 p) const {
         return spread(p.x - low_.x) | spread(p.y - low_.y) << 1 | spread(p.z - low_.z) << 2;

@@ -16,7 +16,6 @@
 #include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
-#include "tree/message.h"
 #include "tree/unit_vector.h"
 
 namespace unseen::vdtree {
@@ -152,19 +151,12 @@ private:
     bool any_ = false;
 };
 
-// Some of the vertices.
-struct VertexRange {
-    std::size_t begin, end;
-    std::size_t size() const { return end - begin; }
-    bool has(std::size_t v) const { return v - begin < size(); }
-};
-
 // The other corners of a triangle at a place: the following and the preceding one.
 struct Wedge {
     Index following, preceding;
 };
 
-// What is collected at the places of a range: the wedges of the triangles there, and the sum of these triangles' area
+// What is collected at the places: the wedges of the triangles there, and the sum of these triangles' area
 // vectors, twice.
 struct Wedges {
     std::vector<Index> start; // one longer
@@ -176,43 +168,40 @@ struct Wedges {
     }
 };
 
-// Triangles that the welding degenerates have neither edges nor an area. `vertex_areas`: by vertex, of which only those
-// at the range's places grow.
-Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange vertices,
-                      std::span<double> vertex_areas) {
+// Triangles that the welding degenerates have neither edges nor an area. Adds to `vertex_areas`, by vertex.
+Wedges collect_wedges(const MeshView& mesh, const Places& places, std::span<double> vertex_areas) {
+    const std::size_t vertices = vertex_areas.size();
     Wedges out;
-    out.start.assign(vertices.size() + 1, 0);
-    out.sums.assign(vertices.size(), glm::dvec3(0));
+    out.start.assign(vertices + 1, 0);
+    out.sums.assign(vertices, glm::dvec3(0));
     // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes
     // time. All sums are made in the order of the triangles.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_triangle = [&](auto&& use) {
         parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
-            const auto end_of = [&](std::size_t range) { return vertices.begin + vertices.size() * range / ranges; };
-            const VertexRange own{end_of(r), end_of(r + 1)};
+            const std::size_t begin = vertices * r / ranges, size = vertices * (r + 1) / ranges - begin;
+            const auto is_own = [&](std::size_t place) { return place - begin < size; };
             for (const Triangle& corners : mesh.triangles) {
                 const Triangle at = places.of(corners);
-                if (!own.has(at[0]) && !own.has(at[1]) && !own.has(at[2])) continue;
-                if (!places.degenerates(corners)) use(own, corners, at);
+                if (std::ranges::any_of(at, is_own) && !places.degenerates(corners)) use(is_own, corners, at);
             }
         });
     };
-    for_each_triangle([&](VertexRange own, const Triangle&, const Triangle& at) {
+    for_each_triangle([&](const auto& is_own, const Triangle&, const Triangle& at) {
         for (const Index place : at)
-            if (own.has(place)) ++out.start[place - vertices.begin];
+            if (is_own(place)) ++out.start[place];
     });
     std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
     out.wedges = ParallelArray<Wedge>(out.start.back(), Unfilled());
-    for_each_triangle([&](VertexRange own, const Triangle& corners, const Triangle& at) {
+    for_each_triangle([&](const auto& is_own, const Triangle& corners, const Triangle& at) {
         const glm::dvec3& a = mesh.positions[corners[0]];
         const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
         const double sixth = glm::length(vector) / 6; // what each corner has of the triangle's area
         for (std::size_t k = 0; k < 3; ++k) {
-            if (!own.has(at[k])) continue;
-            const std::size_t place = at[k] - vertices.begin;
-            out.wedges[--out.start[place]] = {at[(k + 1) % 3], at[(k + 2) % 3]};
-            out.sums[place] += vector;
+            if (!is_own(at[k])) continue;
+            out.wedges[--out.start[at[k]]] = {at[(k + 1) % 3], at[(k + 2) % 3]};
+            out.sums[at[k]] += vector;
             vertex_areas[corners[k]] += sixth;
         }
     });
@@ -291,122 +280,21 @@ Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincide
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
 }
 
-// What is found around the places of a range: for these, regularity and the sum of the faces; for all vertices there,
-// areas.
-Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRange range) {
+// By place: regularity and the sum of the faces; by vertex: areas.
+Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
     Surface surface;
     surface.irregular.assign(coincident.size(), 0);
     surface.areas.assign(coincident.size(), 0);
     surface.normals.resize(coincident.size());
-    const Wedges wedges = collect_wedges(mesh, Places(coincident), range, surface.areas);
-    parallel_loop_over(tbb::blocked_range<std::size_t>(0, range.size(), grain), [&](const auto& places) {
+    const Wedges wedges = collect_wedges(mesh, Places(coincident), surface.areas);
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, coincident.size(), grain), [&](const auto& places) {
         Fan fan;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
-            const std::size_t v = range.begin + place;
-            if (coincident[v] != v) continue;
-            surface.irregular[v] = !fan.is_regular(static_cast<Index>(v), wedges.around(place));
-            surface.normals[v] = glm::vec3(unit(wedges.sums[place]));
+            if (coincident[place] != place) continue;
+            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), wedges.around(place));
+            surface.normals[place] = glm::vec3(unit(wedges.sums[place]));
         }
     });
-    return surface;
-}
-
-// What a range's survey leaves in a surface; the areas are those of the vertices there, ascending.
-struct SurveyPiece {
-    std::vector<std::uint8_t> irregular;
-    std::vector<glm::vec3> normals;
-    std::vector<double> areas;
-
-    template <class Message>
-    void exchange(Message& message) {
-        message(irregular), message(normals), message(areas);
-    }
-};
-
-SurveyPiece cut_out(const Surface& surface, std::span<const Index> coincident, VertexRange range) {
-    const auto begin = static_cast<std::ptrdiff_t>(range.begin), end = static_cast<std::ptrdiff_t>(range.end);
-    SurveyPiece piece{{surface.irregular.begin() + begin, surface.irregular.begin() + end},
-                      {surface.normals.begin() + begin, surface.normals.begin() + end},
-                      {}};
-    for (std::size_t v = 0; v < coincident.size(); ++v)
-        if (range.has(coincident[v])) piece.areas.push_back(surface.areas[v]);
-    return piece;
-}
-
-bool put_in(Surface& surface, std::span<const Index> coincident, VertexRange range, const SurveyPiece& piece) {
-    if (piece.irregular.size() != range.size() || piece.normals.size() != range.size()) return false;
-    std::copy(piece.irregular.begin(), piece.irregular.end(),
-              surface.irregular.begin() + static_cast<std::ptrdiff_t>(range.begin));
-    std::copy(piece.normals.begin(), piece.normals.end(),
-              surface.normals.begin() + static_cast<std::ptrdiff_t>(range.begin));
-    std::size_t next = 0;
-    for (std::size_t v = 0; v < coincident.size(); ++v) {
-        if (!range.has(coincident[v])) continue;
-        if (next == piece.areas.size()) return false;
-        surface.areas[v] = piece.areas[next++];
-    }
-    return next == piece.areas.size();
-}
-
-// Each member surveys a range, and all get all of it by way of member 0.
-Result<Surface> survey_together(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
-    const auto members = static_cast<std::size_t>(team.size()), rank = static_cast<std::size_t>(team.rank());
-    const auto range_of = [&](std::size_t member) {
-        return VertexRange{coincident.size() * member / members, coincident.size() * (member + 1) / members};
-    };
-    Surface surface = survey(mesh, coincident, range_of(rank));
-    const auto send = [&](std::size_t to, VertexRange range) {
-        MessageWriter message;
-        cut_out(surface, coincident, range).exchange(message);
-        team.send(static_cast<int>(to), message.bytes());
-    };
-    const auto receive = [&](std::size_t from, VertexRange range) {
-        const std::vector<std::byte> bytes = team.receive(static_cast<int>(from));
-        MessageReader message(bytes);
-        SurveyPiece piece;
-        piece.exchange(message);
-        return message.complete() && put_in(surface, coincident, range, piece);
-    };
-    const Error strange{
-        ErrorCode::malformed_data,
-        "A process of the team sent something else than its part: all must run the same program on the same mesh."};
-    if (rank != 0) {
-        send(0, range_of(rank));
-        for (std::size_t other = 0; other < members; ++other)
-            if (other != rank && !receive(0, range_of(other))) return strange;
-        return surface;
-    }
-    for (std::size_t other = 1; other < members; ++other)
-        if (!receive(other, range_of(other))) return strange;
-    for (std::size_t to = 1; to < members; ++to)
-        for (std::size_t other = 0; other < members; ++other)
-            if (other != to) send(to, range_of(other));
-    return surface;
-}
-
-// From what is known by place to what is known by vertex.
-Surface complete(const MeshView& mesh, std::span<const Index> coincident, Surface surface) {
-    const std::size_t vertices = coincident.size();
-    surface.closedness = find_closedness(mesh, coincident, surface);
-    const bool inward = surface.closedness == Closedness::closed_inward;
-    const float face_sign = inward ? -1 : 1;
-    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the
-    // others read them.
-    const auto spread = [&](bool standing) {
-        parallel_loop_over(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                const Index place = coincident[v];
-                if ((place == v) != standing) continue;
-                surface.irregular[v] = surface.irregular[place];
-                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
-                surface.normals[v] =
-                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
-            }
-        });
-    };
-    spread(false);
-    spread(true);
     return surface;
 }
 
@@ -448,13 +336,30 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
 }
 
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident) {
-    return complete(mesh, coincident, survey(mesh, coincident, {0, coincident.size()}));
-}
-
-Result<Surface> analyse_surface(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
-    auto surface = survey_together(mesh, coincident, team);
-    if (!surface) return surface.error();
-    return complete(mesh, coincident, std::move(*surface));
+    Surface surface = survey(mesh, coincident);
+    // From what is known by place to what is known by vertex.
+    const std::size_t vertices = coincident.size();
+    surface.closedness = find_closedness(mesh, coincident, surface);
+    const bool inward = surface.closedness == Closedness::closed_inward;
+    const float face_sign = inward ? -1 : 1;
+    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
+    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the
+    // others read them.
+    const auto spread = [&](bool standing) {
+        parallel_loop_over(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v) {
+                const Index place = coincident[v];
+                if ((place == v) != standing) continue;
+                surface.irregular[v] = surface.irregular[place];
+                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
+                surface.normals[v] =
+                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
+            }
+        });
+    };
+    spread(false);
+    spread(true);
+    return surface;
 }
 
 } // namespace unseen::vdtree

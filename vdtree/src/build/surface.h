@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {
@@ -27,8 +26,5 @@ struct Surface {
 
 // Cost: linear, and 48 bytes a triangle while it lasts.
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident);
-// The same by all members of a team together; each calls this with the same mesh. Sends 21 bytes a vertex to each and
-// back.
-Result<Surface> analyse_surface(const MeshView& mesh, std::span<const Index> coincident, Team& team);
 
 } // namespace unseen::vdtree

@@ -45,7 +45,8 @@ Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& pro
 // (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies. Pairs are the edges,
 // and near neighbours where no edge connects two parts. Space is divided into blocks that are contracted in parallel and
 // then joined; the blocks depend on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle. With a team,
-// of which this must be member 0, the other members contract their share of the blocks.
+// whose members all call this with the same input, each contracts its share of the blocks, and member 0 gets the result,
+// the others an empty one.
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {}, Team* team = nullptr);
 
 enum class ClustererKind { quadric, octree };

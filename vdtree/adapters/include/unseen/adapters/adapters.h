@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/mesh.h>
@@ -58,106 +59,135 @@ inline std::uint8_t to_byte(float channel) {
     return channel > 0 ? static_cast<std::uint8_t>(std::lround(255 * std::min(channel, 1.0f))) : std::uint8_t{0};
 }
 
-// A soup of a mesh whose corners may have attributes of their own. Vertex i of the source is vertex i of the soup;
-// corners with other attributes than the vertex's first corner get further vertices at its position.
-class CornerSoup {
+inline Error malformed(const std::string& what) { return {ErrorCode::malformed_data, what}; }
+
+inline Error not_closed(const std::string& face) {
+    return malformed(face + " is not closed: its halfedges do not lead back to the first.");
+}
+
+// Makes a soup of a halfedge mesh whose corners may have attributes of their own. Vertex i of the mesh is vertex i of the
+// soup; corners with other attributes than the vertex's first corner get further vertices at its position.
+template <class VertexHandle, class FaceHandle>
+class SoupMaker {
 public:
     struct Corner {
         glm::vec3 normal = glm::vec3(0);
         glm::vec4 colour = glm::vec4(1);
         glm::vec2 uv = glm::vec2(0);
+        bool operator==(const Corner&) const = default;
     };
 
-    CornerSoup(bool has_normals, bool has_colours, bool has_uvs)
+    SoupMaker(bool has_normals, bool has_colours, bool has_uvs)
         : has_normals_(has_normals), has_colours_(has_colours), has_uvs_(has_uvs) {}
 
-    // A vertex of the source. `corner`: attributes of all its corners; unused vertices keep them.
-    void add_vertex(glm::dvec3 position, const Corner& corner) {
-        sources_.push_back(static_cast<vdtree::Index>(mesh_.positions.size()));
+    // A vertex of the mesh. `corner`: attributes of all its corners; unused vertices keep them.
+    void add_vertex(VertexHandle handle, glm::dvec3 position, const Corner& corner) {
         is_used_.push_back(0);
-        append(position, corner);
+        append(handle, position, corner);
     }
 
-    // The soup's vertex for a corner at a vertex of the source. Call it after all vertices have been added.
-    vdtree::Index corner(vdtree::Index source, const Corner& corner) {
-        if (!is_used_[source]) {
-            is_used_[source] = 1;
-            set(source, corner);
-            return source;
-        }
-        vdtree::Index last = source;
-        for (vdtree::Index v = source; v != none; v = next_[v]) {
-            if (has(v, corner)) return v;
-            last = v;
-        }
-        const auto made = static_cast<vdtree::Index>(mesh_.positions.size());
-        next_[last] = made;
-        sources_.push_back(source);
-        append(glm::dvec3(mesh_.positions[source]), corner);
-        return made;
+    // The triangle of a face, by its first halfedge. `source_of(h)`: the number of the mesh's vertex that a halfedge leads
+    // to, or why there is none. `set_own(h, corner)` sets the attributes that corners have of their own. Call it after
+    // all vertices have been added.
+    template <class Halfedge, class Next, class SourceOf, class SetOwn>
+    Result<void> add_face(FaceHandle handle, const std::string& face, Halfedge first, std::size_t most_corners,
+                          const Next& next, const SourceOf& source_of, const SetOwn& set_own, const char* advice) {
+        vdtree::Triangle triangle{};
+        std::size_t count = 0;
+        Halfedge h = first;
+        do {
+            const Result<vdtree::Index> source = source_of(h);
+            if (!source) return source.error();
+            Corner corner = attributes(*source);
+            set_own(h, corner);
+            if (count < 3) triangle[count] = vertex_with(*source, corner);
+            ++count;
+            h = next(h);
+        } while (h != first && count <= most_corners);
+        if (h != first) return not_closed(face);
+        if (count != 3)
+            return Error{ErrorCode::unsupported,
+                         face + " has " + std::to_string(count) + " corners, and trees are of triangles: " + advice};
+        soup_.mesh.triangles.push_back(triangle);
+        soup_.faces.push_back(handle);
+        return {};
     }
 
-    void add_triangle(const vdtree::Triangle& t) { mesh_.triangles.push_back(t); }
-
-    // Moves everything into a Soup. `handles`: by vertex of the source.
-    template <class S>
-    void finish(S& out, const decltype(S::vertices)& handles) {
-        out.vertices.reserve(sources_.size());
-        for (const vdtree::Index source : sources_) out.vertices.push_back(handles[source]);
-        out.mesh = std::move(mesh_);
-    }
+    Soup<VertexHandle, FaceHandle> finish() { return std::move(soup_); }
 
 private:
     static constexpr vdtree::Index none = std::numeric_limits<vdtree::Index>::max();
 
-    void append(glm::dvec3 position, const Corner& corner) {
-        mesh_.positions.push_back(position);
+    Corner attributes(vdtree::Index v) const {
+        Corner corner;
+        if (has_normals_) corner.normal = soup_.mesh.normals[v];
+        if (has_colours_) corner.colour = soup_.mesh.colours[v];
+        if (has_uvs_) corner.uv = soup_.mesh.uvs[v];
+        return corner;
+    }
+
+    vdtree::Index vertex_with(vdtree::Index source, const Corner& corner) {
+        if (!is_used_[source]) {
+            is_used_[source] = 1;
+            if (has_normals_) soup_.mesh.normals[source] = corner.normal;
+            if (has_colours_) soup_.mesh.colours[source] = corner.colour;
+            if (has_uvs_) soup_.mesh.uvs[source] = corner.uv;
+            return source;
+        }
+        vdtree::Index last = source;
+        for (vdtree::Index v = source; v != none; v = next_[v]) {
+            if (attributes(v) == corner) return v;
+            last = v;
+        }
+        next_[last] = static_cast<vdtree::Index>(soup_.vertices.size());
+        append(soup_.vertices[source], glm::dvec3(soup_.mesh.positions[source]), corner);
+        return next_[last];
+    }
+
+    void append(VertexHandle handle, glm::dvec3 position, const Corner& corner) {
+        soup_.vertices.push_back(handle);
+        soup_.mesh.positions.push_back(position);
         next_.push_back(none);
-        if (has_normals_) mesh_.normals.push_back(corner.normal);
-        if (has_colours_) mesh_.colours.push_back(corner.colour);
-        if (has_uvs_) mesh_.uvs.push_back(corner.uv);
-    }
-    void set(vdtree::Index v, const Corner& corner) {
-        if (has_normals_) mesh_.normals[v] = corner.normal;
-        if (has_colours_) mesh_.colours[v] = corner.colour;
-        if (has_uvs_) mesh_.uvs[v] = corner.uv;
-    }
-    bool has(vdtree::Index v, const Corner& corner) const {
-        return (!has_normals_ || mesh_.normals[v] == corner.normal) &&
-               (!has_colours_ || mesh_.colours[v] == corner.colour) && (!has_uvs_ || mesh_.uvs[v] == corner.uv);
+        if (has_normals_) soup_.mesh.normals.push_back(corner.normal);
+        if (has_colours_) soup_.mesh.colours.push_back(corner.colour);
+        if (has_uvs_) soup_.mesh.uvs.push_back(corner.uv);
     }
 
     bool has_normals_, has_colours_, has_uvs_;
-    vdtree::Mesh mesh_;
-    std::vector<vdtree::Index> sources_, next_; // next_: the next soup vertex of the same source
-    std::vector<std::uint8_t> is_used_;         // by vertex of the source
+    Soup<VertexHandle, FaceHandle> soup_;
+    std::vector<vdtree::Index> next_;   // by vertex of the soup: the next one of the same source
+    std::vector<std::uint8_t> is_used_; // by vertex of the mesh
 };
 
-inline Error malformed(const std::string& what) { return {ErrorCode::malformed_data, what}; }
-
-// Fails unless the halfedges around a face lead back to the first after three corners.
-inline Result<void> check_face(const std::string& face, bool is_closed, std::size_t corners, const char* advice) {
-    if (!is_closed) return malformed(face + " is not closed: its halfedges do not lead back to the first.");
-    if (corners == 3) return {};
-    return Error{ErrorCode::unsupported,
-                 face + " has " + std::to_string(corners) + " corners, and trees are of triangles: " + advice};
-}
-
-// Adds the triangles of a soup to a mesh whose vertex i is `handle(i)`. `add_face` returns whether the mesh took the face;
-// other triangles get vertices of their own by `add_vertex(i)`. Returns their number.
-template <class Handle, class AddVertex, class AddFace>
-Result<std::size_t> add_triangles(const vdtree::MeshView& soup, const Handle& handle, const AddVertex& add_vertex,
-                                  const AddFace& add_face) {
+// Fills a mesh with a soup: `add_vertex(i)` adds the soup's vertex i, and `add_face` returns whether the mesh took the
+// face; other triangles get vertices of their own.
+template <class M, class AddVertex, class AddFace>
+Result<Made<M>> filled(Made<M>&& out, const vdtree::MeshView& soup, const AddVertex& add_vertex,
+                       const AddFace& add_face) {
+    const auto add = [&](vdtree::Index source) {
+        out.sources.push_back(source);
+        return add_vertex(out.mesh, source);
+    };
+    std::vector<decltype(add(0))> handles;
+    for (std::size_t v = 0; v < soup.positions.size(); ++v) handles.push_back(add(static_cast<vdtree::Index>(v)));
     std::vector<vdtree::Triangle> refused;
     for (const vdtree::Triangle& t : soup.triangles) {
         if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        if (!add_face(handle(t[0]), handle(t[1]), handle(t[2]))) refused.push_back(t);
+        if (!add_face(out.mesh, handles[t[0]], handles[t[1]], handles[t[2]])) refused.push_back(t);
     }
     for (const vdtree::Triangle& t : refused) {
-        const auto a = add_vertex(t[0]), b = add_vertex(t[1]), c = add_vertex(t[2]);
-        if (!add_face(a, b, c)) return malformed("A triangle that stands alone was refused.");
+        const auto a = add(t[0]), b = add(t[1]), c = add(t[2]);
+        if (!add_face(out.mesh, a, b, c)) return malformed("A triangle that stands alone was refused.");
     }
-    return refused.size();
+    out.loose_triangles = refused.size();
+    return std::move(out);
+}
+
+// The tree of a soup, or why there is no soup.
+template <class S>
+Result<vdtree::VertexTree> build_tree(const Result<S>& soup, const vdtree::BuildOptions& build) {
+    if (!soup) return soup.error();
+    return vdtree::build_tree(soup->mesh.view(), build);
 }
 
 // The cut as a mesh of the other library, made by `from_mesh(soup)`; its sources become the tree's nodes.

@@ -91,54 +91,44 @@ Result<Soup<CGAL::Surface_mesh<Point>>> to_mesh(const CGAL::Surface_mesh<Point>&
     const auto corner_uvs = detail::find_property<Halfedge, typename T::TexturePoint>(mesh, "h:uv");
     const bool splits = !uvs.second && corner_uvs.second;
 
-    Soup<M> out;
-    adapters::CornerSoup soup(normals.second, colours.second, uvs.second || corner_uvs.second);
-    std::vector<adapters::CornerSoup::Corner> corners;          // by vertex of the soup
+    using Maker = adapters::SoupMaker<Vertex, typename M::Face_index>;
+    using Corner = typename Maker::Corner;
+    Maker soup(normals.second, colours.second, uvs.second || corner_uvs.second);
     std::vector<vdtree::Index> numbers(mesh.num_vertices(), 0); // by vertex; removed ones are not asked for
-    std::vector<Vertex> kept;
+    vdtree::Index kept = 0;
     for (const Vertex v : mesh.vertices()) {
-        adapters::CornerSoup::Corner corner;
+        Corner corner;
         if (normals.second) corner.normal = detail::vec3_of(normals.first[v]);
         if (colours.second) corner.colour = detail::colour_of(colours.first[v], options.colours);
         if (uvs.second) corner.uv = detail::uv_of(uvs.first[v]);
-        numbers[v.idx()] = static_cast<vdtree::Index>(kept.size());
+        numbers[v.idx()] = kept++;
         const auto& p = mesh.point(v);
-        soup.add_vertex({CGAL::to_double(p.x()), CGAL::to_double(p.y()), CGAL::to_double(p.z())}, corner);
-        corners.push_back(corner);
-        kept.push_back(v);
+        soup.add_vertex(v, {CGAL::to_double(p.x()), CGAL::to_double(p.y()), CGAL::to_double(p.z())}, corner);
     }
     const auto is_there = [&](auto handle) {
         return handle.is_valid() && mesh.has_valid_index(handle) && !mesh.is_removed(handle);
     };
     for (const auto f : mesh.faces()) {
         const std::string face = "Face " + std::to_string(static_cast<std::size_t>(f));
-        const Halfedge first = mesh.halfedge(f);
-        vdtree::Triangle triangle{};
-        std::size_t count = 0;
-        Halfedge h = first;
-        do {
+        const auto next = [&](Halfedge h) { return mesh.next(h); };
+        const auto source_of = [&](Halfedge h) -> Result<vdtree::Index> {
             if (!is_there(h))
                 return adapters::malformed(face + " has a halfedge that is null or removed; remove the face.");
-            const Vertex v = mesh.target(h);
-            if (!is_there(v))
+            if (!is_there(mesh.target(h)))
                 return adapters::malformed(face + " has a vertex that is null or removed; remove the face.");
-            if (count < 3) {
-                const vdtree::Index number = numbers[v.idx()];
-                adapters::CornerSoup::Corner corner = corners[number];
-                if (splits) corner.uv = detail::uv_of(corner_uvs.first[h]);
-                triangle[count] = soup.corner(number, corner);
-            }
-            ++count;
-            h = mesh.next(h);
-        } while (h != first && count <= mesh.num_halfedges());
+            return numbers[mesh.target(h).idx()];
+        };
+        const auto set_own = [&](Halfedge h, Corner& corner) {
+            if (splits) corner.uv = detail::uv_of(corner_uvs.first[h]);
+        };
         constexpr const char* advice =
             "triangulate the faces first (CGAL::Polygon_mesh_processing::triangulate_faces).";
-        if (const auto valid = adapters::check_face(face, h == first, count, advice); !valid) return valid.error();
-        soup.add_triangle(triangle);
-        out.faces.push_back(f);
+        if (const auto added =
+                soup.add_face(f, face, mesh.halfedge(f), mesh.num_halfedges(), next, source_of, set_own, advice);
+            !added)
+            return added.error();
     }
-    soup.finish(out, kept);
-    return out;
+    return soup.finish();
 }
 
 // Normals, colours and texture coordinates become the properties named above if the soup has them. Coincident vertices
@@ -149,17 +139,20 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
     using T = detail::Types<M>;
     if (const auto valid = vdtree::validate(soup); !valid) return valid.error();
     Made<M> out;
-    M& mesh = out.mesh;
     const auto count = [](std::size_t n) { return static_cast<typename M::size_type>(n); };
-    mesh.reserve(count(soup.positions.size()), count(soup.positions.size() + soup.triangles.size()),
-                 count(soup.triangles.size()));
+    out.mesh.reserve(count(soup.positions.size()), count(soup.positions.size() + soup.triangles.size()),
+                     count(soup.triangles.size()));
     typename M::template Property_map<Vertex, typename T::Vector> normals;
     typename M::template Property_map<Vertex, CGAL::IO::Color> colours;
     typename M::template Property_map<Vertex, typename T::TexturePoint> uvs;
-    if (!soup.normals.empty()) normals = mesh.template add_property_map<Vertex, typename T::Vector>("v:normal").first;
-    if (!soup.colours.empty()) colours = mesh.template add_property_map<Vertex, CGAL::IO::Color>("v:color").first;
-    if (!soup.uvs.empty()) uvs = mesh.template add_property_map<Vertex, typename T::TexturePoint>("v:texcoord").first;
-    const auto add_vertex = [&](vdtree::Index source) {
+    const auto add_property = [&]<class Value>(typename M::template Property_map<Vertex, Value>& map,
+                                               const char* name) {
+        map = out.mesh.template add_property_map<Vertex, Value>(name).first;
+    };
+    if (!soup.normals.empty()) add_property(normals, "v:normal");
+    if (!soup.colours.empty()) add_property(colours, "v:color");
+    if (!soup.uvs.empty()) add_property(uvs, "v:texcoord");
+    const auto add_vertex = [&](M& mesh, vdtree::Index source) {
         const glm::dvec3 p = soup.positions[source];
         const Vertex v = mesh.add_vertex(typename T::Point(p.x, p.y, p.z));
         if (!soup.normals.empty()) {
@@ -167,20 +160,13 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
             normals[v] = typename T::Vector(n.x, n.y, n.z);
         }
         if (!soup.colours.empty()) colours[v] = detail::cgal_colour(soup.colours[source], options.colours);
-        if (!soup.uvs.empty()) {
-            const glm::dvec2 uv(soup.uvs[source]);
-            uvs[v] = typename T::TexturePoint(uv.x, uv.y);
-        }
-        out.sources.push_back(source);
+        if (!soup.uvs.empty()) uvs[v] = typename T::TexturePoint(soup.uvs[source].x, soup.uvs[source].y);
         return v;
     };
-    for (std::size_t v = 0; v < soup.positions.size(); ++v) add_vertex(static_cast<vdtree::Index>(v));
-    const auto handle = [](vdtree::Index v) { return Vertex(v); };
-    const auto add_face = [&](Vertex a, Vertex b, Vertex f) { return mesh.add_face(a, b, f) != M::null_face(); };
-    const auto loose = adapters::add_triangles(soup, handle, add_vertex, add_face);
-    if (!loose) return loose.error();
-    out.loose_triangles = *loose;
-    return out;
+    const auto add_face = [](M& mesh, Vertex a, Vertex b, Vertex c) {
+        return mesh.add_face(a, b, c) != M::null_face();
+    };
+    return adapters::filled(std::move(out), soup, add_vertex, add_face);
 }
 
 // The tree of a mesh. Its source_vertices() are the numbers of the handles, if nothing is removed and there is no "h:uv".
@@ -188,9 +174,7 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
 template <class Point>
 Result<vdtree::VertexTree> build_tree(const CGAL::Surface_mesh<Point>& mesh, const vdtree::BuildOptions& build = {},
                                       const Options& options = {}) {
-    const auto soup = to_mesh(mesh, options);
-    if (!soup) return soup.error();
-    return vdtree::build_tree(soup->mesh.view(), build);
+    return adapters::build_tree(to_mesh(mesh, options), build);
 }
 
 // The cut as a mesh; `sources` are the tree's nodes.

@@ -37,29 +37,6 @@ using ClusterDecimater = OpenMesh::Decimater::DecimaterT<ClusterMesh>;
 
 namespace detail {
 
-// Records a hierarchy while merges happen.
-class MergeRecord {
-public:
-    explicit MergeRecord(std::size_t vertices) : parents_(vertices, 0) {}
-
-    vdtree::Index make_cluster(glm::dvec3 position) {
-        parents_.push_back(0);
-        positions_.push_back(position);
-        return static_cast<vdtree::Index>(parents_.size() - 1);
-    }
-    void set_parent(vdtree::Index cluster, vdtree::Index parent) { parents_[cluster] = parent; }
-    std::size_t size() const { return parents_.size(); }
-
-    vdtree::Clustering finish() {
-        parents_.back() = static_cast<vdtree::Index>(parents_.size() - 1);
-        return {std::move(parents_), std::move(positions_)};
-    }
-
-private:
-    std::vector<vdtree::Index> parents_;
-    std::vector<glm::dvec3> positions_;
-};
-
 // A module that allows every collapse and reports those that happen.
 template <class M>
 class ModRecordT : public OpenMesh::Decimater::ModBaseT<M> {
@@ -93,43 +70,12 @@ private:
     bool cancelled_ = false;
 };
 
-// Merges the vertices that no collapse has removed, by Unseen's own clusterers.
-inline Result<vdtree::Clustering> cluster_rest(const vdtree::ClusterInput& input, const ClusterMesh& mesh,
-                                               std::span<const vdtree::Index> vertex_of_place,
-                                               std::span<const vdtree::Index> places) {
-    vdtree::Mesh rest;
-    std::vector<float> luminance;
-    std::vector<glm::vec3> normals;
-    std::vector<double> areas;
-    std::vector<vdtree::Index> coincident, number(vertex_of_place.size(), 0);
-    for (const vdtree::Index place : places) {
-        const vdtree::Index v = vertex_of_place[place];
-        number[place] = static_cast<vdtree::Index>(rest.positions.size());
-        coincident.push_back(number[place]);
-        rest.positions.push_back(input.mesh.positions[v]);
-        if (!input.mesh.colours.empty()) rest.colours.push_back(input.mesh.colours[v]);
-        if (!input.mesh.uvs.empty()) rest.uvs.push_back(input.mesh.uvs[v]);
-        luminance.push_back(input.luminance[v]);
-        normals.push_back(input.normals[v]);
-        areas.push_back(input.areas[v]);
-    }
-    for (std::size_t i = 0; i < mesh.n_faces(); ++i) {
-        const ClusterMesh::FaceHandle f(static_cast<int>(i));
-        if (mesh.status(f).deleted()) continue;
-        vdtree::Triangle t{};
-        std::size_t k = 0;
-        for (auto v = mesh.cfv_iter(f); v.is_valid() && k < 3; ++v) t[k++] = number[static_cast<std::size_t>(v->idx())];
-        rest.triangles.push_back(t);
-    }
-    const vdtree::ClusterInput input_of_rest{rest.view(), luminance, normals, areas, coincident};
-    return rest.triangles.empty() ? vdtree::cluster_octree(input_of_rest) : vdtree::cluster_quadric(input_of_rest);
-}
-
 // One clustering: the mesh with one vertex for each place, decimated, and the merges that it leads to.
 class DecimaterClustering {
 public:
     explicit DecimaterClustering(const vdtree::ClusterInput& input)
-        : input_(input), place_of_(input.mesh.positions.size()), record_(input.mesh.positions.size()) {
+        : input_(input), place_of_(input.mesh.positions.size()) {
+        out_.parents.resize(input.mesh.positions.size());
         glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
         for (const glm::dvec3& p : input.mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
         const glm::dvec3 sides = high - low;
@@ -165,9 +111,8 @@ public:
         decimater.add(recorder);
         decimater.module(recorder).on_collapse = [&](int removed, int remaining) {
             const auto from = static_cast<std::size_t>(removed), to = static_cast<std::size_t>(remaining);
-            const Index merged = record_.make_cluster(position(to));
-            record_.set_parent(cluster_of_[from], merged);
-            record_.set_parent(cluster_of_[to], merged);
+            const Index merged = make_cluster(position(to));
+            out_.parents[cluster_of_[from]] = out_.parents[cluster_of_[to]] = merged;
             cluster_of_[to] = merged;
             is_removed_[from] = 1;
         };
@@ -188,29 +133,34 @@ public:
         std::vector<Index> left;
         for (std::size_t place = 0; place < is_removed_.size(); ++place)
             if (!is_removed_[place]) left.push_back(static_cast<Index>(place));
-        if (left.size() == 1) {
-            if (record_.size() == place_of_.size()) { // one vertex alone: it still needs a root
-                const Index root = record_.make_cluster(position(left[0]));
-                record_.set_parent(cluster_of_[left[0]], root);
-            }
-            return record_.finish();
+        if (left.size() == 1 && out_.positions.empty()) { // one vertex alone: it still needs a root
+            const Index root = make_cluster(position(left[0]));
+            out_.parents[cluster_of_[left[0]]] = root;
+        } else if (left.size() > 1) {
+            const auto rest = cluster_rest(left);
+            if (!rest) return rest.error();
+            // Clusters of the rest follow those made so far.
+            const auto base = static_cast<Index>(out_.parents.size());
+            const auto number = [&](Index c) {
+                return c < left.size() ? cluster_of_[left[c]] : base + (c - static_cast<Index>(left.size()));
+            };
+            for (const glm::dvec3& p : rest->positions.empty() ? means_of(*rest, left) : rest->positions)
+                make_cluster(p);
+            for (std::size_t c = 0; c + 1 < rest->parents.size(); ++c)
+                out_.parents[number(static_cast<Index>(c))] = number(rest->parents[c]);
         }
-        const auto rest = cluster_rest(input_, mesh_, vertex_of_place_, left);
-        if (!rest) return rest.error();
-        // Clusters of the rest follow those made so far.
-        const auto base = static_cast<Index>(record_.size());
-        const auto number = [&](Index c) {
-            return c < left.size() ? cluster_of_[left[c]] : base + (c - static_cast<Index>(left.size()));
-        };
-        for (const glm::dvec3& p : rest->positions.empty() ? means_of(*rest, left) : rest->positions)
-            record_.make_cluster(p);
-        for (std::size_t c = 0; c + 1 < rest->parents.size(); ++c)
-            record_.set_parent(number(static_cast<Index>(c)), number(rest->parents[c]));
-        return record_.finish();
+        out_.parents.back() = static_cast<Index>(out_.parents.size() - 1);
+        return std::move(out_);
     }
 
 private:
     using Index = vdtree::Index;
+
+    Index make_cluster(glm::dvec3 position) {
+        out_.parents.push_back(0);
+        out_.positions.push_back(position);
+        return static_cast<Index>(out_.parents.size() - 1);
+    }
 
     void add_vertices() {
         for (std::size_t v = 0; v < place_of_.size(); ++v) {
@@ -230,11 +180,40 @@ private:
     void merge_coincident() {
         for (std::size_t place = 0; place < vertex_of_place_.size(); ++place)
             cluster_of_.push_back(vertices_there_[place] == 1 ? vertex_of_place_[place]
-                                                              : record_.make_cluster(position(place)));
+                                                              : make_cluster(position(place)));
         for (std::size_t v = 0; v < place_of_.size(); ++v)
-            if (vertices_there_[place_of_[v]] > 1) record_.set_parent(static_cast<Index>(v), cluster_of_[place_of_[v]]);
+            if (vertices_there_[place_of_[v]] > 1) out_.parents[v] = cluster_of_[place_of_[v]];
     }
     const glm::dvec3& position(std::size_t place) const { return input_.mesh.positions[vertex_of_place_[place]]; }
+
+    // Merges places that no collapse has removed, by Unseen's own clusterers.
+    Result<vdtree::Clustering> cluster_rest(std::span<const Index> left) const {
+        vdtree::Mesh rest;
+        std::vector<float> luminance;
+        std::vector<glm::vec3> normals;
+        std::vector<double> areas;
+        std::vector<Index> coincident, number(vertex_of_place_.size(), 0);
+        for (const Index place : left) {
+            const Index v = vertex_of_place_[place];
+            number[place] = static_cast<Index>(rest.positions.size());
+            coincident.push_back(number[place]);
+            rest.positions.push_back(input_.mesh.positions[v]);
+            if (!input_.mesh.colours.empty()) rest.colours.push_back(input_.mesh.colours[v]);
+            if (!input_.mesh.uvs.empty()) rest.uvs.push_back(input_.mesh.uvs[v]);
+            luminance.push_back(input_.luminance[v]);
+            normals.push_back(input_.normals[v]);
+            areas.push_back(input_.areas[v]);
+        }
+        for (const auto f : mesh_.all_faces()) {
+            if (mesh_.status(f).deleted()) continue;
+            vdtree::Triangle& t = rest.triangles.emplace_back();
+            std::size_t k = 0;
+            for (auto v = mesh_.cfv_iter(f); v.is_valid() && k < 3; ++v)
+                t[k++] = number[static_cast<std::size_t>(v->idx())];
+        }
+        const vdtree::ClusterInput input{rest.view(), luminance, normals, areas, coincident};
+        return rest.triangles.empty() ? vdtree::cluster_octree(input) : vdtree::cluster_quadric(input);
+    }
 
     // By cluster of the rest that is no place: the mean of the places under it.
     std::vector<glm::dvec3> means_of(const vdtree::Clustering& rest, std::span<const Index> left) const {
@@ -254,7 +233,7 @@ private:
     ClusterMesh mesh_;
     std::vector<Index> place_of_;                         // by vertex
     std::vector<Index> vertex_of_place_, vertices_there_; // by place: the first vertex, and how many
-    MergeRecord record_;
+    vdtree::Clustering out_;
     std::vector<Index> cluster_of_;        // by place: its cluster so far
     std::vector<std::uint8_t> is_removed_; // by place
 };

@@ -52,6 +52,14 @@ glm::vec3 vec3_of(const V& v) {
     return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
+template <class V, class Vector>
+V vector_of(const Vector& v) {
+    V out;
+    for (std::size_t k = 0; k < OpenMesh::vector_traits<V>::size_; ++k)
+        out[k] = static_cast<typename OpenMesh::vector_traits<V>::value_type>(v[static_cast<int>(k)]);
+    return out;
+}
+
 // OpenMesh's colours have three or four channels of bytes, or of floating-point numbers from 0 to 1.
 template <class Colour>
 glm::vec4 colour_of(const Colour& colour, ColourEncoding encoding) {
@@ -93,24 +101,22 @@ Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
     const bool corner_uvs = !vertex_uvs && mesh.has_halfedge_texcoords2D();
     const bool has_colours = mesh.has_vertex_colors();
 
-    Soup<M> out;
-    adapters::CornerSoup soup(vertex_normals || corner_normals, has_colours, vertex_uvs || corner_uvs);
-    std::vector<adapters::CornerSoup::Corner> corners; // by vertex of the soup
+    using Maker = adapters::SoupMaker<typename M::VertexHandle, typename M::FaceHandle>;
+    using Corner = typename Maker::Corner;
+    Maker soup(vertex_normals || corner_normals, has_colours, vertex_uvs || corner_uvs);
     constexpr vdtree::Index deleted = static_cast<vdtree::Index>(-1);
     std::vector<vdtree::Index> numbers(mesh.n_vertices(), deleted); // by vertex handle
-    std::vector<typename M::VertexHandle> kept;
+    vdtree::Index kept = 0;
     for (std::size_t i = 0; i < mesh.n_vertices(); ++i) {
         const typename M::VertexHandle v(static_cast<int>(i));
         if (vertex_is_deleted(v)) continue;
-        adapters::CornerSoup::Corner corner;
+        Corner corner;
         if (vertex_normals) corner.normal = detail::vec3_of(mesh.normal(v));
         if (has_colours) corner.colour = detail::colour_of(mesh.color(v), options.colours);
         if (vertex_uvs) corner.uv = {mesh.texcoord2D(v)[0], mesh.texcoord2D(v)[1]};
-        numbers[i] = static_cast<vdtree::Index>(kept.size());
+        numbers[i] = kept++;
         const auto p = mesh.point(v);
-        soup.add_vertex(glm::dvec3(p[0], p[1], p[2]), corner);
-        corners.push_back(corner);
-        kept.push_back(v);
+        soup.add_vertex(v, glm::dvec3(p[0], p[1], p[2]), corner);
     }
     for (std::size_t i = 0; i < mesh.n_faces(); ++i) {
         const typename M::FaceHandle f(static_cast<int>(i));
@@ -119,32 +125,26 @@ Result<Soup<M>> to_mesh(const M& mesh, const Options& options = {}) {
         const auto first = mesh.halfedge_handle(f);
         if (!first.is_valid())
             return adapters::malformed(face + " has no halfedge: it was made without vertices; delete it.");
-        vdtree::Triangle triangle{};
-        std::size_t count = 0;
-        auto h = first;
-        do {
+        const auto next = [&](auto h) { return mesh.next_halfedge_handle(h); };
+        const auto source_of = [&](auto h) -> Result<vdtree::Index> {
+            if (!h.is_valid()) return adapters::not_closed(face);
             const auto v = mesh.to_vertex_handle(h);
-            if (!v.is_valid() || static_cast<std::size_t>(v.idx()) >= numbers.size() ||
-                numbers[static_cast<std::size_t>(v.idx())] == deleted)
-                return adapters::malformed(face + " uses vertex " + std::to_string(v.idx()) +
-                                           ", which is deleted or not there; delete the face, too.");
-            if (count < 3) {
-                const vdtree::Index number = numbers[static_cast<std::size_t>(v.idx())];
-                adapters::CornerSoup::Corner corner = corners[number];
-                if (corner_normals) corner.normal = detail::vec3_of(mesh.normal(h));
-                if (corner_uvs) corner.uv = {mesh.texcoord2D(h)[0], mesh.texcoord2D(h)[1]};
-                triangle[count] = soup.corner(number, corner);
-            }
-            ++count;
-            h = mesh.next_halfedge_handle(h);
-        } while (h.is_valid() && h != first && count <= mesh.n_halfedges());
-        if (const auto valid = adapters::check_face(face, h == first, count, "call triangulate() first."); !valid)
-            return valid.error();
-        soup.add_triangle(triangle);
-        out.faces.push_back(f);
+            if (v.is_valid() && static_cast<std::size_t>(v.idx()) < numbers.size() &&
+                numbers[static_cast<std::size_t>(v.idx())] != deleted)
+                return numbers[static_cast<std::size_t>(v.idx())];
+            return adapters::malformed(face + " uses vertex " + std::to_string(v.idx()) +
+                                       ", which is deleted or not there; delete the face, too.");
+        };
+        const auto set_own = [&](auto h, Corner& corner) {
+            if (corner_normals) corner.normal = detail::vec3_of(mesh.normal(h));
+            if (corner_uvs) corner.uv = {mesh.texcoord2D(h)[0], mesh.texcoord2D(h)[1]};
+        };
+        if (const auto added = soup.add_face(f, face, first, mesh.n_halfedges(), next, source_of, set_own,
+                                             "call triangulate() first.");
+            !added)
+            return added.error();
     }
-    soup.finish(out, kept);
-    return out;
+    return soup.finish();
 }
 
 // Normals, colours and texture coordinates become vertex properties if the soup has them. Coincident vertices stay apart.
@@ -153,40 +153,21 @@ template <class M>
 Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options = {}) {
     if (const auto valid = vdtree::validate(soup); !valid) return valid.error();
     Made<M> out;
-    M& mesh = out.mesh;
-    mesh.reserve(soup.positions.size(), soup.positions.size() + soup.triangles.size(), soup.triangles.size());
-    if (!soup.normals.empty()) mesh.request_vertex_normals();
-    if (!soup.colours.empty()) mesh.request_vertex_colors();
-    if (!soup.uvs.empty()) mesh.request_vertex_texcoords2D();
-    using Coordinate = typename OpenMesh::vector_traits<typename M::Point>::value_type;
-    using NormalCoordinate = typename OpenMesh::vector_traits<typename M::Normal>::value_type;
-    using TexCoordinate = typename OpenMesh::vector_traits<typename M::TexCoord2D>::value_type;
-    const auto add_vertex = [&](vdtree::Index source) {
-        const glm::dvec3 p = soup.positions[source];
-        const auto v = mesh.add_vertex(typename M::Point(static_cast<Coordinate>(p.x), static_cast<Coordinate>(p.y),
-                                                         static_cast<Coordinate>(p.z)));
-        if (!soup.normals.empty()) {
-            const glm::vec3 n = soup.normals[source];
-            mesh.set_normal(v,
-                            typename M::Normal(static_cast<NormalCoordinate>(n.x), static_cast<NormalCoordinate>(n.y),
-                                               static_cast<NormalCoordinate>(n.z)));
-        }
+    out.mesh.reserve(soup.positions.size(), soup.positions.size() + soup.triangles.size(), soup.triangles.size());
+    if (!soup.normals.empty()) out.mesh.request_vertex_normals();
+    if (!soup.colours.empty()) out.mesh.request_vertex_colors();
+    if (!soup.uvs.empty()) out.mesh.request_vertex_texcoords2D();
+    const auto add_vertex = [&](M& mesh, vdtree::Index source) {
+        const auto v = mesh.add_vertex(detail::vector_of<typename M::Point>(soup.positions[source]));
+        if (!soup.normals.empty()) mesh.set_normal(v, detail::vector_of<typename M::Normal>(soup.normals[source]));
         if (!soup.colours.empty())
             mesh.set_color(v, detail::openmesh_colour<typename M::Color>(soup.colours[source], options.colours));
-        if (!soup.uvs.empty())
-            mesh.set_texcoord2D(v, typename M::TexCoord2D(static_cast<TexCoordinate>(soup.uvs[source].x),
-                                                          static_cast<TexCoordinate>(soup.uvs[source].y)));
-        out.sources.push_back(source);
+        if (!soup.uvs.empty()) mesh.set_texcoord2D(v, detail::vector_of<typename M::TexCoord2D>(soup.uvs[source]));
         return v;
     };
-    for (std::size_t v = 0; v < soup.positions.size(); ++v) add_vertex(static_cast<vdtree::Index>(v));
+    const auto add_face = [](M& mesh, auto a, auto b, auto c) { return mesh.add_face(a, b, c).is_valid(); };
     const detail::QuietErrors quiet;
-    const auto handle = [](vdtree::Index v) { return typename M::VertexHandle(static_cast<int>(v)); };
-    const auto add_face = [&](auto a, auto b, auto c) { return mesh.add_face(a, b, c).is_valid(); };
-    const auto loose = adapters::add_triangles(soup, handle, add_vertex, add_face);
-    if (!loose) return loose.error();
-    out.loose_triangles = *loose;
-    return out;
+    return adapters::filled(std::move(out), soup, add_vertex, add_face);
 }
 
 // The tree of a mesh. Its source_vertices() are the numbers of the handles, if nothing is deleted and attributes are by
@@ -194,9 +175,7 @@ Result<Made<M>> from_mesh(const vdtree::MeshView& soup, const Options& options =
 template <class M>
 Result<vdtree::VertexTree> build_tree(const M& mesh, const vdtree::BuildOptions& build = {},
                                       const Options& options = {}) {
-    const auto soup = to_mesh(mesh, options);
-    if (!soup) return soup.error();
-    return vdtree::build_tree(soup->mesh.view(), build);
+    return adapters::build_tree(to_mesh(mesh, options), build);
 }
 
 // The cut as a mesh; `sources` are the tree's nodes.
