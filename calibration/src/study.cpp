@@ -217,20 +217,7 @@ namespace {
 constexpr std::array<std::string_view, 12> columns = {"subject", "trial",    "condition", "original",
                                                       "other",   "training", "task",      "predicted",
                                                       "side",    "answer",   "right",     "seconds"};
-enum {
-    subject_,
-    trial_,
-    condition_,
-    original_,
-    other_,
-    training_,
-    task_,
-    predicted_,
-    side_,
-    answer_,
-    right_,
-    seconds_
-};
+enum { subject_, trial_, condition_, original_, other_, training_, task_, expected_, side_, answer_, right_, seconds_ };
 using Line = std::vector<std::string>;
 
 const Line& header() {
@@ -255,7 +242,7 @@ Line line_of(const Study& study, std::string_view subject, const StudyTrial& tri
     line[other_] = pair.other.filename().string();
     line[training_] = pair.is_training ? "1" : "0";
     line[task_] = name(study.task);
-    if (pair.is_predicted_seen) line[predicted_] = *pair.is_predicted_seen ? "seen" : "unseen";
+    if (pair.is_predicted_seen) line[expected_] = *pair.is_predicted_seen ? "seen" : "unseen";
     line[side_] = trial.is_other_left ? "left" : "right";
     return line;
 }
@@ -431,10 +418,10 @@ Result<StudyAnalysis> analyse_answers(std::span<const fs::path> files) {
             add(tally->result.seen, is_seen);
             tally->seconds.push_back(line.seconds);
             if (line.task == StudyTask::differ && is_same) add(false_alarms, is_seen);
-            if (fields[predicted_].empty() || line.task == StudyTask::which) {
+            if (fields[expected_].empty() || line.task == StudyTask::which) {
                 tally->is_predicted = false;
             } else {
-                const bool agrees = is_seen == (fields[predicted_] == "seen");
+                const bool agrees = is_seen == (fields[expected_] == "seen");
                 add(tally->agreed, agrees);
                 add(agreed, agrees);
             }

@@ -53,30 +53,29 @@ Triangle from_least(Triangle t) {
     return t;
 }
 
-double diagonal_of(const std::vector<glm::dvec3>& positions) {
-    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-    for (const glm::dvec3& p : positions) low = glm::min(low, p), high = glm::max(high, p);
-    return positions.empty() ? 0 : glm::length(high - low);
+struct Box {
+    glm::dvec3 low = glm::dvec3(std::numeric_limits<double>::infinity()), high = -low;
+    void add(glm::dvec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
+    double diagonal() const { return low.x <= high.x ? glm::length(high - low) : 0; }
+};
+
+template <class Points>
+Box box_of(const Points& points) {
+    Box box;
+    for (const glm::dvec3& p : points) box.add(p);
+    return box;
 }
+
+glm::dvec3 vector_of(const Point& p) { return {p.x(), p.y(), p.z()}; }
 
 // Vertices by their positions: each one's place, numbered by first appearance.
 struct Places {
-    explicit Places(const std::vector<glm::dvec3>& positions) : of_vertex(positions.size()) {
-        std::vector<Index> order(positions.size());
-        std::iota(order.begin(), order.end(), Index{0});
-        const auto key = [&](Index v) { return std::array{positions[v].x, positions[v].y, positions[v].z}; };
-        std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-            const auto x = key(a), y = key(b);
-            return x != y ? x < y : a < b;
-        });
-        std::vector<Index> first(positions.size());
-        for (std::size_t i = 0; i < order.size(); ++i)
-            first[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? first[order[i - 1]] : order[i];
-        for (std::size_t v = 0; v < first.size(); ++v) {
-            if (first[v] == v) {
-                of_vertex[v] = static_cast<Index>(points.size());
-                points.emplace_back(positions[v].x, positions[v].y, positions[v].z);
-            } else of_vertex[v] = of_vertex[first[v]];
+    explicit Places(const std::vector<glm::dvec3>& positions) {
+        std::map<std::array<double, 3>, Index> numbers;
+        for (const glm::dvec3& p : positions) {
+            const auto [entry, is_new] = numbers.try_emplace({p.x, p.y, p.z}, static_cast<Index>(points.size()));
+            if (is_new) points.emplace_back(p.x, p.y, p.z);
+            of_vertex.push_back(entry->second);
         }
     }
 
@@ -89,7 +88,7 @@ struct Places {
 class Repairer {
 public:
     Repairer(Mesh mesh, const Options& options)
-        : mesh_(std::move(mesh)), options_(options), diagonal_(diagonal_of(mesh_.positions)) {}
+        : mesh_(std::move(mesh)), options_(options), diagonal_(box_of(mesh_.positions).diagonal()) {}
 
     Result<Repaired> run() {
         drop_duplicates();
@@ -142,7 +141,7 @@ private:
         for (const auto& [edge, count] : uses)
             if (count == 1) is_border[edge.first] = is_border[edge.second] = 1;
         std::vector<glm::dvec3> positions;
-        for (const Point& p : places.points) positions.emplace_back(p.x(), p.y(), p.z());
+        for (const Point& p : places.points) positions.push_back(vector_of(p));
         const std::vector<Index> target = find_targets(positions, is_border, uses, gap);
         for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
             const Index place = places.of_vertex[v];
@@ -156,20 +155,12 @@ private:
     static std::vector<Index> find_targets(std::span<const glm::dvec3> positions,
                                            std::span<const std::uint8_t> is_border, const Edges& uses, double gap) {
         using Cell = std::array<std::int64_t, 3>;
-        struct CellHash {
-            std::size_t operator()(const Cell& c) const noexcept {
-                std::size_t hash = 0;
-                for (const std::int64_t k : c) hash = hash * 0x9E3779B97F4A7C15u + static_cast<std::size_t>(k) + 1;
-                return hash;
-            }
-        };
-        glm::dvec3 low(std::numeric_limits<double>::infinity());
-        for (const glm::dvec3& p : positions) low = glm::min(low, p);
+        const glm::dvec3 low = box_of(positions).low;
         const auto cell_of = [&](glm::dvec3 p) { // at most 1 / gap cells a side: fits, for gaps are no smaller
             const glm::dvec3 c = glm::floor((p - low) / gap);
             return Cell{static_cast<std::int64_t>(c.x), static_cast<std::int64_t>(c.y), static_cast<std::int64_t>(c.z)};
         };
-        std::unordered_map<Cell, std::vector<Index>, CellHash> kept; // places that others move to
+        std::map<Cell, std::vector<Index>> kept; // places that others move to
         std::vector<Index> target(positions.size());
         std::iota(target.begin(), target.end(), Index{0});
         for (Index place = 0; place < target.size(); ++place) {
@@ -207,8 +198,6 @@ private:
         }
     }
 
-    bool same_point(std::size_t a, std::size_t b) const { return points_[a] == points_[b]; }
-
     // One orientation for what edges connect: that of most of its triangles. CGAL gives vertices of non-manifold edges
     // points of their own.
     void orient_parts() {
@@ -216,7 +205,8 @@ private:
         pmp::orient_polygon_soup(points_, polygons_);
         if (!options_.orients) return; // halfedges need it; the mesh keeps its own
         std::vector<std::uint8_t> is_turned(polygons_.size());
-        for (std::size_t i = 0; i < polygons_.size(); ++i) is_turned[i] = !same_point(polygons_[i][0], before[i][0]);
+        for (std::size_t i = 0; i < polygons_.size(); ++i)
+            is_turned[i] = points_[polygons_[i][0]] != points_[before[i][0]];
         // Parts, by the edges of the oriented polygons.
         std::vector<std::size_t> part(polygons_.size());
         std::iota(part.begin(), part.end(), std::size_t{0});
@@ -264,18 +254,12 @@ private:
     std::vector<double> find_part_diagonals() {
         const auto component = surface_.add_property_map<Face, std::size_t>("f:part", 0).first;
         const std::size_t count = pmp::connected_components(surface_, component);
-        const glm::dvec3 far(std::numeric_limits<double>::infinity());
-        std::vector<glm::dvec3> low(count, far), high(count, -far);
+        std::vector<Box> boxes(count);
         for (const Face face : surface_.faces())
-            for (const Vertex v : CGAL::vertices_around_face(surface_.halfedge(face), surface_)) {
-                const Point& p = surface_.point(v);
-                const std::size_t part = component[face];
-                low[part] = glm::min(low[part], glm::dvec3(p.x(), p.y(), p.z()));
-                high[part] = glm::max(high[part], glm::dvec3(p.x(), p.y(), p.z()));
-            }
+            for (const Vertex v : CGAL::vertices_around_face(surface_.halfedge(face), surface_))
+                boxes[component[face]].add(vector_of(surface_.point(v)));
         std::vector<double> diagonals(surface_.num_faces(), 0);
-        for (const Face face : surface_.faces())
-            diagonals[face] = glm::length(high[component[face]] - low[component[face]]);
+        for (const Face face : surface_.faces()) diagonals[face] = boxes[component[face]].diagonal();
         return diagonals;
     }
 
@@ -286,14 +270,12 @@ private:
         if (!options_.caps || borders.empty()) return;
         const std::vector<double> part_diagonal = find_part_diagonals();
         for (const Halfedge border : borders) {
-            glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+            Box box;
             std::map<Vertex, Index> corner_at; // a vertex of the mesh for each of the surface
             std::size_t edges = 0;
             for (const Halfedge h : CGAL::halfedges_around_face(border, surface_)) {
                 const Vertex v = surface_.target(h);
-                const Point& p = surface_.point(v);
-                low = glm::min(low, glm::dvec3(p.x(), p.y(), p.z()));
-                high = glm::max(high, glm::dvec3(p.x(), p.y(), p.z()));
+                box.add(vector_of(surface_.point(v)));
                 corner_at.try_emplace(v, vertex_at(face_triangle_[surface_.face(surface_.opposite(h))], v));
                 ++edges;
             }
@@ -305,8 +287,7 @@ private:
                 const Index from = place(surface_.source(h)), to = place(surface_.target(h));
                 is_cut = is_cut || edge_uses_.at({std::min(from, to), std::max(from, to)}) > 1;
             }
-            if (is_cut || edges > most_hole_edges || !(glm::length(high - low) <= options_.largest_hole * part))
-                continue;
+            if (is_cut || edges > most_hole_edges || !(box.diagonal() <= options_.largest_hole * part)) continue;
             const Index beside = face_triangle_[surface_.face(surface_.opposite(border))];
             std::vector<Face> patch;
             pmp::triangulate_hole(surface_, border, std::back_inserter(patch));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
 #include <glm/geometric.hpp>
 
@@ -171,66 +170,6 @@ private:
     double farthest_;
 };
 
-// Looks for the farthest corner of the triangles, nodes that reach far first. Of several, the first leaf.
-class CornerFinder {
-public:
-    CornerFinder(const BoundInput& input, std::span<const Sphere> support) : in_(input), support_(support) {}
-
-    glm::dvec3 any() const {
-        Index leaf = 0;
-        while (in_.rings.around(leaf).empty()) ++leaf; // there is a triangle
-        return in_.leaf_position(leaf);
-    }
-
-    glm::dvec3 farthest(glm::dvec3 from) {
-        // Spheres contain their leaves but for the rounding of distances.
-        constexpr double slack = 1 + 1e-12;
-        const auto reach = [&](NodeId node) {
-            return (glm::distance(glm::dvec3(support_[node].centre), from) + support_[node].radius) * slack;
-        };
-        Index farthest = 0;
-        double most_squared = -1, most = -1;
-        open_.assign(1, {0, reach(0)});
-        while (!open_.empty()) {
-            const OpenNode node = open_.back();
-            open_.pop_back();
-            if (node.reach < most) continue;
-            const std::size_t siblings = open_.size();
-            in_.shape.for_each_child(
-                node.node,
-                [&](NodeId child) {
-                    if (const double far = reach(child); far >= most) open_.push_back({child, far});
-                },
-                [&](Index leaf) {
-                    const glm::dvec3 away = in_.leaf_position(leaf) - from;
-                    const double squared = glm::dot(away, away);
-                    if (squared < most_squared || (squared == most_squared && leaf > farthest) ||
-                        in_.rings.around(leaf).empty())
-                        return;
-                    farthest = leaf;
-                    most_squared = squared;
-                    most = std::sqrt(squared);
-                });
-            const auto children = open_.begin() + static_cast<std::ptrdiff_t>(siblings);
-            if (children == open_.end()) continue;
-            std::iter_swap(std::max_element(children, open_.end(),
-                                            [](const OpenNode& a, const OpenNode& b) { return a.reach < b.reach; }),
-                           std::prev(open_.end()));
-        }
-        return in_.leaf_position(farthest);
-    }
-
-private:
-    struct OpenNode {
-        NodeId node;
-        double reach;
-    };
-
-    const BoundInput& in_;
-    std::span<const Sphere> support_;
-    std::vector<OpenNode> open_; // still to be looked at
-};
-
 } // namespace
 
 NodeSpheres bound_spheres(const BoundInput& input) {
@@ -242,9 +181,11 @@ NodeSpheres bound_spheres(const BoundInput& input) {
     return spheres;
 }
 
-Sphere bound_corners(const BoundInput& input, std::span<const Sphere> support) {
-    CornerFinder corners(input, support);
-    return round_outward(smallest_sphere(corners.any(), [&](glm::dvec3 from) { return corners.farthest(from); }));
+Sphere bound_corners(const BoundInput& input) {
+    std::vector<glm::dvec3> corners;
+    for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf)
+        if (!input.rings.around(leaf).empty()) corners.push_back(input.leaf_position(leaf));
+    return round_outward(smallest_sphere(corners));
 }
 
 std::vector<float> bound_displacements(const BoundInput& input, std::span<const Sphere> support) {

@@ -27,7 +27,7 @@ struct NodeSpheres {
 NodeSpheres bound_spheres(const BoundInput& input);
 
 // Around the corners of all triangles.
-Sphere bound_corners(const BoundInput& input, std::span<const Sphere> support);
+Sphere bound_corners(const BoundInput& input);
 
 // By interior node: the largest distance of a supported leaf from the proxy, and never less than a child's. Exact but
 // for rounding up, except in nodes with very many leaves, which are bounded through their children.

@@ -53,12 +53,6 @@ public:
         }
     }
 
-    // `points`: on the sphere, which is the smallest around them. Without points: a single ball.
-    Basis(std::span<const glm::dvec3> points, const DSphere& sphere)
-        : count_(static_cast<int>(points.size())), sphere_(sphere) {
-        std::copy(points.begin(), points.end(), points_.begin());
-    }
-
     const DSphere& sphere() const { return sphere_; }
 
     // Makes the smallest sphere around the basis and what of a ball is farthest outside of its sphere. For balls the
@@ -156,10 +150,20 @@ private:
 
 } // namespace
 
-DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) {
+DSphere smallest_sphere(std::span<const glm::dvec3> points) {
+    if (points.empty()) return {};
+    const auto farthest = [&](glm::dvec3 from) {
+        glm::dvec3 point = points[0];
+        double most = -1;
+        for (const glm::dvec3& p : points) {
+            const double here = squared(p - from);
+            if (here > most) most = here, point = p;
+        }
+        return point;
+    };
     constexpr double slack = 1e-13; // a point's distance loses a few units in the last place
     // Relative to the first point. A pair far apart is a good beginning.
-    const glm::dvec3 one = farthest(first) - first, other = farthest(one + first) - first;
+    const glm::dvec3 first = points[0], one = farthest(first) - first, other = farthest(one + first) - first;
     Basis basis({one, 0}, {other, 0});
     for (int round = 0;; ++round) {
         const DSphere& sphere = basis.sphere();
@@ -169,13 +173,6 @@ DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec
             return {centre, std::max(sphere.radius, reach)};
         basis.add({point - first, 0});
     }
-}
-
-DSphere smallest_sphere(std::span<const glm::dvec3> points) {
-    if (points.empty()) return {};
-    return smallest_sphere(points[0], [&](glm::dvec3 from) {
-        return *std::ranges::max_element(points, {}, [&](glm::dvec3 p) { return squared(p - from); });
-    });
 }
 
 // ---- several at once
@@ -205,20 +202,6 @@ struct FarthestOfLanes {
     }
 };
 
-// A basis of each lane while it has up to three points.
-struct Bases {
-    Row points[3];
-    BallRow sphere;
-    std::array<std::int64_t, lanes> count;   // 0: a single ball
-    std::array<std::int64_t, lanes> growing; // whether something stuck out
-    std::array<std::int64_t, lanes> added;   // and is in the basis now
-
-    Basis basis(std::size_t lane) const {
-        const std::array<glm::dvec3, 3> all = {points[0].at(lane), points[1].at(lane), points[2].at(lane)};
-        return {std::span(all).first(static_cast<std::size_t>(count[lane])), sphere.ball(lane)};
-    }
-};
-
 // `width` lanes at a time: as many as the processor's registers hold (an extension that GCC and Clang share).
 template <std::size_t width>
 struct Kernel {
@@ -232,10 +215,7 @@ struct Kernel {
         std::memcpy(&out, &from[first], sizeof out);
         return out;
     }
-    template <class Vector, class T>
-    UNSEEN_INLINE static void store(Vector v, std::array<T, lanes>& to, std::size_t first) {
-        std::memcpy(&to[first], &v, sizeof v);
-    }
+    UNSEEN_INLINE static void store(Doubles v, Lane& to, std::size_t first) { std::memcpy(&to[first], &v, sizeof v); }
     UNSEEN_INLINE static Doubles root(Doubles v) {
 #ifdef __SSE2__
         __m128d pairs[width / 2];
@@ -251,152 +231,54 @@ struct Kernel {
     struct Points {
         Doubles x, y, z;
 
-        UNSEEN_INLINE friend Points operator+(Points a, Points b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
         UNSEEN_INLINE friend Points operator-(Points a, Points b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-        UNSEEN_INLINE friend Points operator*(Points a, Doubles b) { return {a.x * b, a.y * b, a.z * b}; }
-        UNSEEN_INLINE friend Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
     };
     UNSEEN_INLINE static Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
-    UNSEEN_INLINE static Points cross(Points a, Points b) {
-        return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y};
-    }
     UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) {
         return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z};
     }
     UNSEEN_INLINE static Points load(const Row& row, std::size_t first) {
         return {load(row.x, first), load(row.y, first), load(row.z, first)};
     }
-    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) {
-        store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first);
-    }
-
-    // Balls, and how far they reach from somewhere.
-    struct FarBalls {
-        Points centre;
-        Doubles radius, squared, sphere_reach, reach;
-    };
-
-    UNSEEN_INLINE static FarBalls farthest_in(const Sets& sets, Points from, std::size_t first) {
-        FarBalls out{Points{}, Doubles{}, Doubles{} - 1, Doubles{} - 1, Doubles{}};
-        for (const Row& row : sets.points) {
-            const Points p = load(row, first);
-            const Doubles distance = squared(p - from);
-            const Masks farther = distance > out.squared;
-            out.squared = farther ? distance : out.squared;
-            out.centre = choose(farther, p, out.centre);
-        }
-        out.reach = root(out.squared);
-        for (const BallRow& row : sets.spheres) {
-            const Points p = load(row, first);
-            const Doubles radius = load(row.radius, first), reach = root(squared(p - from)) + radius;
-            out.sphere_reach = reach > out.sphere_reach ? reach : out.sphere_reach;
-            const Masks farther = reach > out.reach;
-            out.reach = farther ? reach : out.reach;
-            out.centre = choose(farther, p, out.centre);
-            out.radius = farther ? radius : out.radius;
-        }
-        return out;
-    }
-
-    UNSEEN_INLINE static void store(const FarBalls& far, FarthestOfLanes& out, std::size_t first) {
-        store(far.centre, out.ball, first);
-        store(far.radius, out.ball.radius, first);
-        store(far.squared, out.squared, first);
-        store(far.sphere_reach, out.sphere_reach, first);
-        store(far.reach, out.reach, first);
-    }
-
-    struct PairBases {
-        Points p, q, centre;
-        Doubles radius;
-        Masks is_pair; // else it is a single ball
-    };
-
-    // As Basis(a, b).
-    UNSEEN_INLINE static PairBases pair_up(const FarBalls& a, const FarBalls& b) {
-        const Points apart = b.centre - a.centre;
-        const Doubles distance = root(squared(apart));
-        const Masks is_a = distance + b.radius <= a.radius, is_b = distance + a.radius <= b.radius;
-        const Points direction = apart / (distance > 0 ? distance : Doubles{} + 1);
-        PairBases out;
-        out.p = a.centre - direction * a.radius;
-        out.q = b.centre + direction * b.radius;
-        out.centre = choose(is_a, a.centre, choose(is_b, b.centre, (out.p + out.q) * (Doubles{} + 0.5)));
-        out.radius = is_a ? a.radius : is_b ? b.radius : (distance + a.radius + b.radius) * 0.5;
-        out.is_pair = ~(is_a | is_b);
-        return out;
-    }
-
-    // As Basis::add() of what sticks out by more than a share of the radius.
-    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases,
-                                           std::size_t first) {
-        const Doubles limit = pair.radius * (1 + slack);
-        const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
-        // The point: of a sphere, the one on the far side.
-        const Points away = far.centre - pair.centre;
-        const Doubles length = root(squared(away));
-        const Points p = far.centre + away / (length > 0 ? length : Doubles{} + 1) * far.radius;
-        // Around it and one of the others, if that has the third in it.
-        const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
-        const Doubles aa = squared(half_a), bb = squared(half_b);
-        const double tight = 1 + 2 * containment_slack;
-        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight,
-                    with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
-        // Around all three.
-        const Points normal = cross(a, b);
-        const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
-        const Masks with_both = flat > least_flatness * length_a * length_b;
-        const Points offset = cross(b * length_a - a * length_b, normal) / (2 * (with_both ? flat : Doubles{} + 1));
-
-        const Masks stays_pair = with_a | with_b, added = grows & pair.is_pair & (stays_pair | with_both);
-        const Points centre = p + choose(with_a, half_a, choose(with_b, half_b, offset));
-        const Doubles radius = root(with_a ? aa : with_b ? bb : squared(offset));
-        store(choose(added & with_b, pair.q, pair.p), bases.points[0], first);
-        store(choose(added & stays_pair, p, pair.q), bases.points[1], first);
-        store(p, bases.points[2], first);
-        store(choose(added, centre, pair.centre), bases.sphere, first);
-        store(added ? radius : pair.radius, bases.sphere.radius, first);
-        store((pair.is_pair & 2) | (added & ~stays_pair & 1), bases.count, first);
-        store(grows, bases.growing, first);
-        store(added, bases.added, first);
-    }
-
     UNSEEN_INLINE static void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
-        for (std::size_t first = 0; first < lanes; first += width)
-            store(farthest_in(sets, load(from, first), first), out, first);
-    }
-
-    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere
-    // around it. `far`: from its centre.
-    UNSEEN_INLINE static void begin(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
         for (std::size_t first = 0; first < lanes; first += width) {
-            const FarBalls one = farthest_in(sets, Points{}, first);
-            const PairBases pair = pair_up(one, farthest_in(sets, one.centre, first));
-            const FarBalls far = farthest_in(sets, pair.centre, first);
-            add_to_pairs(pair, far, slack, bases, first);
-            store(far, out, first);
+            const Points start = load(from, first);
+            Points centre{};
+            Doubles of_ball{}, distance = Doubles{} - 1, sphere_reach = distance;
+            for (const Row& row : sets.points) {
+                const Points p = load(row, first);
+                const Doubles here = squared(p - start);
+                centre = choose(here > distance, p, centre);
+                distance = here > distance ? here : distance;
+            }
+            Doubles reach = root(distance);
+            for (const BallRow& row : sets.spheres) {
+                const Points p = load(row, first);
+                const Doubles radius = load(row.radius, first), here = root(squared(p - start)) + radius;
+                sphere_reach = here > sphere_reach ? here : sphere_reach;
+                const Masks farther = here > reach;
+                reach = farther ? here : reach;
+                centre = choose(farther, p, centre);
+                of_ball = farther ? radius : of_ball;
+            }
+            store(centre.x, out.ball.x, first), store(centre.y, out.ball.y, first), store(centre.z, out.ball.z, first);
+            store(of_ball, out.ball.radius, first);
+            store(distance, out.squared, first);
+            store(sphere_reach, out.sphere_reach, first);
+            store(reach, out.reach, first);
         }
     }
 };
 
 using FindFarthest = void(const Sets& sets, const Row& from, FarthestOfLanes& out);
-using Begin = void(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far);
 void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) {
     Kernel<2>::find_farthest(sets, from, out);
 }
-void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) {
-    Kernel<2>::begin(sets, slack, bases, far);
-}
-
 // Neither has fused operations, so both give the same bits.
 UNSEEN_AVX2 void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) {
     Kernel<4>::find_farthest(sets, from, out);
 }
-UNSEEN_AVX2 void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) {
-    Kernel<4>::begin(sets, slack, bases, far);
-}
 FindFarthest* const find = has_avx2() ? find_with_avx2 : find_with_any;
-Begin* const begin_bases = has_avx2() ? begin_with_avx2 : begin_with_any;
 
 } // namespace
 
@@ -415,21 +297,19 @@ void BallLanes::enclose(double slack, std::span<Sphere> out) {
     const std::size_t used = out.size();
     fill_up(used);
     const Sets sets{std::span(rows_).first(row_count_), std::span(spheres_).first(sphere_count_)};
-    Bases begun;
-    FarthestOfLanes far;
-    begin_bases(sets, slack, begun, far);
-    Row from = begun.sphere;
+    // A pair far apart is a good beginning, from each lane's first point, which is at 0.
+    FarthestOfLanes one, far;
+    Row from{};
+    find(sets, from, one);
+    from = one.ball;
+    find(sets, from, far);
     std::array<Basis, lanes> bases;
-    unsigned growing = 0;
     for (std::size_t lane = 0; lane < used; ++lane) {
-        if (!begun.growing[lane]) continue;
-        growing |= 1u << lane;
-        bases[lane] = begun.basis(lane);
-        if (begun.added[lane]) continue;
-        bases[lane].add(far.ball.ball(lane));
+        bases[lane] = Basis(one.ball.ball(lane), far.ball.ball(lane));
         from.put(lane, bases[lane].sphere().centre);
     }
-    for (int round = 1; growing != 0 && round < most_rounds; ++round) {
+    unsigned growing = (1u << used) - 1;
+    for (int round = 0; growing != 0 && round < most_rounds; ++round) {
         find(sets, from, far);
         for (unsigned rest = growing; rest != 0; rest &= rest - 1) {
             const auto lane = static_cast<std::size_t>(std::countr_zero(rest));

@@ -9,7 +9,6 @@
 
 #include <glm/vec3.hpp>
 
-#include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
@@ -19,9 +18,8 @@ struct DSphere {
     double radius = -1; // negative: contains nothing
 };
 
-// The smallest sphere that contains all points, which somebody else keeps (Welzl 1991, move to front): asks now and then,
-// ten times or so, for the point that is farthest from a place. `first`: any of them. Deterministic.
-DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3 from)>& farthest);
+// The smallest sphere that contains all points (Welzl 1991, move to front). Looks for the farthest from some place ten times
+// or so. Deterministic.
 DSphere smallest_sphere(std::span<const glm::dvec3> points);
 
 // Several sets of points and spheres, each to be enclosed by a sphere of its own, at the same time: the farthest points

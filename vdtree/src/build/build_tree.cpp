@@ -69,19 +69,6 @@ struct CleanMesh {
 
 bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-// Whether there is nothing to be cleaned.
-bool is_clean(const MeshView& mesh) {
-    std::vector<std::uint8_t> used(mesh.positions.size(), 0);
-    std::atomic<bool> whole = true;
-    parallel_loop_over(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1 << 14), [&](const auto& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            if (uses_a_vertex_twice(mesh.triangles[t])) whole = false;
-            for (const Index v : mesh.triangles[t]) std::atomic_ref(used[v]).store(1, std::memory_order_relaxed);
-        }
-    });
-    return whole && std::find(used.begin(), used.end(), 0) == used.end();
-}
-
 template <class T>
 std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
     std::vector<T> out;
@@ -93,10 +80,6 @@ std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
 
 CleanMesh clean(const MeshView& mesh) {
     CleanMesh out;
-    if (is_clean(mesh)) {
-        out.view = mesh;
-        return out;
-    }
     std::vector<std::uint8_t> used(mesh.positions.size(), 0);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
         if (uses_a_vertex_twice(mesh.triangles[t])) continue;
@@ -108,6 +91,11 @@ CleanMesh clean(const MeshView& mesh) {
     for (std::size_t v = 0; v < used.size(); ++v) {
         clean_number[v] = static_cast<Index>(out.source_vertices.size());
         (used[v] ? out.source_vertices : out.unreferenced).push_back(static_cast<Index>(v));
+    }
+    if (out.dropped == 0 && out.unreferenced.empty()) {
+        out = {};
+        out.view = mesh;
+        return out;
     }
     Mesh& m = out.storage;
     m.positions = select(mesh.positions, out.source_vertices);
@@ -367,15 +355,9 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
     });
-    const TreeParts& parts = *parts_;
     ProxyVertices proxies =
-        place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
-    parallel_loop(std::size_t{0}, clustering.positions.size(), [&](std::size_t i) {
-        const NodeId node = nodes_.node_of_cluster[i];
-        if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
-    });
-    keep_coincident_proxies(nodes_.shape, parts, proxies.positions);
-    if (is_textured()) keep_equal_uvs(nodes_.shape, parts, proxies.uvs);
+        place_proxies(nodes_.shape, *parts_, {source_, g_->source_vertices, weights, normals, g_->origin},
+                      {clustering.positions, nodes_.node_of_cluster});
     g_->positions = std::move(proxies.positions);
     g_->normals = std::move(proxies.normals);
     g_->colours = std::move(proxies.colours);
@@ -445,7 +427,7 @@ void TreeBuilder::bound() {
     const BoundInput input{shape, parts, rings, g_->positions};
 
     NodeSpheres spheres = bound_spheres(input);
-    g_->bounding_sphere = bound_corners(input, spheres.support);
+    g_->bounding_sphere = bound_corners(input);
     g_->displacement = bound_displacements(input, spheres.support);
     const ParallelArray<Directions> facing =
         bound_facing(input, triangles.triangles, places, spheres.support, ancestors);

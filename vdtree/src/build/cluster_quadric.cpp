@@ -10,7 +10,6 @@
 #include <unseen/vdtree/builder.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <numeric>
@@ -74,7 +73,7 @@ struct SpatialNumbering {
 class KdPartition {
 public:
     KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
-        : slots_(slots), items_(slots.size()), other_items_(slots.size()), parts_(parts) {
+        : slots_(slots), items_(slots.size()), parts_(parts) {
         parallel_loop(std::size_t{0}, slots.size(), [&](std::size_t i) {
             items_[i] = {positions[slots[i]], slots[i]};
         });
@@ -84,7 +83,7 @@ public:
     void run(std::size_t first, std::size_t end) {
         wanted_first_ = first;
         wanted_end_ = end;
-        split(0, parts_, items_, other_items_);
+        split(0, parts_);
     }
 
 private:
@@ -93,48 +92,21 @@ private:
         glm::dvec3 at;
         Index slot;
     };
-    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are
-    // in one of the two arrays.
-    void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
+    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number.
+    void split(std::size_t first_part, std::size_t parts) {
         if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
         const auto begin_of = [&](std::size_t part) { return part_begin(part, parts_, slots_.size()); };
         const Index begin = begin_of(first_part), middle = begin_of(first_part + parts / 2),
                     end = begin_of(first_part + parts);
-        const std::span<Item> items = std::span(from).subspan(begin, end - begin);
+        const std::span<Item> items = std::span(items_).subspan(begin, end - begin);
         if (parts == 1) return sort_along_curve(items, slots_.subspan(begin, end - begin));
-        halve(items, std::span(to).subspan(begin, end - begin), middle - begin);
-        parallel_loop(std::size_t{0}, std::size_t{2},
-                      [&](std::size_t half) { split(first_part + half * (parts / 2), parts / 2, to, from); });
-    }
-
-    // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are
-    // compared.
-    static void halve(std::span<const Item> from, std::span<Item> to, std::size_t left) {
-        constexpr std::size_t slices = 2048;
-        const Box bounds = box_around(from, &Item::at);
-        const glm::dvec3 size = bounds.size();
+        const Box box = box_around(items, &Item::at);
+        const glm::dvec3 size = box.size();
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        const double low = bounds.low[axis], slices_per_length = slices / size[axis];
-        const double scale = std::isfinite(slices_per_length) ? slices_per_length : 0;
-        const auto offset = [&](const Item& item) { return item.at[axis] - low; };
-        const auto slice_of = [&](const Item& item) {
-            return std::min(slices - 1, static_cast<std::size_t>(offset(item) * scale));
-        };
-        std::array<Index, slices> counts{};
-        for (const Item& item : from) ++counts[slice_of(item)];
-        std::size_t below = 0, mixed = 0;
-        while (below + counts[mixed] <= left) below += counts[mixed++];
-        // Where the next item below that slice goes, in it, and above it.
-        std::array<std::size_t, 3> next = {0, below, below + counts[mixed]};
-        for (const Item& item : from) {
-            const std::size_t slice = slice_of(item);
-            to[next[static_cast<std::size_t>(slice >= mixed) + static_cast<std::size_t>(slice > mixed)]++] = item;
-        }
-        const auto of_slice = to.subspan(below, counts[mixed]);
-        std::nth_element(of_slice.begin(), of_slice.begin() + static_cast<std::ptrdiff_t>(left - below), of_slice.end(),
-                         [&](const Item& a, const Item& b) {
-                             return offset(a) != offset(b) ? offset(a) < offset(b) : a.slot < b.slot;
-                         });
+        std::ranges::nth_element(items, items.begin() + (middle - begin), {},
+                                 [&](const Item& item) { return std::pair(item.at[axis] - box.low[axis], item.slot); });
+        parallel_loop(std::size_t{0}, std::size_t{2},
+                      [&](std::size_t half) { split(first_part + half * (parts / 2), parts / 2); });
     }
 
     // Equal codes by vertex number.
@@ -153,7 +125,7 @@ private:
     }
 
     std::span<Index> slots_;
-    std::vector<Item> items_, other_items_;
+    std::vector<Item> items_;
     std::size_t parts_, wanted_first_ = 0, wanted_end_ = 0;
 };
 
@@ -324,12 +296,8 @@ void PartMaker::list_triangles() {
         for (Index i = first_place(part); i < first_place(part + 1); ++i)
             part_of[numbering_.members[i]] = static_cast<Index>(part);
     });
-    // Chunk by chunk, so that each thread knows where its triangles go and their order is the mesh's.
-    constexpr std::size_t chunk_size = 1 << 16;
-    const std::size_t chunks = (count + chunk_size - 1) / chunk_size;
-    std::vector<std::size_t> next(chunks * parts, 0);
-    const auto for_each_use = [&](std::size_t chunk, auto&& f) {
-        for (std::size_t t = chunk * chunk_size; t < std::min(count, (chunk + 1) * chunk_size); ++t) {
+    const auto for_each_use = [&](auto&& f) {
+        for (std::size_t t = 0; t < count; ++t) {
             const Triangle& tri = input_.mesh.triangles[t];
             const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
             f(t, a);
@@ -337,21 +305,11 @@ void PartMaker::list_triangles() {
             if (c != a && c != b) f(t, c);
         }
     };
-    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
-        for_each_use(chunk, [&](std::size_t, Index part) { ++next[chunk * parts + part]; });
-    });
-    std::size_t sum = 0;
-    for (std::size_t part = 0; part < parts; ++part) {
-        first_triangle_[part] = sum;
-        for (std::size_t chunk = 0; chunk < chunks; ++chunk) sum += std::exchange(next[chunk * parts + part], sum);
-    }
-    first_triangle_[parts] = sum;
-    triangles_.resize(sum);
-    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
-        for_each_use(chunk, [&](std::size_t t, Index part) {
-            triangles_[next[chunk * parts + part]++] = static_cast<Index>(t);
-        });
-    });
+    for_each_use([&](std::size_t, Index part) { ++first_triangle_[part + 1]; });
+    std::partial_sum(first_triangle_.begin(), first_triangle_.end(), first_triangle_.begin());
+    triangles_.resize(first_triangle_.back());
+    std::vector<std::size_t> next(first_triangle_);
+    for_each_use([&](std::size_t t, Index part) { triangles_[next[part]++] = static_cast<Index>(t); });
 }
 
 void PartMaker::push_channels(Index v, std::vector<float>& to) const {

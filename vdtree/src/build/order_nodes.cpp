@@ -1,8 +1,6 @@
 #include "build/order_nodes.h"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 
@@ -166,61 +164,18 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
     return NodeOrderer(clustering, vertices, lone).run();
 }
 
-namespace {
-
-// For some triangles, the nodes that they vanish at.
-//
-// When that is found is as good as random, and the processor is not to guess: all of them go up the tree in turns, a
-// step each.
-template <std::size_t most>
-void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors,
-                    NodeId* out) {
-    const TreeShape& shape = nodes.shape;
-    std::array<NodeId, most> at;
-    std::array<Index, most> low, high;
-    const auto found = [&](std::size_t i, NodeId node) {
-        return (shape.first_leaf[node] <= low[i]) + (high[i] < shape.leaf_end[node]) > 0;
-    };
-    std::array<std::uint8_t, most> left;
-    std::size_t count = triangles.size();
-    for (std::size_t i = 0; i < count; ++i) {
-        const Triangle& t = triangles[i];
-        const Index a = nodes.leaf_of_vertex[t[0]], b = nodes.leaf_of_vertex[t[1]], c = nodes.leaf_of_vertex[t[2]];
-        low[i] = std::min({a, b, c});
-        high[i] = std::max({a, b, c});
-        // The middle one of three leaves merges first with another.
-        at[i] = shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low[i] ^ high[i])];
-        left[i] = static_cast<std::uint8_t>(i);
-    }
-    constexpr int most_steps = 16; // then jumps are quicker: the tree may be deep
-    for (int step = 0; count > 0 && step < most_steps; ++step) {
-        std::size_t kept = 0;
-        for (std::size_t j = 0; j < count; ++j) {
-            const std::uint8_t i = left[j];
-            const NodeId node = at[i];
-            const bool on = !found(i, node);
-            out[i] = node;
-            at[i] = shape.parents[node];
-            left[kept] = i;
-            kept += on;
-        }
-        count = kept;
-    }
-    for (std::size_t j = 0; j < count; ++j)
-        out[left[j]] = ancestors.lowest(at[left[j]], [&](NodeId node) { return found(left[j], node); });
-}
-
-} // namespace
-
 TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
     const TreeShape& shape = nodes.shape;
     TriangleOrder order;
     ParallelArray<NodeId> vanishing(triangles.size(), Unfilled());
-    constexpr std::size_t together = 64;
-    parallel_loop(std::size_t{0}, (triangles.size() + together - 1) / together, [&](std::size_t i) {
-        const std::size_t begin = i * together;
-        find_vanishing<together>(triangles.subspan(begin, std::min(together, triangles.size() - begin)), nodes,
-                                 ancestors, &vanishing[begin]);
+    parallel_loop(std::size_t{0}, triangles.size(), [&](std::size_t i) {
+        const Triangle& t = triangles[i];
+        const Index a = nodes.leaf_of_vertex[t[0]], b = nodes.leaf_of_vertex[t[1]], c = nodes.leaf_of_vertex[t[2]];
+        const Index low = std::min({a, b, c}), high = std::max({a, b, c});
+        // The middle one of three leaves merges first with another.
+        vanishing[i] = ancestors.lowest(shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low ^ high)], [&](NodeId node) {
+            return shape.first_leaf[node] <= low && high < shape.leaf_end[node];
+        });
     });
     order.first_triangle.assign(shape.interior() + 1, 0);
     // Each thread looks at all triangles, for a range of the nodes: looking is cheap.

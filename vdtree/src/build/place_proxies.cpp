@@ -67,9 +67,27 @@ std::vector<Value> average(const TreeShape& shape, const TreeParts& parts, std::
     return out;
 }
 
+// Gives every node whose leaves have one value that value, which means would round.
+template <class Value>
+void keep_equal(const TreeShape& shape, const TreeParts& parts, std::span<Value> values) {
+    std::vector<std::uint8_t> equal(shape.interior(), 1);
+    parts.bottom_up([&] {
+        return [&](NodeId node) {
+            const Value first = values[shape.node_of_leaf(shape.first_leaf[node])];
+            bool all = true;
+            shape.for_each_child(
+                node, [&](NodeId child) { all = all && equal[child] && values[child] == first; },
+                [&](Index leaf) { all = all && values[shape.node_of_leaf(leaf)] == first; });
+            equal[node] = all;
+            if (all) values[node] = first;
+        };
+    });
+}
+
 } // namespace
 
-ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, const LeafVertices& leaves) {
+ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, const LeafVertices& leaves,
+                            const GivenProxies& given) {
     const std::size_t nodes = shape.parents.size();
     ProxyVertices out;
     out.positions.resize(nodes);
@@ -95,36 +113,12 @@ ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, cons
         out.colours = average<glm::dvec4, glm::vec4>(shape, parts, weights, leaves.sources, leaves.mesh.colours);
     if (!leaves.mesh.uvs.empty())
         out.uvs = average<glm::dvec2, glm::vec2>(shape, parts, weights, leaves.sources, leaves.mesh.uvs);
-    return out;
-}
-
-namespace {
-
-// Gives every node whose leaves have one value that value, which means would round.
-template <class Value>
-void keep_equal(const TreeShape& shape, const TreeParts& parts, std::span<Value> values) {
-    std::vector<std::uint8_t> equal(shape.interior(), 1);
-    parts.bottom_up([&] {
-        return [&](NodeId node) {
-            const Value first = values[shape.node_of_leaf(shape.first_leaf[node])];
-            bool all = true;
-            shape.for_each_child(
-                node, [&](NodeId child) { all = all && equal[child] && values[child] == first; },
-                [&](Index leaf) { all = all && values[shape.node_of_leaf(leaf)] == first; });
-            equal[node] = all;
-            if (all) values[node] = first;
-        };
+    parallel_loop(std::size_t{0}, given.positions.size(), [&](std::size_t i) {
+        if (given.nodes[i] != no_node) out.positions[given.nodes[i]] = glm::vec3(given.positions[i] - leaves.origin);
     });
-}
-
-} // namespace
-
-void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions) {
-    keep_equal(shape, parts, positions);
-}
-
-void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs) {
-    keep_equal(shape, parts, uvs);
+    keep_equal<glm::vec3>(shape, parts, out.positions);
+    if (!leaves.mesh.texture.empty()) keep_equal<glm::vec2>(shape, parts, out.uvs);
+    return out;
 }
 
 } // namespace unseen::vdtree

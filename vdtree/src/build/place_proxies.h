@@ -16,6 +16,12 @@ struct LeafVertices {
     glm::dvec3 origin;                  // of the tree's positions
 };
 
+// Proxies that the clusterer has placed: by cluster that is no vertex, and the node of each, or no_node. May be empty.
+struct GivenProxies {
+    std::span<const glm::dvec3> positions;
+    std::span<const NodeId> nodes;
+};
+
 // By node, leaves included.
 struct ProxyVertices {
     std::vector<glm::vec3> positions;
@@ -24,12 +30,9 @@ struct ProxyVertices {
     std::vector<glm::vec4> colours; // empty where the mesh has none; likewise the next
     std::vector<glm::vec2> uvs;
 };
-ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, const LeafVertices& leaves);
-
-// Puts proxies of coincident leaves exactly where these are.
-void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions);
-
-// Gives proxies of leaves with equal texture coordinates exactly these.
-void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs);
+// Proxies of coincident leaves are exactly where these are; those of leaves with equal texture coordinates have exactly
+// these if the mesh has a texture.
+ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, const LeafVertices& leaves,
+                            const GivenProxies& given);
 
 } // namespace unseen::vdtree

@@ -180,6 +180,11 @@ private:
         Index side; // triangle * 3 + its first corner
     };
 
+    // From a lower slot, with its sides of triangles.
+    struct Edge {
+        Index high, side, second_side = none, uses = 1;
+    };
+
     // Every edge with an own end: within the part a pair, to a ghost an outer edge. An edge with one triangle holds the
     // contour.
     void find_edges() {
@@ -200,31 +205,26 @@ private:
         // Filling has moved each start to its end.
         std::vector<Index> seen_from(part_.positions.size(), none), entry(part_.positions.size());
         result_.pairs.reserve(uses.size() / 2 + uses.size() / 16);
-        std::vector<Use> edges;
-        std::vector<Index> counts, second_side;
+        std::vector<Edge> edges;
         for (Index low = 0; low < own_; ++low) {
             edges.clear();
-            counts.clear();
-            second_side.clear();
             for (Index i = low == 0 ? 0 : start[low - 1]; i < start[low]; ++i) {
                 const Use& use = uses[i];
                 if (seen_from[use.high] != low) {
                     seen_from[use.high] = low;
                     entry[use.high] = static_cast<Index>(edges.size());
-                    edges.push_back(use);
-                    counts.push_back(1);
-                    second_side.push_back(none);
-                } else if (++counts[entry[use.high]] == 2) {
-                    second_side[entry[use.high]] = use.side;
+                    edges.push_back({use.high, use.side});
+                } else if (Edge& edge = edges[entry[use.high]]; ++edge.uses == 2) {
+                    edge.second_side = use.side;
                 }
             }
-            for (std::size_t i = 0; i < edges.size(); ++i) {
-                if (counts[i] == 1) add_boundary(low, edges[i].high, edges[i].side, boundary_weight);
-                if (counts[i] == 2) hold_seam(low, edges[i], second_side[i]);
-                if (edges[i].high < own_) {
-                    result_.pairs.push_back({low, edges[i].high});
+            for (const Edge& edge : edges) {
+                if (edge.uses == 1) add_boundary(low, edge.high, edge.side, boundary_weight);
+                if (edge.uses == 2) hold_seam(low, edge);
+                if (edge.high < own_) {
+                    result_.pairs.push_back({low, edge.high});
                 } else {
-                    result_.outer_edges.push_back({low, part_.ghost_slots[edges[i].high - own_]});
+                    result_.outer_edges.push_back({low, part_.ghost_slots[edge.high - own_]});
                     if (result_.border_slots.empty() || result_.border_slots.back().cluster != low)
                         result_.border_slots.push_back({part_.first_slot + low, low});
                 }
@@ -248,11 +248,11 @@ private:
     }
 
     // Two triangles that meet at an edge with different vertices: where the values differ, the seam is a contour too.
-    void hold_seam(Index low, const Use& first, Index second) {
+    void hold_seam(Index low, const Edge& edge) {
         if (own_vertices_ == own_ && part_.slot_of_vertex.size() == part_.positions.size()) return; // nothing coincides
-        const Triangle &t = part_.triangles[first.side / 3], &u = part_.triangles[second / 3];
-        const Index t0 = t[first.side % 3], t1 = t[(first.side + 1) % 3];
-        Index u0 = u[second % 3], u1 = u[(second + 1) % 3];
+        const Triangle &t = part_.triangles[edge.side / 3], &u = part_.triangles[edge.second_side / 3];
+        const Index t0 = t[edge.side % 3], t1 = t[(edge.side + 1) % 3];
+        Index u0 = u[edge.second_side % 3], u1 = u[(edge.second_side + 1) % 3];
         if (slot(u0) != slot(t0)) std::swap(u0, u1);
         if (t0 == u0 && t1 == u1) return;
         float difference = 0; // unit-box length squared
@@ -264,8 +264,8 @@ private:
         constexpr float whole_step = 0.002f; // unit-box length
         const double share = std::min(1.0f, difference / (whole_step * whole_step));
         if (!(share > 0)) return;
-        add_boundary(low, first.high, first.side, boundary_weight * share);
-        add_boundary(low, first.high, second, boundary_weight * share);
+        for (const Index side : {edge.side, edge.second_side})
+            add_boundary(low, edge.high, side, boundary_weight * share);
     }
 
     const PartMesh& part_;

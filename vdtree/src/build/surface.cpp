@@ -1,13 +1,12 @@
 #include "build/surface.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <numeric>
-#include <utility>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_reduce.h>
@@ -16,6 +15,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
+#include "build/spatial_order.h"
 #include "tree/unit_vector.h"
 
 namespace unseen::vdtree {
@@ -69,63 +69,6 @@ std::uint64_t hash(glm::dvec3 p) {
     };
     return mix(bits(p.x) + mix(bits(p.y) + mix(bits(p.z)) * 3) * 5);
 }
-
-// A vertex and 32 bits of its position's hash: where these differ, the positions need not be looked at.
-struct HashedVertex {
-    std::uint32_t hash;
-    Index vertex;
-};
-
-// Vertices whose hashes begin alike, ascending: finds the first at each position. Positions made to collide would fill
-// the table in quadratic time; they are sorted instead.
-class CoincidenceFinder {
-public:
-    CoincidenceFinder(std::span<const glm::dvec3> positions, std::span<Index> first)
-        : positions_(positions), first_(first) {}
-
-    void find(std::span<const HashedVertex> vertices) {
-        if (!by_table(vertices)) by_sorting(vertices);
-    }
-
-private:
-    bool by_table(std::span<const HashedVertex> vertices) {
-        constexpr std::size_t most_probes = 16; // a vertex, on average
-        constexpr Index none = ~Index{0};
-        const std::size_t size = std::bit_ceil(vertices.size() * 2 + 1);
-        table_.assign(size, {0, none});
-        std::size_t probes = 0;
-        for (const HashedVertex& v : vertices) {
-            std::size_t slot = v.hash & (size - 1);
-            while (table_[slot].vertex != none &&
-                   !(table_[slot].hash == v.hash && positions_[table_[slot].vertex] == positions_[v.vertex])) {
-                slot = (slot + 1) & (size - 1);
-                if (++probes > most_probes * vertices.size()) return false;
-            }
-            if (table_[slot].vertex == none) table_[slot] = v;
-            first_[v.vertex] = table_[slot].vertex;
-        }
-        return true;
-    }
-
-    void by_sorting(std::span<const HashedVertex> vertices) {
-        std::vector<Index> order;
-        for (const HashedVertex& v : vertices) order.push_back(v.vertex);
-        std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-            const glm::dvec3 &p = positions_[a], &q = positions_[b];
-            if (p.x != q.x) return p.x < q.x;
-            if (p.y != q.y) return p.y < q.y;
-            return p.z != q.z ? p.z < q.z : a < b;
-        });
-        for (std::size_t i = 0; i < order.size(); ++i) {
-            const bool same = i > 0 && positions_[order[i]] == positions_[order[i - 1]];
-            first_[order[i]] = same ? first_[order[i - 1]] : order[i];
-        }
-    }
-
-    std::span<const glm::dvec3> positions_;
-    std::span<Index> first_;
-    std::vector<HashedVertex> table_;
-};
 
 // ---- around each position
 
@@ -208,33 +151,11 @@ Wedges collect_wedges(const MeshView& mesh, const Places& places, std::span<doub
     return out;
 }
 
-// Looks at the wedges around one place after another.
+// Whether every edge at a place has two triangles that run it in opposite ways: each neighbour follows once and precedes
+// once. Keeps its memory.
 class Fan {
 public:
-    // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
-    // precedes once.
-    bool is_regular(Index place, std::span<const Wedge> wedges) {
-        const std::uint64_t stamp = std::uint64_t{place} << 32;
-        for (const Wedge& wedge : wedges) {
-            std::uint64_t& seen = slot(wedge.following);
-            if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(wedges); // seen twice, or two in one slot
-            seen = stamp | wedge.following;
-        }
-        for (const Wedge& wedge : wedges) {
-            std::uint64_t& seen = slot(wedge.preceding);
-            if (seen != (stamp | wedge.preceding)) return false;
-            seen = stamp | nobody; // only once
-        }
-        return true;
-    }
-
-private:
-    static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
-    static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
-
-    std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
-
-    bool is_regular_by_sorting(std::span<const Wedge> wedges) {
+    bool is_regular(std::span<const Wedge> wedges) {
         following_.clear();
         preceding_.clear();
         for (const Wedge& wedge : wedges) {
@@ -246,14 +167,8 @@ private:
         return following_ == preceding_ && std::adjacent_find(following_.begin(), following_.end()) == following_.end();
     }
 
+private:
     std::vector<Index> following_, preceding_;
-    // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the
-    // others.
-    std::array<std::uint64_t, 1 << slot_bits> slots_ = [] {
-        std::array<std::uint64_t, 1 << slot_bits> none;
-        none.fill(~std::uint64_t{0});
-        return none;
-    }();
 };
 
 // How well the mesh's own normals agree with its faces: positive where they do.
@@ -291,7 +206,7 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
         Fan fan;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
             if (coincident[place] != place) continue;
-            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), wedges.around(place));
+            surface.irregular[place] = !fan.is_regular(wedges.around(place));
             surface.normals[place] = glm::vec3(unit(wedges.sums[place]));
         }
     });
@@ -301,37 +216,27 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
 } // namespace
 
 std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
-    // In groups by the upper bits of a hash, which fit the caches and are independent of each other.
-    constexpr unsigned group_bits = 6;
-    constexpr std::size_t groups = 1u << group_bits;
-    std::vector<std::uint64_t> hashes(positions.size());
-    const auto group_of = [&](std::size_t v) { return hashes[v] >> (64 - group_bits); };
-    const std::size_t chunks = (positions.size() + grain - 1) / grain;
-    const auto end_of = [&](std::size_t chunk) { return std::min(positions.size(), (chunk + 1) * grain); };
-    std::vector<std::array<Index, groups>> places(chunks); // by chunk and group: how many, then where the next one goes
-    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
-        places[chunk].fill(0);
-        for (std::size_t v = chunk * grain; v < end_of(chunk); ++v) {
-            hashes[v] = hash(positions[v]);
-            ++places[chunk][group_of(v)];
-        }
+    // Sorted by a part of the hash, and among those that have it in common by position.
+    constexpr unsigned left_out = 24; // bits
+    std::vector<CodedIndex> order(positions.size()), scratch(positions.size());
+    parallel_loop(std::size_t{0}, positions.size(), [&](std::size_t v) {
+        order[v] = {hash(positions[v]) >> left_out, static_cast<Index>(v)};
     });
-    std::array<Index, groups + 1> start{};
-    Index total = 0;
-    for (std::size_t g = 0; g < groups; ++g) {
-        start[g] = total;
-        for (auto& counts : places) total += std::exchange(counts[g], total);
-    }
-    start[groups] = total;
-    std::vector<HashedVertex> grouped(positions.size());
-    parallel_loop(std::size_t{0}, chunks, [&](std::size_t chunk) {
-        for (std::size_t v = chunk * grain; v < end_of(chunk); ++v)
-            grouped[places[chunk][group_of(v)]++] = {static_cast<std::uint32_t>(hashes[v]), static_cast<Index>(v)};
-    });
+    sort_by_code(order, scratch);
     std::vector<Index> first(positions.size());
-    parallel_loop(std::size_t{0}, groups, [&](std::size_t g) {
-        CoincidenceFinder(positions, first).find(std::span(grouped).subspan(start[g], start[g + 1] - start[g]));
-    });
+    for (auto run = order.begin(); run != order.end();) {
+        const auto end = std::find_if(run, order.end(), [&](const CodedIndex& v) { return v.code != run->code; });
+        if (end - run > 1)
+            std::stable_sort(run, end, [&](const CodedIndex& a, const CodedIndex& b) {
+                const glm::dvec3 &p = positions[a.index], &q = positions[b.index];
+                return std::tie(p.x, p.y, p.z) < std::tie(q.x, q.y, q.z);
+            });
+        for (auto v = run; v != end; ++v) {
+            const bool is_same = v != run && positions[v->index] == positions[(v - 1)->index];
+            first[v->index] = is_same ? first[(v - 1)->index] : v->index;
+        }
+        run = end;
+    }
     return first;
 }
 
