@@ -1,4 +1,6 @@
 // Plans: which gratings to measure on a display.
+#include "calibration_plan.h"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -8,7 +10,6 @@
 #include <unseen/vdtree/internal/errors.h>
 
 #include "json_file.h"
-#include "procedure_state.h"
 
 namespace unseen::calibration {
 

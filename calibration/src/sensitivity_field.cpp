@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "procedure_state.h"
+#include "calibration_plan.h"
 
 namespace unseen::calibration {
 namespace {

@@ -8,7 +8,6 @@
 #include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/input_file.h>
-#include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/number_text.h>
 #include <unseen/vdtree/internal/random.h>
 
@@ -361,6 +360,14 @@ double fisher(const Share& first, const Share& second) {
     return std::min(sum, 1.0);
 }
 
+// The probability of at least `count` heads in `of` tosses: exact, by the binomial distribution.
+double chance_of_so_many(const Share& share) {
+    double sum = 0;
+    for (std::uint64_t k = share.count; k <= share.of; ++k)
+        sum += std::exp(log_choose(share.of, k) - static_cast<double>(share.of) * std::log(2));
+    return std::min(sum, 1.0);
+}
+
 struct Tally {
     ConditionResult result;
     bool is_of_one_picture = false, is_predicted = true;
@@ -380,13 +387,6 @@ void add(Share& share, bool counts) { share.count += counts, ++share.of; }
 
 double Share::low() const { return wilson(*this, -1); }
 double Share::high() const { return wilson(*this, 1); }
-
-double chance_of_so_many(const Share& share) {
-    double sum = 0;
-    for (std::uint64_t k = share.count; k <= share.of; ++k)
-        sum += std::exp(log_choose(share.of, k) - static_cast<double>(share.of) * std::log(2));
-    return std::min(sum, 1.0);
-}
 
 Result<StudyAnalysis> analyse_answers(std::span<const fs::path> files) {
     StudyAnalysis all;

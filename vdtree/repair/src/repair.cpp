@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <exception>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -92,15 +90,14 @@ public:
 
     Result<Repaired> run() {
         drop_duplicates();
-        if (options_.stitches && options_.gap > 0) close_cracks();
+        close_cracks();
         find_triangles();
         orient_parts();
         make_surface();
-        if (options_.stitches) pmp::stitch_borders(surface_);
+        pmp::stitch_borders(surface_);
         cap_holes();
-        if (options_.orients) face_outward();
-        const std::vector<std::uint8_t> turned = write_orientation();
-        turn_normals(turned);
+        face_outward();
+        turn_normals(write_orientation());
         insert_caps();
         return Repaired{std::move(mesh_), report_};
     }
@@ -203,7 +200,6 @@ private:
     void orient_parts() {
         const auto before = polygons_;
         pmp::orient_polygon_soup(points_, polygons_);
-        if (!options_.orients) return; // halfedges need it; the mesh keeps its own
         std::vector<std::uint8_t> is_turned(polygons_.size());
         for (std::size_t i = 0; i < polygons_.size(); ++i)
             is_turned[i] = points_[polygons_[i][0]] != points_[before[i][0]];
@@ -267,7 +263,7 @@ private:
         std::vector<Halfedge> borders;
         pmp::extract_boundary_cycles(surface_, std::back_inserter(borders));
         report_.holes = borders.size();
-        if (!options_.caps || borders.empty()) return;
+        if (borders.empty()) return;
         const std::vector<double> part_diagonal = find_part_diagonals();
         for (const Halfedge border : borders) {
             Box box;
@@ -360,7 +356,6 @@ private:
     // By triangle: whether it was turned.
     std::vector<std::uint8_t> write_orientation() {
         std::vector<std::uint8_t> turned(mesh_.triangles.size(), 0);
-        if (!options_.orients) return turned;
         for (std::size_t i = 0; i < own_faces_; ++i) {
             const auto corners = corners_of(Face(static_cast<Surface::size_type>(i)));
             const Index triangle = face_triangle_[i];

@@ -1,11 +1,7 @@
 // The directions that the surroundings of each node face, before and after it folds.
 #pragma once
 
-#include <cstdint>
 #include <span>
-#include <vector>
-
-#include <unseen/vdtree/internal/normal_mask.h>
 
 #include "build/bound_spheres.h"
 #include "build/parallel_array.h"

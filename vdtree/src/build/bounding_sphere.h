@@ -1,7 +1,6 @@
 // Small enclosing spheres of points and of spheres.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>

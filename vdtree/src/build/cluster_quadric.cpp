@@ -16,7 +16,6 @@
 #include <span>
 #include <utility>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/parallel.h>

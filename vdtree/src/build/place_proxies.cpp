@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include <glm/geometric.hpp>
-
 #include "build/parallel_array.h"
 #include "cut/kernel/prefetch.h"
 

@@ -1,12 +1,12 @@
 // Temporary file and rename, with POSIX calls because their errors say why.
 #include <unseen/vdtree/internal/atomic_file.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <climits>
-#include <cstdint>
 #include <random>
 #include <string>
 #include <system_error>
@@ -103,18 +103,14 @@ Result<AtomicFile> AtomicFile::create(const fs::path& target) {
     std::error_code failure;
     const fs::file_status status = fs::status(target, failure);
     if (failure == std::errc::filename_too_long) return io_error(target, "create", failure.value());
-    if (target.filename().empty() || fs::is_directory(status)) {
-        return Error{ErrorCode::invalid_argument,
-                     "Cannot write to '" + target.string() + "': it is a folder; give the name of a file."};
-    }
-    if (fs::exists(status) && !fs::is_regular_file(status)) {
-        return Error{ErrorCode::invalid_argument,
-                     "Cannot write to '" + target.string() + "': it is no regular file; give another name."};
-    }
+    const std::string cannot = "Cannot write to '" + target.string() + "'";
+    if (target.filename().empty() || fs::is_directory(status))
+        return invalid_argument(cannot + ": it is a folder; give the name of a file.");
+    if (fs::exists(status) && !fs::is_regular_file(status))
+        return invalid_argument(cannot + ": it is no regular file; give another name.");
     // Renaming would go against what others are told with it.
     if (fs::exists(status) && ::faccessat(AT_FDCWD, target.c_str(), W_OK, AT_EACCESS) != 0)
-        return Error{ErrorCode::io_failure, "Cannot write to '" + target.string() +
-                                                "', which is there: " + std::generic_category().message(errno) +
+        return Error{ErrorCode::io_failure, cannot + ", which is there: " + std::generic_category().message(errno) +
                                                 ". Allow it, remove the file, or give another name."};
     const Result<fs::path> real_target = follow(target);
     if (!real_target) return real_target.error();
@@ -159,19 +155,14 @@ void AtomicFile::remove_all() noexcept {
 AtomicFile::AtomicFile(int descriptor, fs::path target, fs::path temporary, int place)
     : descriptor_(descriptor), target_(std::move(target)), temporary_(std::move(temporary)), place_(place) {}
 
-AtomicFile::AtomicFile(AtomicFile&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), target_(std::move(other.target_)),
-      temporary_(std::exchange(other.temporary_, {})), place_(std::exchange(other.place_, -1)) {}
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept { *this = std::move(other); }
 
 AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
-    if (this != &other) {
-        discard();
-        descriptor_ = std::exchange(other.descriptor_, -1);
-        target_ = std::move(other.target_);
-        temporary_ = std::exchange(other.temporary_, {});
-        place_ = std::exchange(other.place_, -1);
-    }
-    return *this;
+    std::swap(descriptor_, other.descriptor_);
+    std::swap(target_, other.target_);
+    std::swap(temporary_, other.temporary_);
+    std::swap(place_, other.place_);
+    return *this; // `other` removes what was here
 }
 
 AtomicFile::~AtomicFile() { discard(); }

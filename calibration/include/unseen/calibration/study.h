@@ -100,14 +100,12 @@ struct Share {
     double low() const;
     double high() const;
 };
-// The probability of at least `count` heads in `of` tosses: exact, by the binomial distribution.
-double chance_of_so_many(const Share& share);
 
 struct ConditionResult {
     std::string condition;
     StudyTask task = StudyTask::which;
     Share seen;                  // which: right answers; differ: "different"
-    double chance = 1;           // which: chance_of_so_many(); differ: against the false alarms, Fisher's test
+    double chance = 1;           // which: of so many by tossing a coin; differ: against the false alarms, Fisher's test
     std::optional<Share> agreed; // with the prediction; differ only, if all of the condition's pairs have one
     double median_s = 0;
 };

@@ -13,7 +13,6 @@
 // ("h:uv") are read, and vertices are split at seams.
 #pragma once
 
-#include <array>
 #include <string>
 #include <utility>
 #include <vector>

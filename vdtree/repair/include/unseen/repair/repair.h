@@ -13,9 +13,6 @@
 namespace unseen::repair {
 
 struct Options {
-    bool orients = true;
-    bool stitches = true;
-    bool caps = true;
     // Vertices of borders up to so far apart become one position: a share of the diagonal of the mesh's box, 0..0.01.
     // The default is what is lost where coordinates are written with six digits. 0: only equal positions.
     double gap = 1e-6;

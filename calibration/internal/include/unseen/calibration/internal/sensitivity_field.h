@@ -1,7 +1,6 @@
 // Beliefs about an observer's contrast sensitivity everywhere, from answers at some frequencies and eccentricities.
 #pragma once
 
-#include <span>
 #include <vector>
 
 #include <unseen/calibration/procedure.h>
