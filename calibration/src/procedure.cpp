@@ -4,17 +4,15 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <numeric>
 #include <utility>
 
-#include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/internal/random.h>
-
 #include <unseen/calibration/internal/quest.h>
 #include <unseen/calibration/internal/sensitivity_field.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/random.h>
 
 #include "calibration_plan.h"
 #include "json_file.h"
@@ -26,10 +24,7 @@ using perception::CsfTable;
 using perception::CyclesPerDegree;
 using perception::Luminance;
 
-constexpr double two_sided_95 = 1.959964; // standard deviations
-
-// Sweeps over all places until the beliefs keep still; more than enough, as each answer changes little.
-constexpr int most_sweeps = 8;
+constexpr int most_sweeps = 8; // over all places until the beliefs keep still: more than enough
 constexpr double still = 5e-4; // log10 units, a fiftieth of a grid step
 
 // What observers' psychometric functions are taken to be one of; 3.5 and a lapse rate of 0.01 are QUEST's own. A choice
@@ -76,12 +71,8 @@ private:
     void weigh_settings();
 };
 
-double PlaceEstimate::sensitivity() const { return std::pow(10, log10_sensitivity.mean); }
-double PlaceEstimate::low() const {
-    return std::pow(10, log10_sensitivity.mean - two_sided_95 * log10_sensitivity.deviation);
-}
-double PlaceEstimate::high() const {
-    return std::pow(10, log10_sensitivity.mean + two_sided_95 * log10_sensitivity.deviation);
+double PlaceEstimate::at(double deviations) const {
+    return std::pow(10, log10_sensitivity.mean + deviations * log10_sensitivity.deviation);
 }
 
 Result<void> check(const Summation& measured, const CalibrationPlan& plan) {
@@ -331,22 +322,18 @@ void Procedure::State::weigh_settings() {
 }
 
 std::vector<PlaceEstimate> Procedure::estimates() const {
-    std::vector<PlaceEstimate> result(state_->plan.places.size());
-    for (std::size_t i = 0; i < result.size(); ++i) {
-        result[i].place = state_->plan.places[i];
-        result[i].log10_sensitivity = state_->field.belief(i);
-        result[i].local = state_->field.local_deviation(i);
-        result[i].answers = state_->asked[i];
-    }
+    std::vector<PlaceEstimate> result;
+    for (std::size_t i = 0; i < state_->plan.places.size(); ++i)
+        result.push_back(
+            {state_->plan.places[i], state_->asked[i], state_->field.belief(i), state_->field.local_deviation(i)});
     return result;
 }
 
 std::optional<Summation> Procedure::summation() const {
-    if (std::none_of(state_->plan.places.begin(), state_->plan.places.end(), std::mem_fn(&GratingPlace::is_wide)))
-        return std::nullopt;
+    if (std::ranges::none_of(state_->plan.places, &GratingPlace::is_wide)) return std::nullopt;
     const auto [mean, deviation] = state_->field.log10_summation();
-    return Summation{std::pow(10, mean), std::pow(10, mean - two_sided_95 * deviation),
-                     std::pow(10, mean + two_sided_95 * deviation)};
+    return Summation{std::pow(10, mean), std::pow(10, mean - normal_95 * deviation),
+                     std::pow(10, mean + normal_95 * deviation)};
 }
 
 Result<CsfTable> Procedure::table(std::string source) const {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include <unseen/calibration/procedure.h>
 #include <unseen/vdtree/internal/csv.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/input_file.h>
@@ -332,7 +333,6 @@ Result<std::vector<StudyAnswer>> read_answers(const fs::path& file, const Study&
 
 namespace {
 
-constexpr double normal_95 = 1.959964; // standard deviations
 constexpr double careless_share = 1.0 / 3;
 
 // Wilson 1927.

@@ -204,11 +204,6 @@ Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, 
     n.first_member.assign(slots + 1, 0);
     n.place.resize(vertices);
     for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
-    if (slots == vertices) {                                            // nothing coincides
-        n.members = n.vertex_of_slot;
-        std::iota(n.first_member.begin(), n.first_member.end(), Index{0});
-        return n;
-    }
     for (Index v = 0; v < vertices; ++v) ++n.first_member[n.place[coincident[v]] + 1];
     std::partial_sum(n.first_member.begin(), n.first_member.end(), n.first_member.begin());
     n.members.resize(vertices);
@@ -284,12 +279,6 @@ double PartMaker::texture_density() const {
 void PartMaker::list_triangles() {
     const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
     first_triangle_.assign(parts + 1, 0);
-    if (parts == 1) {
-        first_triangle_[1] = count;
-        triangles_.resize(count);
-        std::iota(triangles_.begin(), triangles_.end(), Index{0});
-        return;
-    }
     std::vector<Index> part_of(input_.mesh.positions.size());
     parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
         for (Index i = first_place(part); i < first_place(part + 1); ++i)
@@ -514,59 +503,43 @@ public:
 
     Clustering write(std::vector<Level>& levels) {
         join_coincident();
-        const std::size_t clusters = result_.parents.size() + merges_of(levels);
-        result_.parents.resize(clusters);
-        result_.positions.resize(clusters - vertices());
-        result_.deviations.resize(clusters - vertices());
         for (Level& level : levels) {
-            number_rounds(level);
-            parallel_loop(std::size_t{0}, level.size(), [&](std::size_t i) {
-                write_record(level[i], i);
-                level[i] = {};
-            });
+            write_level(level);
+            level = {};
         }
-        result_.parents.back() = static_cast<Index>(clusters - 1);
+        result_.parents.back() = static_cast<Index>(result_.parents.size() - 1);
         for (Index c = 0; c < result_.deviations.size(); ++c)
             raise(result_.parents[vertices() + c], result_.deviations[c]);
         return std::move(result_);
     }
 
 private:
-    static std::size_t merges_of(const std::vector<Level>& levels) {
-        std::size_t merges = 0;
-        for (const Level& level : levels)
-            for (const MergeRecord& record : level) merges += record.merges.size();
-        return merges;
-    }
-
-    // Round by round, and in a round record by record.
-    void number_rounds(const Level& level) {
-        first_of_round_.assign(level.size(), {});
+    // Round by round, and in a round record by record; records of one level have no vertex in common.
+    void write_level(const Level& level) {
         std::size_t rounds = 0;
         for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
-        for (std::size_t round = 0; round < rounds; ++round) {
-            for (std::size_t i = 0; i < level.size(); ++i) {
-                if (round >= level[i].round_ends.size()) continue;
-                first_of_round_[i].push_back(end_);
-                end_ += level[i].round_ends[round] - (round == 0 ? 0 : level[i].round_ends[round - 1]);
-            }
-        }
+        for (std::size_t round = 0; round < rounds; ++round)
+            for (const auto& [merges, ends, vanishings] : level)
+                if (round < ends.size())
+                    for (Index i = round == 0 ? 0 : ends[round - 1]; i < ends[round]; ++i) write(merges[i]);
+        for (const MergeRecord& record : level)
+            for (const auto& vanishing : record.vanishings)
+                raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
     }
 
-    // Records of one level have no vertex in common.
-    void write_record(const MergeRecord& record, std::size_t number) {
-        for (std::size_t round = 0; round < record.round_ends.size(); ++round) {
-            Index parent = first_of_round_[number][round];
-            for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i, ++parent) {
-                const Merge& merge = record.merges[i];
-                result_.positions[parent - vertices()] = maker_.from_unit_box(merge.place);
-                result_.deviations[parent - vertices()] = maker_.length_from_unit_box(merge.deviation);
-                result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
-                cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
-            }
-        }
-        for (const auto& vanishing : record.vanishings)
-            raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
+    void write(const Merge& merge) {
+        const Index parent = make_cluster(maker_.from_unit_box(merge.place));
+        result_.deviations.back() = maker_.length_from_unit_box(merge.deviation);
+        result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
+        cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+    }
+
+    Index make_cluster(glm::dvec3 position) {
+        const Index number = static_cast<Index>(result_.parents.size());
+        result_.parents.push_back(number);
+        result_.positions.push_back(position);
+        result_.deviations.push_back(0);
+        return number;
     }
 
     // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without
@@ -578,14 +551,11 @@ private:
         made_by_joining_.resize(cluster_.size());
         for (Index s = 0; s < cluster_.size(); ++s) {
             if (first_member[s + 1] - first_member[s] == 1) continue;
-            const Index parent = static_cast<Index>(result_.parents.size());
-            result_.positions.push_back(input_.mesh.positions[cluster_[s]]);
-            result_.parents.push_back(parent);
+            const Index parent = make_cluster(input_.mesh.positions[cluster_[s]]);
             for (Index i = first_member[s]; i < first_member[s + 1]; ++i)
                 result_.parents[numbering_.members[i]] = parent;
             cluster_[s] = parent;
         }
-        end_ = static_cast<Index>(result_.parents.size());
     }
 
     void raise(Index cluster, float deviation) {
@@ -598,11 +568,8 @@ private:
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
-    std::vector<Index> cluster_; // by slot: the cluster that is known under its name
-    std::vector<Index>
-        made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
-    Index end_ = 0;       // of the clusters that have a number
-    std::vector<std::vector<Index>> first_of_round_; // by record of a level, by round: the first cluster made
+    std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
+    std::vector<Index> made_by_joining_; // by slot: the cluster made when the one of this name was joined to another
 };
 
 } // namespace

@@ -72,27 +72,13 @@ std::uint64_t hash(glm::dvec3 p) {
 
 // ---- around each position
 
-// Which vertices stand for corners: themselves where no two coincide, which needs no look.
-class Places {
-public:
-    explicit Places(std::span<const Index> coincident) : coincident_(coincident) {
-        for (Index v = 0; v < coincident.size() && !any_; ++v) any_ = coincident[v] != v;
-    }
-    Index of(Index vertex) const { return any_ ? coincident_[vertex] : vertex; }
-    Triangle of(const Triangle& t) const {
-        return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t;
-    }
-    // Precondition: the triangle uses no vertex twice.
-    bool degenerates(const Triangle& t) const {
-        if (!any_) return false;
-        const Triangle w = of(t);
-        return w[0] == w[1] || w[1] == w[2] || w[2] == w[0];
-    }
-
-private:
-    std::span<const Index> coincident_;
-    bool any_ = false;
-};
+// The places of a triangle's corners; two are the same where the welding degenerates it.
+Triangle places_of(const Triangle& t, std::span<const Index> coincident) {
+    return {coincident[t[0]], coincident[t[1]], coincident[t[2]]};
+}
+bool is_degenerate(const Triangle& places) {
+    return places[0] == places[1] || places[1] == places[2] || places[2] == places[0];
+}
 
 // The other corners of a triangle at a place: the following and the preceding one.
 struct Wedge {
@@ -112,7 +98,7 @@ struct Wedges {
 };
 
 // Triangles that the welding degenerates have neither edges nor an area. Adds to `vertex_areas`, by vertex.
-Wedges collect_wedges(const MeshView& mesh, const Places& places, std::span<double> vertex_areas) {
+Wedges collect_wedges(const MeshView& mesh, std::span<const Index> coincident, std::span<double> vertex_areas) {
     const std::size_t vertices = vertex_areas.size();
     Wedges out;
     out.start.assign(vertices + 1, 0);
@@ -126,8 +112,8 @@ Wedges collect_wedges(const MeshView& mesh, const Places& places, std::span<doub
             const std::size_t begin = vertices * r / ranges, size = vertices * (r + 1) / ranges - begin;
             const auto is_own = [&](std::size_t place) { return place - begin < size; };
             for (const Triangle& corners : mesh.triangles) {
-                const Triangle at = places.of(corners);
-                if (std::ranges::any_of(at, is_own) && !places.degenerates(corners)) use(is_own, corners, at);
+                const Triangle at = places_of(corners, coincident);
+                if (std::ranges::any_of(at, is_own) && !is_degenerate(at)) use(is_own, corners, at);
             }
         });
     };
@@ -184,13 +170,9 @@ double agreement_of_own_normals(const MeshView& mesh) {
 }
 
 Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincident, const Surface& surface) {
-    const bool regular = std::find(surface.irregular.begin(), surface.irregular.end(), 1) == surface.irregular.end();
-    if (!regular) return Closedness::open;
-    const bool has_edges = std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
-        const Index a = coincident[t[0]], b = coincident[t[1]], c = coincident[t[2]];
-        return a != b && b != c && c != a;
-    });
-    if (!has_edges) return Closedness::open;
+    const bool has_edges = std::ranges::any_of(
+        mesh.triangles, [&](const Triangle& t) { return !is_degenerate(places_of(t, coincident)); });
+    if (!has_edges || std::ranges::find(surface.irregular, 1) != surface.irregular.end()) return Closedness::open;
     const double volume = signed_volume(mesh);
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
 }
@@ -201,7 +183,7 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
     surface.irregular.assign(coincident.size(), 0);
     surface.areas.assign(coincident.size(), 0);
     surface.normals.resize(coincident.size());
-    const Wedges wedges = collect_wedges(mesh, Places(coincident), surface.areas);
+    const Wedges wedges = collect_wedges(mesh, coincident, surface.areas);
     parallel_loop_over(tbb::blocked_range<std::size_t>(0, coincident.size(), grain), [&](const auto& places) {
         Fan fan;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {

@@ -1,16 +1,13 @@
 // calibration: profiles of displays, observers and lights, and the procedures that measure them. The header to include first.
 //
-// Profiles are JSON files whose keys carry their units: read_display() gives a perception::Display, read_csf() a
-// perception::CsfTable, LightRig::read() the lights of a scene. A Procedure measures an observer: it gives the next
-// grating and takes the answer.
+// Profiles are JSON files whose keys carry their units. A Procedure measures an observer: it gives the next grating and
+// takes the answer; the caller shows the gratings and asks.
 //
 //     const auto display = calibration::read_display("data/displays/tv-55in-3840x2160.json");
 //     const auto& expected = perception::CsfTable::standard();
 //     auto procedure = calibration::Procedure::create(calibration::plan_for(*display, expected), expected);
 //     while (!procedure->is_done()) show(procedure->next()), procedure->choose(ask()); // interval 1 or 2
 //     const auto measured = procedure->table("me");
-//
-// The caller shows the gratings and asks.
 #pragma once
 
 #include <unseen/calibration/display_profile.h>

@@ -27,6 +27,8 @@ struct GratingPlace {
 // (perception/csf.h).
 double summation_gain(const GratingPlace& place, double own = 1);
 
+inline constexpr double normal_95 = 1.959964; // deviations of a normal distribution that 95% lie within
+
 // A normal distribution.
 struct Belief {
     double mean = 0, deviation = 0;
@@ -98,10 +100,11 @@ struct PlaceEstimate {
     GratingPlace place;
     int answers = 0;
     Belief log10_sensitivity;
-    Belief local;       // its deviation from the fitted shape, log10 units
-    double low() const; // 95% interval of the sensitivity
-    double high() const;
-    double sensitivity() const;
+    Belief local; // its deviation from the fitted shape, log10 units
+    double sensitivity() const { return at(0); }
+    double low() const { return at(-normal_95); } // 95% interval of the sensitivity
+    double high() const { return at(normal_95); }
+    double at(double deviations) const;
 };
 
 // How an observer sums over area: `own` of perception::summation_gain(), with its 95% interval.
