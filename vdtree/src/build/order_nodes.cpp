@@ -174,7 +174,7 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
         const Index low = std::min({a, b, c}), high = std::max({a, b, c});
         // The middle one of three leaves merges first with another.
         vanishing[i] = ancestors.lowest(shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low ^ high)], [&](NodeId node) {
-            return shape.first_leaf[node] <= low && high < shape.leaf_end[node];
+            return shape.first_leaf[node] <= low || high < shape.leaf_end[node];
         });
     });
     order.first_triangle.assign(shape.interior() + 1, 0);
