@@ -1,14 +1,11 @@
 // What nodes are bounded by: spheres around points, and what tells which way triangles face. What the program has not is
 // here as a twin.
-#include "accuracy_axes.h"
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -18,9 +15,8 @@
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
-#include "bench_tools.h"
+#include "accuracy.h"
 #include "build/bounding_sphere.h" // vdtree's own
-#include "exact_sphere.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -257,11 +253,9 @@ struct Cone {
 // The leaves of some nodes, and the smallest radius around each.
 class SphereSets {
 public:
-    SphereSets(const vdtree::SoundTree& tree, const AccuracyBenchOptions& options)
-        : tree_(tree), repeats_(std::max(1, options.repeats / 3)) {
-        // Of fewer points all spheres are alike; more points take exact arithmetic too long.
-        constexpr Index fewest = 5, most = 1000;
-        nodes_ = some_nodes(tree, options.nodes, [&](NodeId node) {
+    SphereSets(const vdtree::SoundTree& tree, std::size_t nodes) : tree_(tree) {
+        constexpr Index fewest = 5, most = 1000; // of fewer points all spheres are alike
+        nodes_ = some_nodes(tree, nodes, [&](NodeId node) {
             const Index leaves = tree.leaf_end()[node] - tree.first_leaf()[node];
             return leaves >= fewest && leaves <= most && tree.support_spheres()[node].radius > 0;
         });
@@ -283,15 +277,11 @@ public:
         std::vector<DSphere> spheres;
         double us = 0; // a node
     };
-    Made make(const std::function<DSphere(std::span<const glm::dvec3>)>& around, int repeats = 0) const {
+    Made make(DSphere (*around)(std::span<const glm::dvec3>)) const {
         Made made{std::vector<DSphere>(sets_.size())};
-        std::vector<double> times;
-        for (int k = 0; k < (repeats > 0 ? repeats : repeats_); ++k) {
-            const auto start = BenchClock::now();
-            for (std::size_t i = 0; i < sets_.size(); ++i) made.spheres[i] = around(sets_[i]);
-            times.push_back(us_since(start));
-        }
-        made.us = median(std::move(times));
+        made.us = 1e6 / static_cast<double>(nodes_.size()) * median_seconds(few_repeats, [&] {
+                      for (std::size_t i = 0; i < sets_.size(); ++i) made.spheres[i] = around(sets_[i]);
+                  });
         return made;
     }
 
@@ -313,7 +303,7 @@ public:
             }
             balls.enclose(slack, std::span(out).first(used));
         }
-        Made made{{}, us_since(start)};
+        Made made{{}, 1e6 * seconds_since(start) / static_cast<double>(nodes_.size())};
         for (const NodeId node : nodes_) {
             const vdtree::Sphere& s = tree_.support_spheres()[node];
             made.spheres.push_back({glm::dvec3(s.centre), static_cast<double>(s.radius)});
@@ -321,21 +311,18 @@ public:
         return made;
     }
 
-    void set_smallest(const std::vector<DSphere>& spheres) {
-        radii_.clear();
-        for (const DSphere& sphere : spheres) radii_.push_back(sphere.radius);
-    }
-
-    AccuracyPoint point(const std::string& name, const Made& made, const std::string& note = {},
+    // `smallest`: the exact radii.
+    AccuracyPoint point(const std::string& name, const Made& made, const Made& smallest, const std::string& note = {},
                         bool is_default = false) const {
         double sum = 0, largest = 0, outside = 0;
         for (std::size_t i = 0; i < made.spheres.size(); ++i) {
             const DSphere& sphere = made.spheres[i];
-            const double beyond = std::max(sphere.radius / radii_[i] - 1, 0.0); // less is what rounding leaves
+            const double least = smallest.spheres[i].radius;
+            const double beyond = std::max(sphere.radius / least - 1, 0.0); // less is what rounding leaves
             sum += beyond;
             largest = std::max(largest, beyond);
             for (const glm::dvec3& p : sets_[i])
-                outside = std::max(outside, glm::distance(p, sphere.centre) / radii_[i] - sphere.radius / radii_[i]);
+                outside = std::max(outside, (glm::distance(p, sphere.centre) - sphere.radius) / least);
         }
         return {.name = name,
                 .values = {made.us, sum / static_cast<double>(made.spheres.size()), largest, outside},
@@ -344,25 +331,18 @@ public:
     }
 
 private:
-    double us_since(BenchClock::time_point start) const {
-        return 1e6 * seconds_since(start) / static_cast<double>(nodes_.size());
-    }
-
     const vdtree::SoundTree& tree_;
-    int repeats_;
     std::vector<NodeId> nodes_;
     std::vector<std::vector<glm::dvec3>> sets_;
     std::size_t points_in_all_ = 0;
-    std::vector<double> radii_; // the smallest ones
 };
 
 // Rings of some nodes, looked at from all around, and how each truly faces.
 class FacingTests {
 public:
-    FacingTests(const AccuracySubject& subject, const vdtree::SoundTree& tree, const AccuracyBenchOptions& options)
-        : repeats_(std::max(1, options.repeats / 3)) {
+    FacingTests(const AccuracySubject& subject, const vdtree::SoundTree& tree) {
         constexpr Index most_leaves = 64; // larger nodes are silhouettes from nearly everywhere
-        nodes = some_nodes(tree, options.nodes, [&](NodeId node) {
+        nodes = some_nodes(tree, subject.nodes, [&](NodeId node) {
             const bool moves = tree.support_spheres()[node].radius > 0; // else the fold changes nothing, and none asks
             return moves && tree.leaf_end()[node] - tree.first_leaf()[node] <= most_leaves;
         });
@@ -388,25 +368,19 @@ public:
     template <class Test>
     AccuracyPoint point(const std::string& name, double bytes, Test&& test, const std::string& note = {},
                         bool is_default = false) const {
-        std::size_t false_silhouettes = 0, misses = 0;
-        std::vector<double> times;
-        for (int repeat = 0; repeat < repeats_; ++repeat) {
+        double false_silhouettes = 0, misses = 0;
+        const double seconds = median_seconds(few_repeats, [&] {
             false_silhouettes = misses = 0;
-            const auto start = BenchClock::now();
             for (std::size_t k = 0; k < nodes.size(); ++k)
                 for (std::size_t i = 0; i < sights_[k].size(); ++i) {
                     const Facing found = test(k, sights_[k][i]);
                     false_silhouettes += found == Facing::mixed && truth_[k][i] != Facing::mixed;
                     misses += found != Facing::mixed && found != truth_[k][i];
                 }
-            times.push_back(1e9 * seconds_since(start) /
-                            (static_cast<double>(eyes) * static_cast<double>(nodes.size())));
-        }
+        });
         return {.name = name,
-                .values = {median(std::move(times)),
-                           static_cast<double>(false_silhouettes) /
-                               static_cast<double>(std::max<std::size_t>(one_sided_, 1)),
-                           static_cast<double>(misses), bytes},
+                .values = {1e9 * seconds / (eyes * static_cast<double>(nodes.size())),
+                           false_silhouettes / std::max(one_sided_, 1.0), misses, bytes},
                 .note = note,
                 .is_default = is_default};
     }
@@ -416,40 +390,30 @@ public:
     std::vector<Ring> rings;
 
 private:
-    int repeats_;
     std::vector<std::vector<Sight>> sights_;
     std::vector<std::vector<Facing>> truth_;
-    std::size_t one_sided_ = 0;
+    double one_sided_ = 0;
 };
 
 } // namespace
 
-Result<AccuracyPoints> sphere_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    const auto sound = vdtree::SoundTree::of(subject.session.tree());
-    if (!sound) return sound.error();
-    SphereSets sets(*sound, options);
-    if (sets.empty()) return AccuracyPoints();
-    const SphereSets::Made smallest = sets.make([](auto set) { return vdtree::smallest_sphere(set); });
-    std::optional<SphereSets::Made> exact;
-    if (has_exact_spheres()) exact = sets.make([](auto set) { return exact_sphere(set); }, 1);
-    sets.set_smallest(exact ? exact->spheres : smallest.spheres);
-    AccuracyPoints points = {
-        sets.point("around the centroid", sets.make(around_centroid), sets.size()),
-        sets.point("Ritter", sets.make(by_ritter)),
-        sets.point("Welzl, of points", smallest, exact ? "" : "taken as exact, for this build has no CGAL")};
-    if (exact) points.push_back(sets.point("CGAL, exact", *exact));
-    points.push_back(sets.point("the program's, of children's spheres", sets.make_own(),
-                                "has the children's spheres and all proxies in it, too, so that tests nest", true));
-    return points;
+AccuracyPoints sphere_points(AccuracySubject& subject) {
+    const auto sound = require(vdtree::SoundTree::of(subject.session.tree()));
+    const SphereSets sets(sound, subject.nodes);
+    if (sets.empty()) return {};
+    const SphereSets::Made smallest = sets.make(vdtree::smallest_sphere);
+    return {sets.point("around the centroid", sets.make(around_centroid), smallest, sets.size()),
+            sets.point("Ritter", sets.make(by_ritter), smallest),
+            sets.point("Welzl, of points", smallest, smallest, "taken as exact"),
+            sets.point("the program's, of children's spheres", sets.make_own(), smallest,
+                       "has the children's spheres and all proxies in it, too, so that tests nest", true)};
 }
 
-Result<AccuracyPoints> facing_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    const auto sound = vdtree::SoundTree::of(subject.session.tree());
-    if (!sound) return sound.error();
-    const vdtree::SoundTree& tree = *sound;
-    const FacingTests tests(subject, tree, options);
+AccuracyPoints facing_points(AccuracySubject& subject) {
+    const auto tree = require(vdtree::SoundTree::of(subject.session.tree()));
+    const FacingTests tests(subject, tree);
     const std::vector<Ring>& rings = tests.rings;
-    if (rings.empty()) return AccuracyPoints();
+    if (rings.empty()) return {};
     AccuracyPoints points;
     for (const int side : {2, 4, 8, 12, 16}) {
         const MaskTwin twin(side);

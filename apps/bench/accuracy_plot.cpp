@@ -1,15 +1,21 @@
-#include "accuracy_plot.h"
-
+// The accuracy benchmark's pictures: error against cost.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <limits>
 
+#include "accuracy.h"
+#include "benches.h"
+#include "drawing.h"
+#include "plot_style.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
-constexpr double margin_left = 70, margin_right = 20, margin_top = 16, margin_bottom = 46; // pixels around the axes
-constexpr double letter_width = 0.6 * AccuracyPlot::text_height;                           // about
+constexpr double plot_width = 760, plot_height = 360, title_height = 18, text_height = 10; // pixels
+constexpr double margin_left = 70, margin_right = 20, margin_top = 16, margin_bottom = 46; // around the axes
+constexpr glm::vec3 grid{0.87f}, blue{0.2f, 0.4f, 0.8f}, red{0.8f, 0.2f, 0}, grey{0.67f};
 
 // A logarithmic axis with room for 0 at its beginning.
 struct PlotScale {
@@ -18,13 +24,11 @@ struct PlotScale {
 
     PlotScale(const std::vector<double>& values, double from_, double to_) : from(from_), to(to_) {
         std::vector<double> positive;
-        for (const double v : values) {
-            if (v > 0) positive.push_back(v);
-            else has_zero = true;
-        }
+        std::ranges::copy_if(values, std::back_inserter(positive), [](double v) { return v > 0; });
+        has_zero = positive.size() < values.size();
         if (positive.empty()) return;
-        least = std::pow(10, std::floor(std::log10(*std::ranges::min_element(positive)) * 2) / 2);
-        most = std::pow(10, std::ceil(std::log10(*std::ranges::max_element(positive)) * 2) / 2);
+        least = std::pow(10, std::floor(std::log10(std::ranges::min(positive)) * 2) / 2);
+        most = std::pow(10, std::ceil(std::log10(std::ranges::max(positive)) * 2) / 2);
         if (!(most > least)) most = 10 * least;
     }
     double at(double value) const {
@@ -44,50 +48,90 @@ struct PlotScale {
 
 struct PlotBox {
     glm::dvec2 low, high;
-    bool meets(const PlotBox& other) const {
-        return low.x < other.high.x && other.low.x < high.x && low.y < other.high.y && other.low.y < high.y;
-    }
     double overlap(const PlotBox& other) const {
-        if (!meets(other)) return 0;
-        return (std::min(high.x, other.high.x) - std::max(low.x, other.low.x)) *
-               (std::min(high.y, other.high.y) - std::max(low.y, other.low.y));
+        const glm::dvec2 size = glm::min(high, other.high) - glm::max(low, other.low);
+        return size.x > 0 && size.y > 0 ? size.x * size.y : 0;
     }
 };
 
+struct PlotName {
+    std::string text;
+    glm::dvec2 dot; // beside which it is
+    bool is_default;
+};
+
 // Names beside their points, where they cover least of what is there: right or left, and up or down by lines.
-void place_names(AccuracyPlot& plot, const std::vector<std::string>& names) {
-    constexpr double line = AccuracyPlot::text_height + 1, gap = 6, radius = 4;
+void draw_names(Drawing& drawing, glm::dvec2 origin, const std::vector<PlotName>& names) {
+    constexpr double line = text_height + 1, gap = 6, radius = 4, letter_width = 0.6 * text_height;
+    const PlotBox inside{{margin_left, 0}, {plot_width, plot_height - margin_bottom}};
     std::vector<PlotBox> taken;
-    for (const AccuracyPlot::Dot& dot : plot.dots) taken.push_back({dot.at - radius, dot.at + radius});
-    for (std::size_t i = 0; i < names.size(); ++i) {
-        const double width = letter_width * static_cast<double>(names[i].size());
-        const glm::dvec2 at = plot.dots[i].at;
-        double least = 1e300;
-        AccuracyPlot::Text best;
-        PlotBox best_box{};
+    for (const PlotName& name : names) taken.push_back({name.dot - radius, name.dot + radius});
+    for (const PlotName& name : names) {
+        const double width = letter_width * static_cast<double>(name.text.size());
+        double least = std::numeric_limits<double>::infinity();
+        PlotBox best{};
         for (const int row : {0, -1, 1, -2, 2, -3, 3, -4, 4, -5, 5, -6, 6})
             for (const bool is_right : {true, false}) {
-                const double top = at.y - AccuracyPlot::text_height / 2 + row * line;
-                const double x = is_right ? at.x + gap : at.x - gap;
-                const PlotBox box{{is_right ? x : x - width, top},
-                                  {is_right ? x + width : x, top + AccuracyPlot::text_height}};
+                const glm::dvec2 low{is_right ? name.dot.x + gap : name.dot.x - gap - width,
+                                     name.dot.y - text_height / 2 + row * line};
+                const PlotBox box{low, low + glm::dvec2(width, text_height)};
                 constexpr double of_row = 12; // square pixels that are covered sooner than a line farther away
-                double cost = of_row * std::abs(row);
+                double cost = of_row * std::abs(row) + 4 * (width * text_height - box.overlap(inside));
                 for (const PlotBox& other : taken) cost += box.overlap(other);
-                const PlotBox inside{{margin_left, 0}, {AccuracyPlot::width, AccuracyPlot::height - margin_bottom}};
-                cost += 4 * (width * AccuracyPlot::text_height - box.overlap(inside));
-                if (cost >= least) continue;
-                least = cost;
-                best = {.at = {x, top},
-                        .text = names[i],
-                        .align = is_right ? PlotAlign::left : PlotAlign::right,
-                        .is_name = true,
-                        .is_default = plot.dots[i].is_default};
-                best_box = box;
+                if (cost < least) least = cost, best = box;
             }
-        plot.texts.push_back(best);
-        taken.push_back(best_box);
+        const bool is_right = best.low.x > name.dot.x;
+        drawing.text(origin + glm::dvec2(is_right ? best.low.x : best.high.x, best.low.y), name.text,
+                     name.is_default ? red : plot_ink, text_height, is_right ? Align::left : Align::right);
+        taken.push_back(best);
     }
+}
+
+void draw_plot(Drawing& drawing, glm::dvec2 corner, const std::string& title, const AccuracyAxis& axis,
+               const AccuracyPoints& points) {
+    drawing.text(corner + glm::dvec2(8, 4), title, plot_ink, text_height + 2);
+    if (points.empty()) return;
+    const glm::dvec2 origin = corner + glm::dvec2(0, title_height);
+    const double right = plot_width - margin_right, bottom = plot_height - margin_bottom;
+    std::vector<double> costs, errors;
+    for (const AccuracyPoint& p : points) costs.push_back(p.cost()), errors.push_back(p.error());
+    const PlotScale x(costs, margin_left, right), y(errors, bottom, margin_top);
+    constexpr double tick_gap = 5;
+    const auto text = [&](glm::dvec2 at, const std::string& words, Align align) {
+        drawing.text(origin + at, words, plot_ink, text_height, align);
+    };
+    const auto name_x = [&](double tick) { text({x.at(tick), bottom + tick_gap}, shortest(tick), Align::centre); };
+    const auto name_y = [&](double tick) {
+        text({margin_left - tick_gap, y.at(tick) - text_height / 2}, shortest(tick), Align::right);
+    };
+    for (const double tick : x.ticks()) {
+        drawing.line(origin + glm::dvec2(x.at(tick), margin_top), origin + glm::dvec2(x.at(tick), bottom), grid);
+        name_x(tick);
+    }
+    for (const double tick : y.ticks()) {
+        drawing.line(origin + glm::dvec2(margin_left, y.at(tick)), origin + glm::dvec2(right, y.at(tick)), grid);
+        name_y(tick);
+    }
+    if (x.has_zero) name_x(0);
+    if (y.has_zero) name_y(0);
+    text({0.5 * (margin_left + right), bottom + 22}, axis.columns[0] + "   (upwards: " + axis.columns[1] + ")",
+         Align::centre);
+    std::vector<glm::dvec2> front;
+    std::vector<PlotName> names;
+    for (const AccuracyPoint& p : points) {
+        names.push_back({p.name, {x.at(p.cost()), y.at(p.error())}, p.is_default});
+        if (p.is_on_front) front.push_back(origin + names.back().dot);
+    }
+    std::ranges::sort(front, {}, [](const glm::dvec2& p) { return p.x; });
+    if (front.size() > 1) drawing.line(front, blue);
+    constexpr double dot_width = 7; // a line of no length with round ends
+    for (std::size_t i = 0; i < points.size(); ++i)
+        drawing.line(origin + names[i].dot, origin + names[i].dot,
+                     points[i].is_default    ? red
+                     : points[i].is_on_front ? blue
+                                             : grey,
+                     dot_width);
+    draw_names(drawing, origin, names);
 }
 
 } // namespace
@@ -100,72 +144,28 @@ std::string accuracy_number(double value) {
     return value == 0 ? "0" : rounded(value, 3);
 }
 
-std::vector<std::string> subjects_of(const AccuracyBenchResult& result, const AccuracyAxis& axis) {
-    std::vector<std::string> subjects;
-    for (const AccuracyPoint& p : result.points)
-        if (p.axis == axis.key && std::ranges::find(subjects, p.subject) == subjects.end())
-            subjects.push_back(p.subject);
-    return subjects;
-}
+std::string accuracy_picture_name(const std::string& key) { return "accuracy_" + key + ".png"; }
 
-std::vector<AccuracyPoint> points_of(const AccuracyBenchResult& result, const AccuracyAxis& axis,
-                                     const std::string& subject) {
-    std::vector<AccuracyPoint> points;
-    for (const AccuracyPoint& p : result.points)
-        if (p.axis == axis.key && p.subject == subject) points.push_back(p);
-    return points;
-}
-
-AccuracyPlot lay_out(const AccuracyAxis& axis, const std::vector<AccuracyPoint>& all,
-                     std::array<std::size_t, 2> columns) {
-    std::vector<AccuracyPoint> points;
-    for (const AccuracyPoint& p : all)
-        if (std::isfinite(p.values[columns[0]]) && std::isfinite(p.values[columns[1]])) points.push_back(p);
-    AccuracyPlot plot;
-    if (points.empty()) return plot;
-    const double right = AccuracyPlot::width - margin_right, bottom = AccuracyPlot::height - margin_bottom;
-    std::vector<double> across, up;
-    for (const AccuracyPoint& p : points) across.push_back(p.values[columns[0]]), up.push_back(p.values[columns[1]]);
-    const PlotScale x(across, margin_left, right), y(up, bottom, margin_top);
-    constexpr double half_text = AccuracyPlot::text_height / 2, tick_gap = 5;
-    for (const double tick : x.ticks()) {
-        plot.lines.push_back({{{x.at(tick), margin_top}, {x.at(tick), bottom}}});
-        plot.texts.push_back(
-            {.at = {x.at(tick), bottom + tick_gap}, .text = shortest(tick), .align = PlotAlign::centre});
+void write_accuracy_pictures(const std::vector<const AccuracyAxis*>& axes, const AccuracyPoints& points,
+                             const std::string& folder) {
+    constexpr double height = plot_height + title_height;
+    for (const AccuracyAxis* axis : axes) {
+        std::vector<std::string> subjects;
+        for (const AccuracyPoint& p : points)
+            if (p.axis == axis && (subjects.empty() || subjects.back() != p.subject)) subjects.push_back(p.subject);
+        if (subjects.size() > 2) subjects = {subjects.front(), subjects.back()};
+        auto drawing = require(Drawing::create(
+            static_cast<int>(plot_width), static_cast<int>(height) * static_cast<int>(subjects.size()), plot_paper));
+        for (std::size_t i = 0; i < subjects.size(); ++i) {
+            AccuracyPoints shown;
+            std::ranges::copy_if(points, std::back_inserter(shown), [&](const AccuracyPoint& p) {
+                return p.axis == axis && p.subject == subjects[i] && std::isfinite(p.cost()) &&
+                       std::isfinite(p.error());
+            });
+            draw_plot(drawing, {0, static_cast<double>(i) * height}, axis->name + ", " + subjects[i], *axis, shown);
+        }
+        require(drawing.write(std::filesystem::path(folder) / accuracy_picture_name(axis->key)));
     }
-    for (const double tick : y.ticks()) {
-        plot.lines.push_back({{{margin_left, y.at(tick)}, {right, y.at(tick)}}});
-        plot.texts.push_back({.at = {margin_left - tick_gap, y.at(tick) - half_text},
-                              .text = shortest(tick),
-                              .align = PlotAlign::right});
-    }
-    if (x.has_zero) plot.texts.push_back({.at = {x.at(0), bottom + tick_gap}, .text = "0", .align = PlotAlign::centre});
-    if (y.has_zero)
-        plot.texts.push_back(
-            {.at = {margin_left - tick_gap, y.at(0) - half_text}, .text = "0", .align = PlotAlign::right});
-    plot.texts.push_back({.at = {0.5 * (margin_left + right), bottom + 22},
-                          .text = axis.columns[columns[0]] + "   (upwards: " + axis.columns[columns[1]] + ")",
-                          .align = PlotAlign::centre});
-    const std::vector<bool> front = accuracy_front(points, columns);
-    std::vector<glm::dvec2> path;
-    std::vector<std::string> names;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const glm::dvec2 at{x.at(across[i]), y.at(up[i])};
-        if (front[i]) path.push_back(at);
-        std::string tip = points[i].name + ": ";
-        for (std::size_t c = 0; c < axis.columns.size(); ++c)
-            if (!std::isnan(points[i].values[c]))
-                tip += (c > 0 ? ", " : "") + accuracy_number(points[i].values[c]) + " " + axis.columns[c];
-        plot.dots.push_back({.at = at,
-                             .is_default = points[i].is_default,
-                             .is_on_front = front[i],
-                             .tip = tip + (points[i].note.empty() ? "" : " (" + points[i].note + ")")});
-        names.push_back(points[i].name);
-    }
-    std::ranges::sort(path, {}, [](const glm::dvec2& p) { return p.x; });
-    plot.lines.push_back({std::move(path), true});
-    place_names(plot, names);
-    return plot;
 }
 
 } // namespace unseen::app

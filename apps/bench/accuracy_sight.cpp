@@ -1,14 +1,7 @@
 // What is known of contrast sensitivity, and of the thresholds that a picture raises: formulas, tables and maps.
-#include "accuracy_axes.h"
-
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <numbers>
-#include <random>
 #include <utility>
-
-#include <glm/gtc/packing.hpp>
 
 #include <unseen/perception/csf.h>
 #include <unseen/perception/internal/judge_tables.h>
@@ -19,7 +12,7 @@
 #include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
-#include "bench_tools.h"
+#include "accuracy.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -29,13 +22,6 @@ using perception::CyclesPerDegree;
 using perception::Degrees;
 using perception::Luminance;
 
-// The value that so large a share of them stays below; `values` in any order, and not empty.
-double quantile(std::vector<double> values, double share) {
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
-}
-
 // ---- contrast sensitivity
 
 struct Stimuli {
@@ -43,15 +29,12 @@ struct Stimuli {
 };
 
 Stimuli random_stimuli(std::size_t count) {
-    std::mt19937_64 random(1);
-    const auto between = [&](double a, double b) {
-        return a + (b - a) * static_cast<double>(random() >> 11) * 0x1p-53;
-    };
+    Random random(1);
     Stimuli all;
     for (std::size_t i = 0; i < count; ++i) {
-        all.cpd.push_back(std::exp2(between(-3, 5)));
-        all.degrees.push_back(between(0, 60));
-        all.cdm2.push_back(std::exp2(between(-3, 8)));
+        all.cpd.push_back(std::exp2(random.between(-3, 5)));
+        all.degrees.push_back(random.between(0, 60));
+        all.cdm2.push_back(std::exp2(random.between(-3, 8)));
     }
     return all;
 }
@@ -130,31 +113,6 @@ private:
     std::vector<float> log_; // log2 S; [(e * luminances + l) * frequencies + f]
 };
 
-// A twin of castleCSF's formula for static gratings of patch_area(), in any precision. Its constants are those of
-// perception/src/csf/csf_castle.cpp, which has the source.
-template <class Real>
-Real castle_twin(Real cpd, Real degrees, Real cdm2) {
-    const auto rise = [&](Real p1, Real p2, Real p3) { return p1 * std::exp(-p3 * std::log1p(p2 / cdm2)); };
-    const Real area = std::numbers::pi_v<Real> * (Real(1.5) / cpd) * (Real(1.5) / cpd);
-    const auto channel = [&](Real log2_width, Real truncation, Real area0, Real frequency0, Real peak) {
-        const Real decades = std::log10(cpd / peak);
-        Real parabola = std::pow(Real(10), -decades * decades / std::exp2(log2_width));
-        if (cpd < peak) parabola = std::max(parabola, 1 - truncation);
-        const Real relative = cpd / frequency0, summed = area0 / (1 + relative * relative);
-        return parabola * cpd * std::sqrt(summed / (1 + summed / area));
-    };
-    const Real glare = -std::expm1(-Real(9.66862e9) * std::log1p(Real(5.58341e-7) / cdm2));
-    const Real sustained = rise(Real(56.4947), Real(7.54726), Real(0.144532)) * glare *
-                           channel(Real(0.000213047), Real(0.100207), Real(157.103), Real(0.702338),
-                                   rise(Real(1.78119), Real(91.5718), Real(0.256682)));
-    const Real hz0 = std::max(Real(4.7036) + Real(2.41482) * std::log10(cdm2), Real(0.5));
-    const Real away = std::pow(hz0, Real(0.1898));
-    const Real transient = std::exp(-away * away / Real(0.0844836)) * Real(2748.09) * std::pow(cdm2, Real(0.193434)) *
-                           channel(Real(2.6761), Real(0.000241177), Real(3.81611), Real(3.01389), Real(0.000316696));
-    const Real decay = std::min(Real(0.0239853) + Real(0.0189038) * cpd, Real(0.0400662) + Real(0.00813619) * cpd);
-    return (sustained + transient) * std::pow(Real(10), -decay * degrees);
-}
-
 // ---- maps
 
 perception::Image block_means(const perception::Image& image, int block) {
@@ -170,11 +128,6 @@ perception::Image block_means(const perception::Image& image, int block) {
             out.values.push_back(static_cast<float>(sum / count));
         }
     return out;
-}
-
-perception::Image in_half_floats(perception::Image image) {
-    for (float& value : image.values) value = glm::unpackHalf1x16(glm::packHalf1x16(value));
-    return image;
 }
 
 // Of each pixel of the truth, the relative error of a map of blocks.
@@ -193,12 +146,10 @@ std::vector<double> map_errors(const std::vector<float>& map, int map_width, int
 
 // A way to make a map on the GPU.
 struct MapVariant {
-    std::string name; // begins with the recipe
-    const perception::Image& picture;
-    int block = 1;            // each of its pixels stands for so many by so many
-    std::size_t bands = 0;    // at most; 0: all
-    double picture_bytes = 4; // a pixel
-    std::string note = {};
+    std::string name;
+    bool is_modern;        // else rpg99's
+    int block = 1;         // each of its pixels stands for so many by so many
+    std::size_t bands = 0; // at most; 0: all
 };
 
 struct GpuMap {
@@ -209,44 +160,39 @@ struct GpuMap {
 
 class MapMaker {
 public:
-    MapMaker(AccuracySubject& subject, int repeats)
-        : context_(subject.context), observer_(subject.session.observer()), repeats_(repeats) {}
+    explicit MapMaker(AccuracySubject& subject) : context_(subject.context), observer_(subject.session.observer()) {}
 
     perception::JudgeOptions judging() const { return session::judge_options(observer_); }
     perception::Rpg99Options rpg99_options(int width, int block) const {
         return {.field_degrees = perception::physical_field(display(block), width).value(), .masked_by_both = false};
     }
 
-    Result<GpuMap> modern(const MapVariant& variant) const {
-        perception::JudgeOptions how = judging();
-        how.display = display(variant.block);
-        if (how.gaze_px) *how.gaze_px /= static_cast<double>(variant.block);
-        const auto [least, most] = std::ranges::minmax(variant.picture.values);
-        auto tables = perception::judge_tables(variant.picture.width, variant.picture.height, least, most, how);
-        if (!tables) return tables.error();
-        if (variant.bands > 0 && tables->bands.size() > variant.bands) tables->bands.resize(variant.bands);
-        auto up = upload(variant.picture);
-        if (!up) return up.error();
-        auto passes = render::VisibilityPasses::create(context_, *tables, up->texture());
-        if (!passes) return passes.error();
-        return timed(*passes, std::to_string(tables->bands.size()) + " bands", [&]() -> Result<void> {
-            if (auto set = passes->set_reference(up->texture()); !set) return set;
-            return passes->map_thresholds();
-        });
-    }
-
-    Result<GpuMap> rpg99(const MapVariant& variant) const {
-        const int width = variant.picture.width, height = variant.picture.height;
-        const auto tables = perception::rpg99_tables(width, rpg99_options(width, variant.block));
-        if (!tables) return tables.error();
-        auto up = upload(variant.picture);
-        if (!up) return up.error();
-        auto passes = render::ElevationPasses::create(context_, width, height, *tables);
-        if (!passes) return passes.error();
-        return timed(*passes, "against rpg99's", [&] { return passes->map_thresholds(up->texture()); });
+    GpuMap make(const perception::Image& picture, const MapVariant& variant) const {
+        return variant.is_modern ? modern(picture, variant) : rpg99(picture, variant);
     }
 
 private:
+    GpuMap modern(const perception::Image& picture, const MapVariant& variant) const {
+        perception::JudgeOptions how = judging();
+        how.display = display(variant.block);
+        if (how.gaze_px) *how.gaze_px /= static_cast<double>(variant.block);
+        const auto [least, most] = std::ranges::minmax(picture.values);
+        auto tables = require(perception::judge_tables(picture.width, picture.height, least, most, how));
+        if (variant.bands > 0 && tables.bands.size() > variant.bands) tables.bands.resize(variant.bands);
+        auto up = upload(picture);
+        auto passes = require(render::VisibilityPasses::create(context_, tables, up.texture()));
+        return timed(passes, std::to_string(tables.bands.size()) + " bands", [&] {
+            require(passes.set_reference(up.texture()));
+            require(passes.map_thresholds());
+        });
+    }
+    GpuMap rpg99(const perception::Image& picture, const MapVariant& variant) const {
+        const auto tables =
+            require(perception::rpg99_tables(picture.width, rpg99_options(picture.width, variant.block)));
+        auto up = upload(picture);
+        auto passes = require(render::ElevationPasses::create(context_, picture.width, picture.height, tables));
+        return timed(passes, "against rpg99's", [&] { require(passes.map_thresholds(up.texture())); });
+    }
     perception::Display display(int block) const {
         perception::Display display = observer_.display;
         if (block > 1)
@@ -254,29 +200,24 @@ private:
                 display, perception::PixelsPerDegree(perception::pixels_per_degree(display).value() / block));
         return display;
     }
-    Result<render::LuminanceImage> upload(const perception::Image& picture) const {
-        return render::LuminanceImage::create(context_, picture.width, picture.height, picture.values);
+    render::LuminanceImage upload(const perception::Image& picture) const {
+        return require(render::LuminanceImage::create(context_, picture.width, picture.height, picture.values));
     }
     template <class Passes, class Make>
-    Result<GpuMap> timed(Passes& passes, std::string note, Make&& make) const {
+    static GpuMap timed(Passes& passes, std::string note, Make&& make) {
         GpuMap map;
         map.note = std::move(note);
-        std::vector<double> times;
-        for (int i = 0; i <= repeats_; ++i) {
-            const auto start = BenchClock::now();
-            if (auto made = make(); !made) return made.error();
-            auto read = passes.read_thresholds();
-            if (!read) return read.error();
-            map.thresholds = std::move(*read);
-            if (i > 0) times.push_back(1e3 * seconds_since(start)); // the first one compiles
-        }
-        map.milliseconds = median(std::move(times));
+        const auto once = [&] {
+            make();
+            map.thresholds = require(passes.read_thresholds());
+        };
+        once(); // the first one compiles
+        map.milliseconds = 1e3 * median_seconds(few_repeats, once);
         return map;
     }
 
     const render::Context& context_;
     const session::Observer& observer_;
-    int repeats_;
 };
 
 double median_ratio(const perception::Image& map, const perception::Image& other) {
@@ -289,30 +230,22 @@ double median_ratio(const perception::Image& map, const perception::Image& other
 // Sensitivities to random stimuli: each way's time and error.
 class CsfLookups {
 public:
-    explicit CsfLookups(int repeats) : stimuli_(random_stimuli(count)), repeats_(repeats), truth_(count) {}
-
     // The first is the truth that the others are held against.
     template <class LookUp>
-    void add(const std::string& name, LookUp&& look_up, double bytes = 0, const std::string& note = {},
-             bool is_default = false) {
-        std::vector<double> found(count), times, errors;
-        for (int i = 0; i < repeats_; ++i) {
-            const auto start = BenchClock::now();
+    void add(const std::string& name, LookUp&& look_up, double bytes = 0, const std::string& note = {}) {
+        std::vector<double> found(count), errors;
+        const double seconds = median_seconds(few_repeats, [&] {
             for (std::size_t k = 0; k < count; ++k)
                 found[k] = look_up(stimuli_.cpd[k], stimuli_.degrees[k], stimuli_.cdm2[k]);
-            times.push_back(1e9 * seconds_since(start) / count);
-        }
+        });
         if (points.empty()) truth_ = found;
         for (std::size_t k = 0; k < count; ++k)
             if (truth_[k] > 1) errors.push_back(std::abs(found[k] / truth_[k] - 1));
-        points.push_back(
-            {.subject = "castleCSF",
-             .name = name,
-             .values = {median(std::move(times)), *std::ranges::max_element(errors), quantile(errors, 0.95), bytes},
-             .note = note,
-             .is_default = is_default});
+        points.push_back({.name = name,
+                          .values = {1e9 / count * seconds, std::ranges::max(errors), quantile(errors, 0.95), bytes},
+                          .note = note});
     }
-    void add(const std::string& name, const perception::CsfTable& table, bool is_default = false) {
+    void add_table(const std::string& name, const perception::CsfTable& table) {
         const perception::CsfSamples& s = table.samples();
         add(
             name,
@@ -321,105 +254,81 @@ public:
             },
             static_cast<double>(sizeof(double) * s.sensitivity.size()),
             std::to_string(s.frequency_cpd.size()) + " x " + std::to_string(s.eccentricity_deg.size()) + " x " +
-                std::to_string(s.luminance_cdm2.size()) + " samples",
-            is_default);
+                std::to_string(s.luminance_cdm2.size()) + " samples");
     }
 
     AccuracyPoints points;
 
 private:
     static constexpr std::size_t count = 100'000;
-    Stimuli stimuli_;
-    int repeats_;
+    Stimuli stimuli_ = random_stimuli(count);
     std::vector<double> truth_;
 };
 
 } // namespace
 
-Result<AccuracyPoints> csf_points(const AccuracyBenchOptions& options) {
-    CsfLookups lookups(std::max(1, options.repeats / 3));
+AccuracyPoints csf_points() {
+    CsfLookups lookups;
     lookups.add("closed form, double", [](double f, double e, double l) {
         return perception::sensitivity(perception::CsfModel::castle,
                                        perception::stimulus_of({}, CyclesPerDegree(f), Degrees(e), Luminance(l)));
     });
-    lookups.add(
-        "closed form, float",
-        [](double f, double e, double l) {
-            return static_cast<double>(
-                castle_twin(static_cast<float>(f), static_cast<float>(e), static_cast<float>(l)));
-        },
-        0, "a twin, for static gratings alone");
     for (const int samples : {16, 32, 64}) {
         perception::CsfSamples s = samples_of(samples);
         const CubicTable cubic(s);
-        const auto table = perception::CsfTable::create(std::move(s));
-        if (!table) return table.error();
         const std::string name = "table, " + std::to_string(samples) + " an axis, ";
-        lookups.add(name + "linear", *table);
+        lookups.add_table(name + "linear", require(perception::CsfTable::create(std::move(s))));
         lookups.add(
             name + "cubic", [&](double f, double e, double l) { return cubic.sensitivity(f, e, l); },
             static_cast<double>(cubic.bytes()), "a twin");
     }
-    lookups.add("the program's table", perception::CsfTable::standard(), true);
+    lookups.add_table("the program's table", perception::CsfTable::standard());
+    lookups.points.back().is_default = true;
     return std::move(lookups.points);
 }
 
-Result<AccuracyPoints> map_points(AccuracySubject& subject, const AccuracyBenchOptions& options) {
-    auto renderer = session::SceneRenderer::create(subject.context, subject.session);
-    if (!renderer) return renderer.error();
-    render::DrawOptions drawing;
-    drawing.samples = std::min(options.samples, 16);
-    drawing.background = subject.session.background();
+AccuracyPoints map_points(AccuracySubject& subject) {
+    auto renderer = require(session::SceneRenderer::create(subject.context, subject.session));
     const auto whole = session::whole_cuts(subject.session);
-    const auto frame = renderer->draw(session::drawn_cuts(whole), subject.view, drawing);
-    if (!frame) return frame.error();
-    const perception::Image picture = session::luminance_image(*frame, subject.session.observer().display);
-    const MapMaker maker(subject, std::max(1, options.repeats / 3));
+    const auto frame = require(renderer.draw(session::drawn_cuts(whole), subject.view,
+                                             {.samples = 16, .background = subject.session.background()}));
+    const perception::Image picture = session::luminance_image(frame, subject.session.observer().display);
+    const MapMaker maker(subject);
 
     // The CPU's are the truth.
-    AccuracyPoints points;
-    auto start = BenchClock::now();
-    const auto modern = perception::threshold_map_modern(picture, maker.judging());
-    if (!modern) return modern.error();
-    points.push_back({.name = "modern, CPU", .values = {1e3 * seconds_since(start), 0, 0, 4}});
-    start = BenchClock::now();
-    const auto rpg99 = perception::rpg99_map(picture, picture, maker.rpg99_options(picture.width, 1));
-    if (!rpg99) return rpg99.error();
-    points.push_back({.name = "rpg99, CPU",
-                      .values = {1e3 * seconds_since(start), 0, 0, 4},
-                      .note = "thresholds are " + rounded(median_ratio(rpg99->threshold, *modern), 2) +
-                              " x modern's at the median pixel"});
-
-    const perception::Image half = block_means(picture, 2), quarter = block_means(picture, 4),
-                            rounded_picture = in_half_floats(picture);
-    const std::string twin = ", a twin: the picture is rounded before";
-    const MapVariant variants[] = {{"modern", picture},
-                                   {"modern, 16 bits", rounded_picture, 1, 0, 2, twin},
-                                   {"modern, half the resolution", half, 2},
-                                   {"modern, a quarter", quarter, 4},
-                                   {"modern, 1 band", picture, 1, 1},
-                                   {"modern, 2 bands", picture, 1, 2},
-                                   {"modern, 3 bands", picture, 1, 3},
-                                   {"modern, 4 bands", picture, 1, 4},
-                                   {"modern, 5 bands", picture, 1, 5},
-                                   {"rpg99", picture},
-                                   {"rpg99, 16 bits", rounded_picture, 1, 0, 2, twin},
-                                   {"rpg99, half the resolution", half, 2},
-                                   {"rpg99, a quarter", quarter, 4}};
-    for (const MapVariant& variant : variants) {
-        const bool is_modern = variant.name.starts_with("modern");
-        const auto map = is_modern ? maker.modern(variant) : maker.rpg99(variant);
-        if (!map) return map.error();
+    perception::Image modern;
+    perception::Rpg99Map rpg99;
+    const double modern_s =
+        seconds_of([&] { modern = require(perception::threshold_map_modern(picture, maker.judging())); });
+    const double rpg99_s = seconds_of(
+        [&] { rpg99 = require(perception::rpg99_map(picture, picture, maker.rpg99_options(picture.width, 1))); });
+    AccuracyPoints points = {{.name = "modern, CPU", .values = {1e3 * modern_s, 0, 0, 4}},
+                             {.name = "rpg99, CPU",
+                              .values = {1e3 * rpg99_s, 0, 0, 4},
+                              .note = "thresholds are " + rounded(median_ratio(rpg99.threshold, modern), 2) +
+                                      " x modern's at the median pixel"}};
+    for (const MapVariant& variant : {MapVariant{"modern", true},
+                                      {"modern, half the resolution", true, 2},
+                                      {"modern, a quarter", true, 4},
+                                      {"modern, 1 band", true, 1, 1},
+                                      {"modern, 2 bands", true, 1, 2},
+                                      {"modern, 3 bands", true, 1, 3},
+                                      {"modern, 4 bands", true, 1, 4},
+                                      {"modern, 5 bands", true, 1, 5},
+                                      {"rpg99", false},
+                                      {"rpg99, half the resolution", false, 2},
+                                      {"rpg99, a quarter", false, 4}}) {
+        const perception::Image small = block_means(picture, variant.block);
+        const GpuMap map = maker.make(small, variant);
         const std::vector<double> errors =
-            map_errors(map->thresholds, variant.picture.width, variant.block, is_modern ? *modern : rpg99->threshold);
-        constexpr double of_map = 4; // bytes
-        const double share =
-            static_cast<double>(variant.picture.values.size()) / static_cast<double>(picture.values.size());
-        points.push_back({.name = variant.name,
-                          .values = {map->milliseconds, quantile(errors, 0.99), quantile(errors, 0.5),
-                                     share * (variant.picture_bytes + of_map)},
-                          .note = map->note + variant.note,
-                          .is_default = variant.name == "modern"});
+            map_errors(map.thresholds, small.width, variant.block, variant.is_modern ? modern : rpg99.threshold);
+        constexpr double of_picture = 4, of_map = 4; // bytes a pixel
+        const double share = static_cast<double>(small.values.size()) / static_cast<double>(picture.values.size());
+        points.push_back(
+            {.name = variant.name,
+             .values = {map.milliseconds, quantile(errors, 0.99), quantile(errors, 0.5), share * (of_picture + of_map)},
+             .note = map.note,
+             .is_default = variant.name == "modern"});
     }
     return points;
 }

@@ -1,30 +1,54 @@
 #include "bench_tools.h"
 
 #include <algorithm>
-#include <cmath>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <limits>
+#include <numbers>
 
 #include <sample_mesh.h>
-#include <unseen/vdtree/builder.h>
 
-#include "child_process.h"
+#include "make_scene.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double idle_load = 0.5; // of a machine that does nothing else, with what has just been built or copied
-constexpr double active_tolerance = 0.002; // how near a threshold must come to the triangles asked for
+
+// The file of this program.
+fs::path own_executable() {
+    std::error_code unknown;
+    return fs::read_symlink("/proc/self/exe", unknown);
+}
+
+std::vector<std::string> make_each(const BenchFolder& folder, std::uint64_t triangles,
+                                   const std::vector<std::string>& statues,
+                                   std::initializer_list<std::pair<SceneKind, const char*>> kinds) {
+    std::vector<std::string> files;
+    for (const auto& [kind, name] : kinds) {
+        files.push_back((folder / (name + std::string(".glb"))).string());
+        require(make_scene(files.back(),
+                           {.kind = kind, .triangles = triangles, .statues = {statues.begin(), statues.end()}}));
+    }
+    return files;
+}
 
 } // namespace
 
 double median(std::vector<double> values) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
+    std::ranges::nth_element(values, middle);
     return *middle;
+}
+
+double quantile(std::vector<double> values, double share) {
+    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::ranges::nth_element(values, at);
+    return *at;
 }
 
 Pinned::Pinned() {
@@ -44,8 +68,58 @@ Pinned::~Pinned() {
     if (is_pinned_) sched_setaffinity(0, sizeof before_, &before_);
 }
 
+MachineLoad MachineLoad::now() {
+    double average = 0;
+    return {getloadavg(&average, 1) == 1 ? average : std::numeric_limits<double>::quiet_NaN()};
+}
+
+std::string MachineLoad::advice() const {
+    constexpr double idle = 0.5; // of a machine that does nothing else, with what has just been built or copied
+    if (!(average > idle)) return {};
+    return "the machine was busy when this began (load average " + rounded(average, 3) +
+           "): times and rates come out worse than they are. End other programs, wait a minute and measure again; "
+           "counts, memory and pixels are as on an idle machine.";
+}
+
+glm::dvec3 Random::direction() {
+    const double z = between(-1, 1), turn = between(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
+    return {across * std::cos(turn), across * std::sin(turn), z};
+}
+
+std::vector<std::string> installed_meshes() {
+    constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj"; // of Debian's glmark2-data
+    std::vector<std::string> files;
+    std::error_code unknown;
+    if (fs::exists(bunny, unknown)) files.push_back(bunny);
+    if (const fs::path dragon = find_in_checkout(dragon_file); !dragon.empty()) files.push_back(dragon.string());
+    return files;
+}
+
+vdtree::VertexTree sample_tree() {
+    print_note("neither the bunny nor the dragon is there ('./quickstart --dragon' fetches them): a sphere with bumps "
+               "stands in.");
+    constexpr int rows = 130; // 67,600 triangles
+    return require(vdtree::build_tree(bumpy_sphere(rows).view()));
+}
+
+vdtree::Mesh whole_mesh(const vdtree::VertexTree& tree) {
+    vdtree::Cut whole(tree);
+    whole.unfold_all();
+    vdtree::Mesh mesh = vdtree::extract_mesh(whole);
+    const vdtree::TextureView texture = tree.texture();
+    mesh.texture = {texture.width, texture.height, texture.wrap_u, texture.wrap_v,
+                    std::vector(texture.texels.begin(), texture.texels.end())};
+    return mesh;
+}
+
+vdtree::VertexTree tree_like(const vdtree::VertexTree& own, const vdtree::Mesh& mesh, vdtree::BuildOptions how) {
+    how.light = own.light();
+    how.prelit = own.is_prelit();
+    return require(vdtree::build_tree(mesh.view(), how));
+}
+
 fs::path find_in_checkout(const fs::path& relative) {
-    for (const fs::path& start : {fs::current_path(), fs::path(own_executable()).parent_path()}) {
+    for (const fs::path& start : {fs::current_path(), own_executable().parent_path()}) {
         for (fs::path folder = start; !folder.empty(); folder = folder.parent_path()) {
             std::error_code unknown;
             if (fs::exists(folder / relative, unknown)) return folder / relative;
@@ -55,69 +129,44 @@ fs::path find_in_checkout(const fs::path& relative) {
     return {};
 }
 
-std::string command_beside(const std::string& name) {
-    const fs::path file = fs::path(own_executable()).parent_path() / name;
-    std::error_code unknown;
-    return fs::exists(file, unknown) ? file.string() : name;
-}
-
-bool MachineLoad::is_high() const { return average > idle_load; }
-
-std::string MachineLoad::advice() const {
-    if (!is_high()) return {};
-    return "the machine was busy when this began (load average " + rounded(average, 3) +
-           "): times and rates come out worse than they are. End other programs, wait a minute and measure again; "
-           "counts, memory and pixels "
-           "are as on an idle machine.";
-}
-
-MachineLoad machine_load() {
-    double average = 0;
-    return {getloadavg(&average, 1) == 1 ? average : std::numeric_limits<double>::quiet_NaN()};
-}
-
-std::vector<std::string> installed_meshes() {
-    constexpr const char* bunny =
-        "/usr/share/glmark2/models/bunny.obj"; // of Debian's glmark2-data, which quickstart installs
-    std::vector<std::string> files;
-    std::error_code unknown;
-    if (fs::exists(bunny, unknown)) files.push_back(bunny);
-    if (const fs::path dragon = find_in_checkout(dragon_file); !dragon.empty()) files.push_back(dragon.string());
-    return files;
-}
-
-Result<vdtree::VertexTree> sample_tree() {
-    print_note("neither the bunny nor the dragon is there ('./quickstart --dragon' fetches them): a sphere with bumps "
-               "stands in.");
-    constexpr int rows = 130; // 67,600 triangles
-    const vdtree::Mesh mesh = bumpy_sphere(rows);
-    return vdtree::build_tree(mesh.view());
-}
-
-double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,
-                             const vdtree::Viewpoint& viewpoint, const vdtree::FollowOptions& options, int repeats) {
-    std::vector<double> rates;
-    for (int i = 0; i < repeats; ++i) {
-        const auto start = BenchClock::now();
-        if (!vdtree::test_every_node(tree, criterion, viewpoint, options))
-            return std::numeric_limits<double>::quiet_NaN();
-        rates.push_back(static_cast<double>(tree.interior_count()) / seconds_since(start));
+BenchFolder::BenchFolder(const std::string& kept) : folder_(kept), is_kept_(!kept.empty()) {
+    std::error_code failed;
+    if (is_kept_) {
+        fs::create_directories(kept, failed);
+    } else {
+        std::string name = (fs::temp_directory_path() / "unseen-bench-XXXXXX").string();
+        if (!mkdtemp(name.data())) failed = std::error_code(errno, std::generic_category());
+        folder_ = name;
     }
-    return median(rates);
+    if (failed)
+        throw BenchFailure{
+            {ErrorCode::io_failure, "Cannot make the folder '" + folder_.string() + "': " + failed.message() + "."}};
 }
 
-AimedThreshold aim_for(vdtree::Index triangles, const FunctionRef<vdtree::Index(float)>& follow) {
-    double low = -20, high = 20; // log2
-    AimedThreshold aimed;
-    constexpr int steps = 24;
-    for (int step = 0; step < steps; ++step) {
-        const double middle = (low + high) / 2;
-        aimed.threshold = static_cast<float>(std::exp2(middle));
-        aimed.triangles = follow(aimed.threshold);
-        if (std::abs(static_cast<double>(aimed.triangles) - triangles) <= active_tolerance * triangles) break;
-        (aimed.triangles > triangles ? low : high) = middle;
-    }
-    return aimed;
+BenchFolder::~BenchFolder() {
+    std::error_code ignored;
+    if (!is_kept_) fs::remove_all(folder_, ignored);
+}
+
+std::vector<std::string> make_scenes(const BenchFolder& folder, std::uint64_t triangles) {
+    return make_each(folder, triangles, {},
+                     {{SceneKind::museum, "museum"},
+                      {SceneKind::treasure, "treasure"},
+                      {SceneKind::house, "house"},
+                      {SceneKind::forest, "forest"}});
+}
+
+std::vector<std::string> make_scenes_to_select_in(const BenchFolder& folder, const std::vector<std::string>& statues) {
+    return make_each(folder, 0, statues,
+                     {{SceneKind::spheres, "spheres"}, {SceneKind::bunnies, "bunnies"}, {SceneKind::models, "models"}});
+}
+
+Result<ChildOutcome> run_unseen(const std::vector<std::string>& words, std::vector<std::string> launcher) {
+    const fs::path beside = own_executable().parent_path() / "unseen";
+    std::error_code unknown;
+    launcher.push_back(fs::exists(beside, unknown) ? beside.string() : "unseen"); // else found by PATH
+    launcher.insert(launcher.end(), words.begin(), words.end());
+    return run_child(std::move(launcher));
 }
 
 } // namespace unseen::app

@@ -2,14 +2,14 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <cstring>
-#include <filesystem>
 
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <unseen/vdtree/internal/stopwatch.h>
 
 extern char** environ;
 
@@ -41,7 +41,7 @@ Result<ChildOutcome> run_child(std::vector<std::string> words) {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
     pid_t process = -1;
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = vdtree::Clock::now();
     const int failed = posix_spawnp(&process, argv.front(), &actions, nullptr, argv.data(), environ);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);
@@ -52,14 +52,9 @@ Result<ChildOutcome> run_child(std::vector<std::string> words) {
     int status = 0;
     while (waitpid(process, &status, 0) < 0)
         if (errno != EINTR) return cannot(errno);
-    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    outcome.seconds = vdtree::seconds_since(start);
     outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
     return outcome;
-}
-
-std::string own_executable() {
-    std::error_code unknown;
-    return std::filesystem::read_symlink("/proc/self/exe", unknown).string();
 }
 
 } // namespace unseen::app

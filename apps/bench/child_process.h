@@ -1,4 +1,4 @@
-// Programs run for what they do and for what they take.
+// A program run for what it does and for what it takes.
 #pragma once
 
 #include <string>
@@ -14,10 +14,8 @@ struct ChildOutcome {
     std::string out;    // stdout
 };
 
-// Runs a program (found by PATH where its name has no slash) and waits for it; its stderr is this one's. Fails where it
-// cannot be started.
+// Runs a program (found by PATH if its name has no slash) and waits for it; its stderr is this one's. Fails if it cannot
+// be started.
 Result<ChildOutcome> run_child(std::vector<std::string> words);
-
-std::string own_executable(); // this program's file
 
 } // namespace unseen::app

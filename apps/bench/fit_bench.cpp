@@ -1,15 +1,12 @@
-#include "fit_bench.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
-#include <random>
 
 #include <hard_mesh.h>
 #include <unseen/perception/criterion.h>
-#include <unseen/render/context.h>
 
+#include "bench_tools.h"
+#include "benches.h"
 #include "judged_model.h"
 #include "progress_bar.h"
 #include "terminal.h"
@@ -20,7 +17,6 @@ namespace {
 using perception::FoldModel;
 using vdtree::NodeId;
 
-constexpr std::uint64_t seed = 30; // of the views
 // Where the viewer looks, from the window's centre; 0: at everything.
 constexpr auto aside_degrees = FoldModel::needed_at_degrees;
 
@@ -56,7 +52,7 @@ struct Setting {
     std::string factor;
     double value = 0;
     FoldModel model;
-    std::uint64_t triangles = 0, visible_pixels = 0;
+    double triangles = 0, visible_pixels = 0;
     std::array<double, aside_degrees.size()> largest = {}; // V
     std::array<std::string, aside_degrees.size()> worst;   // their meshes
 };
@@ -66,174 +62,95 @@ std::vector<Setting> settings_of(const std::string& factor) {
     for (const Factor& one : factors()) {
         if (!factor.empty() && factor != one.name) continue;
         for (const double value : one.values) {
-            Setting& setting = settings.emplace_back();
-            setting.factor = one.name;
-            setting.value = value;
+            Setting& setting = settings.emplace_back(Setting{one.name, value, {}, 0, 0, {}, {}});
             one.set(setting.model, value);
         }
     }
     return settings;
 }
 
-// What one cut showed; settings often come to the same.
-struct Shown {
-    std::vector<NodeId> indices;
-    double largest = 0;
-    std::uint64_t visible_pixels = 0;
-};
-
-class Fit {
-public:
-    explicit Fit(const FitBenchOptions& options)
-        : options_(options), settings_(settings_of(options.factor)), random_(seed), bar_("fitting") {}
-
-    Result<FitBenchResult> run() {
-        const auto context = render::Context::headless();
-        if (!context) return context.error();
-        std::vector<HardMesh> meshes = tuning_meshes(options_.quick ? 1'500 : 8'000);
-        if (options_.quick) meshes.resize(2);
-        for (std::size_t i = 0; i < meshes.size(); ++i) {
-            bar_(static_cast<double>(i) / static_cast<double>(meshes.size()), meshes[i].name.c_str());
-            auto tree = build_hard_tree(meshes[i]);
-            if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context, meshes[i].name, std::move(*tree), options_.quick ? 128 : 256);
-            if (!model) return model.error();
-            if (auto ok = look_from_all_around(*model); !ok) return ok.error();
-            result_.table.title += meshes[i].name + " (" + grouped(model->triangles()) + "), ";
-        }
-        return finished();
+// One look at a model by each setting's criterion; settings often come to the same cut.
+void judge_all(JudgedModel& model, const std::vector<vdtree::DistanceCriterion>& criteria, std::size_t aside,
+               std::vector<Setting>& settings) {
+    session::Session& session = model.session(FoldTest::error);
+    const session::CutRecipe recipe = require(session.recipe(
+        model.view(), {.fold_test = FoldTest::error, .purpose = session::Purpose::picture})); // but for its criterion
+    std::vector<std::pair<std::vector<NodeId>, session::PictureVerdict>> known;
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+        vdtree::Cut cut(session.tree());
+        require(cut.follow(criteria[i], recipe.viewpoint, recipe.options));
+        const std::span<const NodeId> indices = cut.indices();
+        auto shown =
+            std::ranges::find_if(known, [&](const auto& one) { return std::ranges::equal(one.first, indices); });
+        if (shown == known.end())
+            shown = known.insert(shown, {{indices.begin(), indices.end()}, model.judge(cut).verdict});
+        Setting& setting = settings[i];
+        setting.triangles += cut.triangle_count();
+        setting.visible_pixels += static_cast<double>(shown->second.visible);
+        if (shown->second.v <= setting.largest[aside]) continue;
+        setting.largest[aside] = shown->second.v;
+        setting.worst[aside] = model.name();
     }
+}
 
-private:
-    // From near to far, from random directions; looked at and aside, with criteria that do for all directions.
-    Result<void> look_from_all_around(JudgedModel& model) {
-        std::vector<ViewOptions> views;
-        for (const double share : {0.9, 0.3, 0.08}) { // of the window's height
-            const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
-            ViewOptions& view = views.emplace_back();
-            view.direction = {across * std::cos(turn), across * std::sin(turn), z};
-            view.fill = share * uniform(0.8, 1.2);
-        }
-        if (options_.quick) views.resize(1);
-        const auto session = model.session(FoldTest::error);
-        if (!session) return session.error();
-        for (std::size_t aside = 0; aside < aside_degrees.size(); ++aside) {
-            if (auto looked = model.look(views.front()); !looked) return looked;
-            const auto test = test_options(**session, model.view(), aside_degrees[aside]);
-            if (!test) return test.error();
-            const auto criteria = criteria_of((*session)->tree(), model.view(), *test);
-            if (!criteria) return criteria.error();
-            for (const ViewOptions& view : views) {
-                if (auto looked = model.look(view); !looked) return looked;
-                if (auto judged = judge_all(model, **session, *criteria, test->gaze_px, aside); !judged) return judged;
-            }
-        }
-        return {};
+// From near to far, from random directions; looked at and aside, with criteria that do for all directions.
+void look_from_all_around(JudgedModel& model, Random& random, bool quick, std::vector<Setting>& settings) {
+    std::vector<Look> looks;
+    for (const double share : {0.9, 0.3, 0.08}) { // of the window's height
+        ViewOptions& view = looks.emplace_back().view;
+        view.direction = random.direction();
+        view.fill = share * random.between(0.8, 1.2);
     }
-
-    static Result<perception::FoldTestOptions> test_options(session::Session& session, const vdtree::View& view,
-                                                            double degrees) {
-        const auto scene = session.luminance(view);
-        if (!scene) return scene.error();
+    if (quick) looks.resize(1);
+    session::Session& session = model.session(FoldTest::error);
+    for (std::size_t aside = 0; aside < aside_degrees.size(); ++aside) {
+        model.look(looks.front());
         perception::FoldTestOptions test;
         test.display = session.observer().display;
-        test.scene = *scene;
-        if (degrees > 0) test.gaze_px = session::gaze_aside(test.display, view, degrees);
-        return test;
-    }
-
-    Result<std::vector<vdtree::DistanceCriterion>> criteria_of(const vdtree::VertexTree& tree, const vdtree::View& view,
-                                                               perception::FoldTestOptions test) const {
+        test.scene = require(session.luminance(model.view()));
+        if (aside_degrees[aside] > 0)
+            test.gaze_px = session::gaze_aside(test.display, model.view(), aside_degrees[aside]);
+        session.set_gaze(test.gaze_px ? std::optional(session::Gaze{*test.gaze_px}) : std::nullopt);
         std::vector<vdtree::DistanceCriterion> criteria;
-        for (const Setting& setting : settings_) {
+        for (const Setting& setting : settings) {
             test.model = setting.model;
-            auto criterion = perception::error_distances(tree, view, test);
-            if (!criterion) return criterion.error();
-            criteria.push_back(std::move(*criterion));
+            criteria.push_back(require(perception::error_distances(session.tree(), model.view(), test)));
         }
-        return criteria;
-    }
-
-    Result<void> judge_all(JudgedModel& model, session::Session& session,
-                           const std::vector<vdtree::DistanceCriterion>& criteria,
-                           const std::optional<glm::dvec2>& gaze_px, std::size_t aside) {
-        session.set_gaze(gaze_px ? std::optional(session::Gaze{*gaze_px}) : std::nullopt);
-        const auto recipe =
-            session.recipe(model.view(), {.fold_test = FoldTest::error,
-                                          .purpose = session::Purpose::picture}); // but for its criterion
-        if (!recipe) return recipe.error();
-        std::vector<Shown> known;
-        for (std::size_t i = 0; i < settings_.size(); ++i) {
-            vdtree::Cut cut(session.tree());
-            if (const auto made = cut.follow(criteria[i], recipe->viewpoint, recipe->options); !made)
-                return made.error();
-            const auto shown = show(model, cut, gaze_px, known);
-            if (!shown) return shown.error();
-            Setting& setting = settings_[i];
-            setting.triangles += cut.triangle_count();
-            setting.visible_pixels += (*shown)->visible_pixels;
-            if (double& largest = setting.largest[aside]; !((*shown)->largest <= largest)) {
-                largest = (*shown)->largest;
-                setting.worst[aside] = model.name();
-            }
+        for (Look& look : looks) {
+            look.gaze_px = test.gaze_px;
+            model.look(look);
+            judge_all(model, criteria, aside, settings);
         }
-        return {};
     }
+}
 
-    static Result<const Shown*> show(JudgedModel& model, const vdtree::Cut& cut,
-                                     const std::optional<glm::dvec2>& gaze_px, std::vector<Shown>& known) {
-        const std::span<const NodeId> indices = cut.indices();
-        for (const Shown& one : known)
-            if (std::ranges::equal(one.indices, indices)) return &one;
-        const auto judged = model.judge(cut, gaze_px);
-        if (!judged) return judged.error();
-        known.push_back({{indices.begin(), indices.end()}, judged->max_ratio, judged->visible_pixels});
-        return &known.back();
+BenchReport report_of(const std::vector<Setting>& settings, std::string title) {
+    BenchTable table{.title = std::move(title), .columns = {{"factor"}, {}, {}, {}, {}, {}}};
+    Json rows = Json::array();
+    double own = 0;
+    for (const Setting& s : settings)
+        if (s.model == FoldModel()) own = s.triangles;
+    for (const Setting& s : settings) {
+        const bool is_own = s.model == FoldModel();
+        const double ratio = s.triangles / own;
+        if (table.rows.empty() || table.rows.back().front().text != s.factor) table.rows.push_back({s.factor});
+        std::string largest;
+        for (const double v : s.largest) largest += (largest.empty() ? "" : " ") + with_decimals(v, 2);
+        table.rows.back().push_back(rounded(s.value, 3) + (is_own ? "*: " : ": ") + with_decimals(ratio, 3) + "; " +
+                                    largest + "; " + count(s.visible_pixels).text);
+        Json& row = rows.emplace_back(Json{{"factor", s.factor},
+                                           {"value", s.value},
+                                           {"is_own", is_own},
+                                           {"triangles", s.triangles},
+                                           {"of_own", ratio},
+                                           {"visible_pixels", s.visible_pixels}});
+        for (std::size_t i = 0; i < aside_degrees.size(); ++i)
+            row["seen"].push_back({{"degrees_aside", aside_degrees[i]},
+                                   {"largest_v", number_or_null(s.largest[i])},
+                                   {"mesh", s.worst[i]}});
     }
-
-    FitBenchResult finished() {
-        result_.table.title +=
-            "each from " + std::string(options_.quick ? "one place" : "three places") +
-            ", looked at, and 12, 29 and 50 degrees aside. Value of the factor: triangles kept, over "
-            "those of the model's own value (*); largest V at these four; visible pixels.";
-        result_.table.rows = {{"factor", "", "", "", "", ""}};
-        double own = 0;
-        for (const Setting& s : settings_)
-            if (s.model == FoldModel()) own = static_cast<double>(s.triangles);
-        for (const Setting& s : settings_) {
-            const bool is_own = s.model == FoldModel();
-            const double ratio = static_cast<double>(s.triangles) / own;
-            if (result_.table.rows.back().front() != s.factor) result_.table.rows.push_back({s.factor});
-            result_.table.rows.back().push_back(rounded(s.value, 3) + (is_own ? "*: " : ": ") +
-                                                with_decimals(ratio, 3) + "; " + largest_text(s) + "; " +
-                                                grouped(s.visible_pixels));
-            Json row = {{"factor", s.factor},       {"value", s.value}, {"is_own", is_own},
-                        {"triangles", s.triangles}, {"of_own", ratio},  {"visible_pixels", s.visible_pixels}};
-            for (std::size_t i = 0; i < aside_degrees.size(); ++i)
-                row["seen"].push_back({{"degrees_aside", aside_degrees[i]},
-                                       {"largest_v", number_or_null(s.largest[i])},
-                                       {"mesh", s.worst[i]}});
-            result_.rows.push_back(std::move(row));
-        }
-        return std::move(result_);
-    }
-
-    static std::string largest_text(const Setting& setting) {
-        std::string text;
-        for (const double v : setting.largest) text += (text.empty() ? "" : " ") + with_decimals(v, 2);
-        return text;
-    }
-
-    double uniform(double low, double high) {
-        return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-    }
-
-    const FitBenchOptions& options_;
-    std::vector<Setting> settings_;
-    std::mt19937_64 random_;
-    ProgressBar bar_;
-    FitBenchResult result_;
-};
+    return {{std::move(table)}, {{"rows", std::move(rows)}}};
+}
 
 } // namespace
 
@@ -243,6 +160,25 @@ std::vector<std::string> fit_factors() {
     return names;
 }
 
-Result<FitBenchResult> bench_fit(const FitBenchOptions& options) { return Fit(options).run(); }
+BenchReport bench_fit(const FitOptions& options) {
+    const render::Context context = require(render::Context::headless());
+    std::vector<Setting> settings = settings_of(options.factor);
+    constexpr std::uint64_t seed = 30; // of the views
+    Random random(seed);
+    std::vector<HardMesh> meshes = tuning_meshes(options.quick ? 1'500 : 8'000);
+    if (options.quick) meshes.resize(2);
+    std::string title;
+    ProgressBar bar("fitting");
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        bar(static_cast<double>(i) / static_cast<double>(meshes.size()), meshes[i].name.c_str());
+        JudgedModel model(context, meshes[i].name, require(build_hard_tree(meshes[i])), options.quick ? 128 : 256);
+        look_from_all_around(model, random, options.quick, settings);
+        title += model.name() + " (" + grouped(model.triangles()) + "), ";
+    }
+    return report_of(settings, title + "each from " + (options.quick ? "one place" : "three places") +
+                                   ", looked at, and 12, 29 and 50 degrees aside. Value of the factor: triangles "
+                                   "kept, over those of the model's own value (*); largest V at these four; visible "
+                                   "pixels.");
+}
 
 } // namespace unseen::app

@@ -1,94 +1,66 @@
 // A model whose simplifications are drawn and judged, view by view.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include <unseen/perception/image.h>
-#include <unseen/perception/judge.h>
-#include <unseen/render/renderer.h>
-#include <unseen/vdtree/cut.h>
+#include <unseen/session_gpu/picture_judge.h>
 
 #include "session_options.h"
 
 namespace unseen::app {
 
-// The judges, of the default observer. The first shares castleCSF with the fold tests; the second has another model of
-// contrast sensitivity and adds its bands up as squares: perception::second_judge_options().
-enum class Judge { modern, second };
-inline constexpr std::array judges = {Judge::modern, Judge::second};
-inline constexpr perception::CsfModel usual_second =
-    perception::CsfModel::barten_fitted; // of the eye's physics, by its own laws of area and of frequency
+// How a model is looked at.
+struct Look {
+    ViewOptions view; // but for its window
+    std::optional<glm::dvec2> gaze_px = {};
+    perception::Display display = {}; // flat
+    std::optional<perception::Luminance> background = {};
+};
 
-// Where they run. The GPU's says what the CPU's says within 0.1%.
-enum class JudgeDevice { cpu, gpu };
-
-struct Verdicts {
+// What was seen of a cut, by both judges of the default observer.
+struct Seen {
     vdtree::Index triangles = 0;
-    std::array<std::uint64_t, judges.size()> visible_pixels = {};
-    std::array<double, judges.size()> largest = {}; // V
+    session::PictureVerdict verdict;
 };
 
 class JudgedModel {
 public:
-    // Keeps a handle to the context.
-    static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree,
-                                      int window_px, perception::CsfModel second = usual_second,
-                                      JudgeDevice device = JudgeDevice::cpu);
+    JudgedModel(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px);
 
     const std::string& name() const { return name_; }
-    const vdtree::VertexTree& tree() const { return plain_.session->tree(); }
-    vdtree::Index triangles() const { return tree().triangle_count(); }
-
-    // What a fold test looks at: the tree as it was built or, where the test asks for it, with the errors of its folds.
-    Result<session::Session*> session(FoldTest test);
+    vdtree::Index triangles() const { return plain_.session->tree().triangle_count(); }
     const vdtree::View& view() const { return view_; }
 
-    // From now on it is seen on such a flat screen, before this background (none: the usual one). Look anew then.
-    Result<void> put(const perception::Display& display, std::optional<perception::Luminance> background);
-    // From now on everything is seen so. Of the options, the window's size is the model's own.
-    Result<void> look(ViewOptions view);
+    // From now on everything is seen so.
+    void look(const Look& look);
+    // What a fold test looks at: the tree as it was built or, if the test asks for it, with the errors of its folds.
+    session::Session& session(FoldTest test) { return *stand(test).session; }
 
-    struct Picture {
-        vdtree::Index triangles = 0;
-        perception::Image luminance; // cd/m2
-    };
-    Result<Picture> draw(const WhatOptions& what);
-    // Against the full model, which is drawn once a view.
-    Result<Verdicts> judge(const WhatOptions& what); // by all judges
-    Result<perception::Judgement> judge(const WhatOptions& what, Judge judge);
-    // Another cut of the tree with errors, that of session(FoldTest::error), by the first judge.
-    Result<perception::Judgement> judge(const vdtree::Cut& cut, const std::optional<glm::dvec2>& gaze_px);
-
-    // The cut alone.
-    Result<vdtree::Index> count(const WhatOptions& what);
+    // How many triangles a request for a picture leaves.
+    vdtree::Index count(const session::Request& request);
+    // Against the full model, which is drawn once a look.
+    Seen judge(const session::Request& request);
+    Seen judge(const vdtree::Cut& cut); // of the tree with errors
 
 private:
-    struct Stand { // a session with what draws it
+    struct Stand { // a session, whose place does not change, with what draws it
         std::unique_ptr<session::Session> session;
-        std::unique_ptr<render::Renderer> renderer;
+        std::shared_ptr<session::SceneRenderer> renderer;
     };
-    JudgedModel() = default;
-    Result<Stand*> stand(FoldTest test);
-    Result<Stand> make_stand(vdtree::VertexTree tree);
-    Result<session::Session> make_session(vdtree::VertexTree tree) const;
-    Result<session::Simplification> simplify(Stand& stand, const WhatOptions& what);
-    Result<Picture> draw(Stand& stand, const WhatOptions& what);
-    Result<Picture> draw(Stand& stand, const vdtree::Cut& cut);
-    Result<const perception::Image*> full();
-    Result<perception::Judgement> judge(const Picture& picture, const std::optional<glm::dvec2>& gaze_px, Judge judge);
+    Stand make_stand(vdtree::VertexTree tree) const;
+    Stand& stand(FoldTest test);
+    session::Simplification simplify(Stand& stand, session::Request request);
+    Seen judge(Stand& stand, std::span<const vdtree::Cut> cuts);
 
-    std::optional<render::Context> context_;
+    render::Context context_;
     std::string name_;
-    perception::Display display_;
-    std::optional<perception::Luminance> background_;
-    perception::CsfModel second_ = usual_second;
-    JudgeDevice device_ = JudgeDevice::cpu;
+    int window_px_;
+    Look look_;
     vdtree::View view_;
-    Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for
-    std::optional<perception::Image> full_;
+    Stand plain_, measured_; // the second when it is first asked for
+    std::unique_ptr<session::PictureJudge> judge_;
 };
 
 } // namespace unseen::app

@@ -1,17 +1,12 @@
-#include "libraries_bench.h"
-
 #include <algorithm>
 #include <filesystem>
 
-#include <unistd.h>
-
 #include <unseen/meshio/examine.h>
 #include <unseen/meshio/mesh_file.h>
-#include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
 
 #include "bench_tools.h"
-#include "child_process.h"
+#include "benches.h"
 #include "surface_distance.h"
 #include "terminal.h"
 
@@ -19,28 +14,6 @@ namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr vdtree::Index kept_one_in = 10; // triangles of the cut that is compared
-constexpr double millionths = 1e6;
-
-// A folder that goes when it is done with.
-class TreeFolder {
-public:
-    TreeFolder() : path_(fs::temp_directory_path() / ("unseen-libraries-" + std::to_string(getpid()))) {
-        std::error_code ignored; // building says what is wrong
-        fs::create_directory(path_, ignored);
-    }
-    TreeFolder(const TreeFolder&) = delete;
-    TreeFolder& operator=(const TreeFolder&) = delete;
-    ~TreeFolder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    fs::path tree() const { return path_ / "tree.vdt"; }
-
-private:
-    fs::path path_;
-};
 
 // At most so many triangles; the largest displacement is the least. No viewer takes part.
 vdtree::Mesh cut_to(const vdtree::VertexTree& tree, vdtree::Index triangles) {
@@ -54,80 +27,57 @@ vdtree::Mesh cut_to(const vdtree::VertexTree& tree, vdtree::Index triangles) {
     return vdtree::extract_mesh(cut);
 }
 
-vdtree::Mesh whole_mesh_of(const vdtree::VertexTree& tree) {
-    vdtree::Cut cut(tree);
-    cut.unfold_all();
-    return vdtree::extract_mesh(cut);
-}
-
-std::uint64_t bad_edges(const meshio::Examination& e) {
-    return e.boundary_edges + e.non_manifold_edges + e.inconsistent_edges;
-}
-
-// One build of a mesh: a row, and its cells for people.
-Result<void> add_build(const std::string& file, const vdtree::Mesh& original, bool repairs,
-                       const std::string& clusterer, const TreeFolder& folder, LibrariesBenchResult& result) {
-    std::vector<std::string> words = {command_beside("unseen"),
-                                      "build",
-                                      file,
-                                      "-o",
-                                      folder.tree().string(),
-                                      "--no-fold-errors",
-                                      "--no-texture",
-                                      "--json",
-                                      "-",
-                                      "--clusterer",
-                                      clusterer};
+// A row: one build of a mesh, by the command `unseen` of this build.
+std::vector<Cell> row_of_build(const std::string& file, const vdtree::Mesh& original, bool repairs,
+                               const std::string& clusterer, const fs::path& tree_file) {
+    std::vector<std::string> words = {"build",        file,     "-o", tree_file.string(), "--no-fold-errors",
+                                      "--no-texture", "--json", "-",  "--clusterer",      clusterer};
     if (repairs) words.push_back("--repair");
-    const auto outcome = run_child(words);
-    if (!outcome) return outcome.error();
-    const std::string name = fs::path(file).filename().string();
-    Json& row = result.rows.emplace_back(Json{{"mesh", name}, {"repaired", repairs}, {"clusterer", clusterer}});
-    auto& cells = result.table.rows.emplace_back(std::vector<std::string>{name, repairs ? "yes" : "", clusterer});
-    const Json report = Json::parse(outcome->out, nullptr, false);
-    if (outcome->status != 0 || !report.is_object()) { // not manifold, as a rule: stderr has said so
-        row["refused"] = true;
-        cells.insert(cells.end(), {"refused", "", "", "", "", ""});
-        return {};
+    const ChildOutcome outcome = require(run_unseen(words));
+    std::vector<Cell> cells = {fs::path(file).filename().string(), {repairs ? "yes" : "", repairs}, clusterer};
+    const Cell empty("", Json());
+    const Json report = Json::parse(outcome.out, nullptr, false);
+    if (outcome.status != 0 || !report.is_object()) { // not manifold, as a rule: stderr has said so
+        cells.insert(cells.end(), {"refused", empty, empty, empty, empty, empty});
+        return cells;
     }
-    const auto tree = vdtree::read_tree(folder.tree());
-    if (!tree) return tree.error();
-    const auto examined = meshio::examine(whole_mesh_of(*tree).view());
-    if (!examined) return examined.error();
-    const auto budget = std::max<vdtree::Index>(1, static_cast<vdtree::Index>(original.triangles.size()) / kept_one_in);
-    const vdtree::Mesh small = cut_to(*tree, budget);
+    const vdtree::VertexTree tree = require(vdtree::read_tree(tree_file));
+    const meshio::Examination examined = require(meshio::examine(whole_mesh(tree).view()));
+    constexpr std::size_t kept_one_in = 10; // triangles of the cut that is compared
+    const auto budget = static_cast<vdtree::Index>(std::max<std::size_t>(1, original.triangles.size() / kept_one_in));
+    const vdtree::Mesh small = cut_to(tree, budget);
     const double error = small.triangles.empty() ? std::numeric_limits<double>::quiet_NaN()
-                                                 : millionths * mean_surface_distance(original, small);
+                                                 : 1e6 * mean_surface_distance(original, small);
     const double mib = report.value("peak_bytes", 0.0) / (1 << 20);
     const Json repair = report.value("repair", Json());
-    row["triangles"] = tree->triangle_count();
-    row["bad_edges"] = bad_edges(*examined);
-    row["error_millionths"] = number_or_null(error);
-    row["seconds"] = outcome->seconds;
-    row["peak_mib"] = mib;
-    row["repair"] = repair;
-    cells.insert(cells.end(), {grouped(tree->triangle_count()), grouped(bad_edges(*examined)),
-                               repair.is_object() ? grouped(repair.value("capped_holes", std::uint64_t{0})) : "",
-                               rounded(error, 3), rounded(outcome->seconds, 2) + " s", rounded(mib, 3) + " MiB"});
-    return {};
+    const auto bad_edges = examined.boundary_edges + examined.non_manifold_edges + examined.inconsistent_edges;
+    cells.insert(cells.end(),
+                 {count(tree.triangle_count()), count(static_cast<double>(bad_edges)),
+                  repair.is_object() ? count(repair.value("capped_holes", 0.0)) : empty, number(error, 3),
+                  Cell(rounded(outcome.seconds, 2) + " s", outcome.seconds), Cell(rounded(mib, 3) + " MiB", mib)});
+    return cells;
 }
 
 } // namespace
 
-Result<LibrariesBenchResult> bench_libraries(const std::vector<std::string>& meshes) {
-    const TreeFolder folder;
-    LibrariesBenchResult result;
-    result.table.rows = {{"mesh", "repaired", "clusterer", "triangles", "border or irregular edges", "holes capped",
-                          "error at a tenth", "time", "memory"}};
-    for (const std::string& file : meshes) {
-        const auto read = meshio::read_mesh(file);
-        if (!read) return read.error();
+BenchReport bench_libraries(const BenchOptions& options) {
+    const BenchFolder folder;
+    BenchTable table{.columns = {{"mesh", "mesh"},
+                                 {"repaired", "repaired"},
+                                 {"clusterer", "clusterer"},
+                                 {"triangles", "triangles"},
+                                 {"border or irregular edges", "bad_edges"},
+                                 {"holes capped", "capped_holes"},
+                                 {"error at a tenth", "error_millionths"},
+                                 {"time", "seconds"},
+                                 {"memory", "peak_mib"}}};
+    for (const std::string& file : options.inputs) {
+        const meshio::ReadResult read = require(meshio::read_mesh(file));
         for (const bool repairs : {false, true})
-            for (const std::string clusterer : {"quadric", "octree", "openmesh"})
-                if (auto added = add_build(file, read->mesh, repairs, clusterer, folder, result); !added)
-                    return added.error();
+            for (const char* clusterer : {"quadric", "octree", "openmesh"})
+                table.rows.push_back(row_of_build(file, read.mesh, repairs, clusterer, folder / "tree.vdt"));
     }
-    return result;
+    return {{std::move(table)}};
 }
 
 } // namespace unseen::app

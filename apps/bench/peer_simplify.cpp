@@ -6,19 +6,7 @@
 #include <meshoptimizer.h>
 #endif
 
-#include <unseen/vdtree/cut.h>
-
 namespace unseen::app {
-
-vdtree::Mesh whole_mesh(const vdtree::VertexTree& tree) {
-    vdtree::Cut whole(tree);
-    whole.unfold_all();
-    vdtree::Mesh mesh = vdtree::extract_mesh(whole);
-    const vdtree::TextureView texture = tree.texture();
-    mesh.texture = {texture.width, texture.height, texture.wrap_u, texture.wrap_v,
-                    std::vector(texture.texels.begin(), texture.texels.end())};
-    return mesh;
-}
 
 #ifdef UNSEEN_BENCH_WITH_MESHOPTIMIZER
 bool has_meshoptimizer() { return true; }

@@ -4,14 +4,10 @@
 #include <cstddef>
 
 #include <unseen/vdtree/mesh.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::app {
 
 bool has_meshoptimizer(); // whether this build does
-
-// All of a tree for it, with the texture, which extract_mesh() leaves to the tree.
-vdtree::Mesh whole_mesh(const vdtree::VertexTree& tree);
 
 // At most so many triangles, or as few as its topology allows, over vertices of the mesh, with their attributes.
 // `whatever_it_takes`: where topology allows no more, as `gltfpack -sa` does it, by clusters of a grid (none may be left).

@@ -1,5 +1,3 @@
-#include "people_bench.h"
-
 #include <algorithm>
 #include <functional>
 #include <optional>
@@ -7,6 +5,8 @@
 #include <unseen/calibration/internal/people.h>
 #include <unseen/perception/csf.h>
 
+#include "bench_tools.h"
+#include "benches.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -80,54 +80,51 @@ std::vector<Part> parts_of(const People& people) {
     return parts;
 }
 
-BenchTable table_of_models(const People& people, Json& rows) {
+BenchTable table_of_models(const People& people) {
     BenchTable table{
         "Models and observers against " + std::to_string(people.size()) +
             " sensitivities of people: still gratings, to 30 degrees aside, of up to 100 square degrees, 1 "
             "to 500 cd/m2; each study counts alike",
-        {{"model", "people above it", "median, dB", "standard deviation, dB"}}};
+        {{"model", "model"},
+         {"people above it", "share_above"},
+         {"median, dB", "median_db"},
+         {"standard deviation, dB", "deviation_db"}}};
     for (const Model& m : models()) {
         const auto c = calibration::compare(people, m.sensitivity);
-        table.rows.push_back({m.name, rounded(100 * c.share_above, 3) + "%", with_decimals(c.median_db, 1),
-                              with_decimals(c.deviation_db, 1)});
-        rows.push_back({{"model", m.name},
-                        {"share_above", c.share_above},
-                        {"median_db", c.median_db},
-                        {"deviation_db", c.deviation_db}});
+        table.rows.push_back({m.name, percent(c.share_above, 3), fixed(c.median_db, 1), fixed(c.deviation_db, 1)});
     }
     return table;
 }
 
-BenchTable table_of_residuals(const People& people, Json& rows) {
+BenchTable table_of_residuals(const People& people) {
     const Model castle = model(CsfModel::castle), barten = model(CsfModel::barten_fitted);
     const double gain = perception::default_person.gain;
     BenchTable table{"Residuals: people over the model, median in dB",
-                     {{"part", "sensitivities", "castle", "barten-fitted", "above the default observer"}}};
+                     {{"part", "part"},
+                      {"sensitivities", "count"},
+                      {"castle", "castle_median_db"},
+                      {"barten-fitted", "barten_median_db"},
+                      {"above the default observer", "share_above_default"}}};
     for (const Part& part : parts_of(people)) {
         People inside;
-        for (const MeasuredSensitivity& m : people)
-            if (part.holds(m)) inside.push_back(m);
+        std::ranges::copy_if(people, std::back_inserter(inside), part.holds);
         if (inside.empty()) continue;
         const auto c = calibration::compare(inside, castle.sensitivity),
-                   b = calibration::compare(inside, barten.sensitivity);
-        const auto usual =
-            calibration::compare(inside, [&](const Stimulus& s) { return gain * castle.sensitivity(s); });
-        table.rows.push_back({part.name, std::to_string(c.count), with_decimals(c.median_db, 1),
-                              with_decimals(b.median_db, 1), rounded(100 * usual.share_above, 2) + "%"});
-        rows.push_back({{"part", part.name},
-                        {"count", c.count},
-                        {"castle_median_db", c.median_db},
-                        {"barten_median_db", b.median_db},
-                        {"share_above_default", usual.share_above}});
+                   b = calibration::compare(inside, barten.sensitivity),
+                   usual = calibration::compare(inside, [&](const Stimulus&s) { return gain * castle.sensitivity(s); });
+        table.rows.push_back({part.name,
+                              {std::to_string(c.count), c.count},
+                              fixed(c.median_db, 1),
+                              fixed(b.median_db, 1),
+                              percent(usual.share_above, 2)});
     }
     return table;
 }
 
-BenchTable table_of_fits(const People& people, Json& rows) {
-    BenchTable table{"Fits", {{"what", "fitted here", "used"}}};
+BenchTable table_of_fits(const People& people) {
+    BenchTable table{"Fits", {{"what", "fit"}, {"fitted here", "value"}, {"used", "used"}}};
     const auto add = [&](const std::string& what, double here, std::optional<double> used) {
-        table.rows.push_back({what, rounded(here, 4), used ? rounded(*used, 4) : ""});
-        rows.push_back({{"fit", what}, {"value", here}, {"used", used ? Json(*used) : Json()}});
+        table.rows.push_back({what, number(here, 4), used ? number(*used, 4) : Cell("", Json())});
     };
     const auto castle = model(CsfModel::castle).sensitivity, barten = model(CsfModel::barten_fitted).sensitivity;
     for (const double share : {0.1, 0.05})
@@ -146,18 +143,15 @@ BenchTable table_of_fits(const People& people, Json& rows) {
 
 } // namespace
 
-Result<PeopleBenchResult> bench_people(const std::string& file) {
-    const auto all = calibration::read_sensitivities(file);
-    if (!all) return all.error();
-    const People people = calibration::within_domain(*all);
+BenchReport bench_people(const BenchOptions& options) {
+    const std::string file = options.inputs.empty() ? find_in_checkout("data/people/achromatic_thresholds.csv").string()
+                                                    : options.inputs.front();
+    const People people = calibration::within_domain(require(calibration::read_sensitivities(file)));
     if (people.empty())
-        return Error{ErrorCode::invalid_argument, file +
-                                                      ": no sensitivity is of a still grating to 30 degrees aside, of "
-                                                      "up to 100 square degrees, at 1 to 500 cd/m2."};
-    PeopleBenchResult result;
-    result.tables = {table_of_models(people, result.rows), table_of_residuals(people, result.rows),
-                     table_of_fits(people, result.rows)};
-    return result;
+        throw BenchFailure{{ErrorCode::invalid_argument,
+                            file + ": no sensitivity is of a still grating to 30 degrees aside, of up to 100 square "
+                                   "degrees, at 1 to 500 cd/m2."}};
+    return {{table_of_models(people), table_of_residuals(people), table_of_fits(people)}};
 }
 
 } // namespace unseen::app

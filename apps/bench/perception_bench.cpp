@@ -1,22 +1,15 @@
-#include "perception_bench.h"
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iterator>
-#include <memory>
-#include <random>
+#include <numbers>
 #include <span>
 
 #include <glm/geometric.hpp>
 
 #include <hard_mesh.h>
-#include <turning_light.h>
-#include <unseen/perception/criterion.h>
-#include <unseen/render/context.h>
-#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "bench_tools.h"
+#include "benches.h"
 #include "judged_model.h"
 #include "load_model.h"
 #include "progress_bar.h"
@@ -25,7 +18,6 @@
 namespace unseen::app {
 namespace {
 
-namespace fs = std::filesystem;
 using vdtree::Index;
 
 constexpr FoldTest tests[] = {FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error};
@@ -34,157 +26,115 @@ constexpr FoldTest baseline = FoldTest::luebke_hallen;
 constexpr FoldTest promised = FoldTest::error; // the one that the promises are about
 constexpr double gaze_degrees = 29;
 constexpr double gazes[] = {gaze_degrees, 0}; // 0: none, all is looked at
-constexpr double fills[] = {0.9, 0.5, 0.2};   // of the window's height
 constexpr Index large_mesh = 50'000;          // triangles, of the meshes that are looked at from afar
 constexpr Index huge_mesh = 400'000;          // triangles, whose pictures take a minute each in software
-constexpr std::size_t huge_views = 6;         // random ones, of each such mesh
-constexpr Index lit_active = 100'000;         // triangles, under moving lights
 // Of the group `aside`: where the viewer looks, from the window's centre, in degrees; 0: at everything.
 constexpr double eccentricities[] = {0, 6, 12, 20, 29, 40, 50, 70};
-
 const glm::dvec3 directions[] = {{0, 0, 1}, {1, 0, 0}, {1, 1, 1}};
 
-std::string thousands(double triangles) {
-    return triangles < 10'000 ? grouped(static_cast<std::uint64_t>(std::llround(triangles)))
-                              : rounded(triangles / 1e3, 4) + "k";
-}
-
-std::string gaze_name(double degrees) { return degrees > 0 ? rounded(degrees, 2) + " degrees aside" : "fovea"; }
-std::string percent(double share) { return rounded(100 * share, 3) + "%"; }
-
-// How a model is looked at.
-struct Look {
-    ViewOptions view;
-    std::optional<glm::dvec2> gaze_px;
-    std::string text;
-    struct Surroundings {
-        perception::Display display;
-        std::optional<perception::Luminance> background;
-    };
-    std::optional<Surroundings> around = {}; // none: the usual ones
+// The least factors by which the promised test keeps fewer triangles than the baseline.
+struct SavingTarget {
+    double gaze, fill, factor;
 };
+constexpr SavingTarget saving_targets[] = {{29, 0.9, 2.7}, {29, 0.5, 3.4}, {29, 0.2, 3.3},
+                                           {0, 0.9, 1.25}, {0, 0.5, 1.33}, {0, 0.2, 1.55}};
 
-Result<void> look(JudgedModel& model, const Look& how) {
-    const Look::Surroundings around = how.around.value_or(Look::Surroundings());
-    if (auto put = model.put(around.display, around.background); !put) return put;
-    return model.look(how.view);
+std::string thousands(double triangles) {
+    return triangles < 10'000 ? count(triangles).text : rounded(triangles / 1e3, 4) + "k";
 }
+std::string gaze_name(double degrees) { return degrees > 0 ? rounded(degrees, 2) + " degrees aside" : "fovea"; }
+
+// From where a model is looked at, and how that is told.
+struct ToldLook : Look {
+    double fill = 0, aside_degrees = 0;
+    std::string text = {};
+};
 
 // What was seen of one cut.
 struct Judged {
-    std::string group;
-    std::size_t model = 0;
-    Look look;
-    FoldTest test = baseline;
-    Verdicts verdicts;
+    const JudgedModel* model;
+    ToldLook look;
+    FoldTest test;
+    Index triangles;
+    std::array<std::uint64_t, 2> visible; // pixels, by the judge and the second one
+    std::array<double, 2> v;              // the largest, by the same
 };
+using AllJudged = std::vector<Judged>;
 
-using Models = std::vector<std::unique_ptr<JudgedModel>>;
-
-WhatOptions what_of(FoldTest test, const Look& look) {
-    WhatOptions what;
-    what.request.fold_test = test;
-    what.gaze_px = look.gaze_px;
-    return what;
+template <class Takes>
+AllJudged those(const AllJudged& all, Takes&& takes) {
+    AllJudged some;
+    std::ranges::copy_if(all, std::back_inserter(some), takes);
+    return some;
 }
 
-// ---- sums over views
-
+// Sums over views, for one judge.
 struct Totals {
     std::size_t views = 0, views_seen = 0; // with visible pixels
     std::uint64_t pixels = 0;
     double largest = 0; // V
     const Judged* worst = nullptr;
-};
 
-Totals total(const std::vector<Judged>& all, FoldTest test, std::size_t judge) {
-    Totals totals;
-    for (const Judged& one : all) {
-        if (one.test != test) continue;
-        ++totals.views;
-        totals.views_seen += one.verdicts.visible_pixels[judge] > 0;
-        totals.pixels += one.verdicts.visible_pixels[judge];
-        const double v = one.verdicts.largest[judge];
-        if (!totals.worst || !(v <= totals.largest)) {
-            totals.largest = v;
-            totals.worst = &one;
+    Totals(const AllJudged& all, FoldTest test, std::size_t judge) {
+        for (const Judged& one : all) {
+            if (one.test != test) continue;
+            ++views;
+            views_seen += one.visible[judge] > 0;
+            pixels += one.visible[judge];
+            if (!worst || !(one.v[judge] <= largest)) largest = one.v[judge], worst = &one;
         }
     }
-    return totals;
-}
+};
 
-// ---- the work
+using Models = std::vector<std::unique_ptr<JudgedModel>>;
 
 class PerceptionBench {
 public:
-    PerceptionBench(const PerceptionBenchOptions& options, perception::CsfModel second)
-        : options_(options), second_(second), bar_("judging") {}
+    explicit PerceptionBench(const PerceptionOptions& options)
+        : options_(options), context_(require(render::Context::headless())), bar_("judging") {}
 
-    Result<PerceptionBenchResult> run() {
-        if (needs_models() || is_wanted("hard")) { // the other groups draw nothing
-            auto context = render::Context::headless();
-            if (!context) return context.error();
-            context_ = std::move(*context);
+    BenchReport run() {
+        load();
+        const std::pair<const char*, void (PerceptionBench::*)()> steps[] = {
+            {"savings", &PerceptionBench::savings},     {"aside", &PerceptionBench::aside},
+            {"random", &PerceptionBench::random_views}, {"far", &PerceptionBench::far_away},
+            {"hard", &PerceptionBench::hard},           {"tolerance", &PerceptionBench::tolerance}};
+        for (const auto& [group, measure] : steps) {
+            group_ = group;
+            if (is_wanted(group)) (this->*measure)();
         }
-        if (auto loaded = load(); !loaded) return loaded.error();
-        const struct {
-            const char* group;
-            Result<void> (PerceptionBench::*measure)();
-        } steps[] = {{"savings", &PerceptionBench::savings},
-                     {"aside", &PerceptionBench::aside},
-                     {"random", &PerceptionBench::random_views},
-                     {"far", &PerceptionBench::far_away},
-                     {"hard", &PerceptionBench::hard},
-                     {"tolerance", &PerceptionBench::tolerance},
-                     {"csf", &PerceptionBench::csf},
-                     {"observers", &PerceptionBench::observers},
-                     {"speed", &PerceptionBench::speed}};
-        for (const auto& [group, measure] : steps)
-            if (is_wanted(group))
-                if (auto measured = (this->*measure)(); !measured) return measured.error();
-        return std::move(result_);
+        report_.tables.insert(report_.tables.begin(), table_of(title_, rows_));
+        report_.json["title"] = title_;
+        report_.json["rows"] = to_json(rows_);
+        return std::move(report_);
     }
 
 private:
     bool is_wanted(const std::string& group) const {
-        return options_.only.empty() ||
-               std::find(options_.only.begin(), options_.only.end(), group) != options_.only.end();
-    }
-    Target target(std::string_view figure) const { return options_.targets.of("perception", figure); }
-    bool needs_models() const {
-        return is_wanted("savings") || is_wanted("aside") || is_wanted("random") || is_wanted("far") ||
-               is_wanted("tolerance") || is_wanted("speed");
+        return options_.only.empty() || std::ranges::find(options_.only, group) != options_.only.end();
     }
 
     // ---- models
 
-    Result<void> load() {
-        if (!needs_models()) {
-            result_.title = "made-up meshes";
-            return {};
-        }
-        for (const std::string& file : options_.meshes.empty() ? installed_meshes() : options_.meshes)
-            if (auto added = add_file(file); !added) return added;
+    void load() {
+        title_ = "made-up meshes";
+        if (options_.only == std::vector<std::string>{"hard"}) return;
+        for (const std::string& file : options_.meshes.empty() ? installed_meshes() : options_.meshes) add_file(file);
         main_models_ = models_.size();
         if (options_.meshes.empty()) settle_huge_models();
         if (models_.empty()) {
-            auto tree = sample_tree();
-            if (!tree) return tree.error();
-            if (auto added = add("sphere", std::move(*tree)); !added) return added;
+            add(models_, "sphere", sample_tree());
             main_models_ = 1;
         }
         if (is_wanted("random") || is_wanted("far"))
-            for (const std::string& file : options_.others)
-                if (auto added = add_file(file); !added) return added;
+            for (const std::string& file : options_.others) add_file(file);
+        title_.clear();
         for (std::size_t i = 0; i < models_.size(); ++i)
-            result_.title += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" +
-                             grouped(models_[i]->triangles()) + ")";
-        result_.title += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
-        if (options_.judges_on_gpu) result_.title += ", judged on the GPU (" + context_->renderer_name() + ")";
-        return {};
+            title_ += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" +
+                      grouped(models_[i]->triangles()) + ")";
+        title_ += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
     }
-    // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick
-    // not at all.
+    // If nobody named the meshes, huge ones are looked at only at random and from afar, and with --quick not at all.
     void settle_huge_models() {
         const auto huge = std::stable_partition(models_.begin(), models_.end(),
                                                 [](const auto& model) { return model->triangles() <= huge_mesh; });
@@ -192,36 +142,23 @@ private:
         main_models_ = static_cast<std::size_t>(huge - models_.begin());
         if (options_.quick) models_.erase(huge, models_.end());
     }
-    Result<void> add_file(const fs::path& file) {
-        auto tree = load_tree(file);
-        if (!tree) return tree.error();
-        return add(file.stem().string(), std::move(*tree));
+    void add_file(const std::filesystem::path& file) { add(models_, file.stem().string(), require(load_tree(file))); }
+    void add(Models& models, const HardMesh& mesh) { add(models, mesh.name, require(build_hard_tree(mesh))); }
+    void add(Models& models, std::string name, vdtree::VertexTree tree) {
+        models.push_back(std::make_unique<JudgedModel>(context_, std::move(name), std::move(tree), options_.window_px));
     }
-    Result<void> add(std::string name, vdtree::VertexTree tree) {
-        return add(models_, std::move(name), std::move(tree));
-    }
-    Result<void> add_hard(Models& models, const HardMesh& mesh) {
-        auto tree = build_hard_tree(mesh);
-        return tree ? add(models, mesh.name, std::move(*tree)) : tree.error();
-    }
-    Result<void> add(Models& models, std::string name, vdtree::VertexTree tree) {
-        auto model = JudgedModel::create(*context_, std::move(name), std::move(tree), options_.window_px, second_,
-                                         options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
-        if (!model) return model.error();
-        models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
-        return {};
-    }
+    std::span<const std::unique_ptr<JudgedModel>> main_models() const { return std::span(models_).first(main_models_); }
 
     // ---- views
 
-    Look look(glm::dvec3 direction, double fill, double aside_degrees) const {
-        Look look;
-        look.view.width = look.view.height = options_.window_px;
+    ToldLook look(glm::dvec3 direction, double fill, double aside_degrees) const {
+        ToldLook look;
         look.view.direction = direction;
-        look.view.fill = fill;
+        look.view.fill = look.fill = fill;
+        look.aside_degrees = aside_degrees;
         if (aside_degrees > 0) look.gaze_px = session::gaze_aside({}, window(), aside_degrees);
         look.text = "from " + rounded(direction.x, 2) + " " + rounded(direction.y, 2) + " " + rounded(direction.z, 2) +
-                    ", " + percent(fill) + " of the height, " + gaze_name(aside_degrees);
+                    ", " + percent(fill, 3).text + " of the height, " + gaze_name(aside_degrees);
         return look;
     }
     vdtree::View window() const {
@@ -229,602 +166,404 @@ private:
         view.width = view.height = options_.window_px;
         return view;
     }
-    std::size_t direction_count() const { return options_.quick ? 1 : std::size(directions); }
-    std::vector<double> wanted_fills() const {
-        return options_.quick ? std::vector{0.9, 0.2} : std::vector(std::begin(fills), std::end(fills));
+    std::span<const glm::dvec3> some_directions() const {
+        return std::span(directions).first(options_.quick ? 1 : std::size(directions));
+    }
+    std::vector<double> fills() const { // of the window's height
+        return options_.quick ? std::vector{0.9, 0.2} : std::vector{0.9, 0.5, 0.2};
     }
 
-    // Judges a look by all tests, or those asked for; what was found goes into `found`.
-    Result<void> judge(const std::string& group, Models& models, std::size_t model, const Look& how,
-                       std::vector<Judged>& found, std::span<const FoldTest> by = tests) {
-        if (auto looked = app::look(*models[model], how); !looked) return looked;
+    // Judges a look by some tests.
+    void judge(JudgedModel& model, const ToldLook& how, AllJudged& found, std::span<const FoldTest> by = tests) {
+        model.look(how);
         for (const FoldTest test : by) {
-            const auto verdicts = models[model]->judge(what_of(test, how));
-            if (!verdicts) return verdicts.error();
-            found.push_back({group, model, how, test, *verdicts});
-            add_json(found.back(), *models[model]);
+            const auto [triangles, verdict] = model.judge(session::Request{.fold_test = test});
+            found.push_back({&model,
+                             how,
+                             test,
+                             triangles,
+                             {verdict.visible, verdict.second_visible},
+                             {verdict.v, verdict.second_v}});
+            report_.json["views"].push_back({{"group", group_},
+                                             {"mesh", model.name()},
+                                             {"view", how.text},
+                                             {"test", name_of(test)},
+                                             {"triangles", triangles},
+                                             {"of", model.triangles()},
+                                             {"visible_pixels", verdict.visible},
+                                             {"largest_v", number_or_null(verdict.v)},
+                                             {"second_visible_pixels", verdict.second_visible},
+                                             {"second_largest_v", number_or_null(verdict.second_v)}});
         }
-        return {};
     }
-    void progress(std::size_t done, std::size_t all, const char* group) {
-        bar_(static_cast<double>(done) / static_cast<double>(all), group);
-    }
-
-    void add_json(const Judged& judged, const JudgedModel& model) {
-        const Verdicts& v = judged.verdicts;
-        result_.views.push_back({{"group", judged.group},
-                                 {"mesh", model.name()},
-                                 {"view", judged.look.text},
-                                 {"test", name_of(judged.test)},
-                                 {"triangles", v.triangles},
-                                 {"of", model.triangles()},
-                                 {"visible_pixels", v.visible_pixels[0]},
-                                 {"largest_v", number_or_null(v.largest[0])},
-                                 {"second_visible_pixels", v.visible_pixels[1]},
-                                 {"second_largest_v", number_or_null(v.largest[1])}});
+    void progress(std::size_t done, std::size_t all) {
+        bar_(static_cast<double>(done) / static_cast<double>(all), group_);
     }
 
     // ---- rows
 
-    void add_visibility_rows(const std::string& what, const std::vector<Judged>& found, const Models& models) {
-        if (found.empty()) return;
-        for (const FoldTest test : tests) {
-            for (std::size_t j = 0; j < judges.size(); ++j) {
-                const Totals t = total(found, test, j);
+    void add_visibility_rows(const std::string& what, const AllJudged& found) {
+        for (const FoldTest test : tests)
+            for (const std::size_t judge : {0, 1}) {
+                const Totals t(found, test, judge);
                 if (t.views == 0) continue;
-                const std::string where = t.worst ? models[t.worst->model]->name() + ", " + t.worst->look.text : "";
-                BenchRow row{"visible pixels, " + what + ", " + name_of(test),
-                             "",
-                             std::to_string(t.views_seen) + " of " + std::to_string(t.views) +
-                                 " views with any; largest V " + rounded(t.largest, 3) + ": " + where,
-                             static_cast<double>(t.pixels),
-                             target(judges[j] == Judge::modern ? "visible pixels" : "visible pixels, second judge"),
-                             false,
-                             0};
-                if (judges[j] != Judge::modern)
-                    row.name = "the same by the second judge, " + std::string(perception::name(second_));
-                result_.rows.push_back(std::move(row));
+                rows_.push_back({judge == 0 ? "visible pixels, " + what + ", " + name_of(test)
+                                            : "the same by the second judge, barten-fitted",
+                                 "", static_cast<double>(t.pixels), 0, 0,
+                                 std::to_string(t.views_seen) + " of " + std::to_string(t.views) +
+                                     " views with any; largest V " + rounded(t.largest, 3) + ": " +
+                                     t.worst->model->name() + ", " + t.worst->look.text});
             }
+    }
+    static void add_seen(std::vector<Cell>& row, const AllJudged& found, FoldTest test) {
+        for (const std::size_t judge : {0, 1}) {
+            const Totals t(found, test, judge);
+            row.insert(row.end(), {count(static_cast<double>(t.pixels)), number(t.largest, 2)});
         }
     }
 
     // ---- what is saved against the baseline
 
-    // Of one setting and test.
-    struct Saved {
-        std::vector<Judged> views;
-        std::vector<double> triangles; // by model, the mean of the directions
-    };
-    struct Setting {
-        double gaze, fill;
-        std::array<Saved, std::size(tests)> by_test;
-    };
-
-    Result<void> savings() {
-        std::vector<Setting> settings;
-        for (const double gaze : gazes)
-            for (const double fill : wanted_fills()) settings.push_back({gaze, fill, {}});
-        std::vector<Judged> found;
-        if (auto judged = judge_savings(settings, found); !judged) return judged;
-        BenchTable details{
-            "Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " +
-                std::to_string(main_models_) +
-                " meshes; what can be seen of it in the worst view; V, and by the second judge",
-            {{"setting", "test", "triangles", "over luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
-        for (const Setting& setting : settings)
-            for (std::size_t t = 0; t < std::size(tests); ++t) add_saved(setting, t, details);
-        result_.details.push_back(std::move(details));
-        add_visibility_rows("these " + std::to_string(found.size() / std::size(tests)) + " views", found, models_);
-        return {};
-    }
-
-    Result<void> judge_savings(std::vector<Setting>& settings, std::vector<Judged>& found) {
-        for (Setting& setting : settings)
-            for (Saved& saved : setting.by_test) saved.triangles.assign(main_models_, 0);
-        const std::size_t all = main_models_ * settings.size() * direction_count();
-        for (std::size_t model = 0; model < main_models_; ++model)
-            for (const double fill : wanted_fills())
-                for (std::size_t d = 0; d < direction_count(); ++d)
-                    for (Setting& setting : settings) { // gazes inside: the full model is drawn once for all
-                        if (setting.fill != fill) continue;
-                        progress(found.size() / std::size(tests), all, "savings");
-                        const std::size_t first = found.size();
-                        if (auto ok = judge("savings", models_, model, look(directions[d], fill, setting.gaze), found);
-                            !ok)
-                            return ok;
-                        for (std::size_t t = 0; t < std::size(tests); ++t) {
-                            setting.by_test[t].views.push_back(found[first + t]);
-                            setting.by_test[t].triangles[model] +=
-                                found[first + t].verdicts.triangles / static_cast<double>(direction_count());
-                        }
+    void savings() {
+        AllJudged found;
+        const std::size_t all = main_models_ * std::size(gazes) * fills().size() * some_directions().size();
+        for (const auto& model : main_models())
+            for (const double fill : fills())
+                for (const glm::dvec3& direction : some_directions())
+                    for (const double gaze : gazes) {
+                        progress(found.size() / std::size(tests), all);
+                        judge(*model, look(direction, fill, gaze), found);
                     }
-        return {};
+        BenchTable details{"Triangles kept, mean of " + std::to_string(some_directions().size()) + " directions and " +
+                               std::to_string(main_models_) +
+                               " meshes; what can be seen of it in the worst view; V, and by the second judge",
+                           {{"setting"},
+                            {"test"},
+                            {"triangles"},
+                            {"over luebke-hallen's"},
+                            {"visible"},
+                            {"largest V"},
+                            {"second: visible"},
+                            {"V"}}};
+        for (const double gaze : gazes)
+            for (const double fill : fills()) {
+                const AllJudged here =
+                    those(found, [&](const Judged& j) { return j.look.aside_degrees == gaze && j.look.fill == fill; });
+                for (const FoldTest test : tests) add_saved(here, gaze, fill, test, details);
+            }
+        report_.tables.push_back(std::move(details));
+        add_visibility_rows("these " + std::to_string(found.size() / std::size(tests)) + " views", found);
     }
 
-    void add_saved(const Setting& setting, std::size_t t, BenchTable& details) {
-        const std::string where = gaze_name(setting.gaze) + ", " + percent(setting.fill);
-        const Saved &saved = setting.by_test[t], &base = setting.by_test[0];
+    void add_saved(const AllJudged& here, double gaze, double fill, FoldTest test, BenchTable& details) {
+        const auto triangles_of = [&](const JudgedModel& model, FoldTest by) { // mean of the directions
+            double sum = 0;
+            for (const Judged& j : here)
+                if (j.model == &model && j.test == by)
+                    sum += j.triangles / static_cast<double>(some_directions().size());
+            return sum;
+        };
+        const std::string where = gaze_name(gaze) + ", " + percent(fill, 3).text;
         double fewer = 0, kept = 0;
         std::string note;
-        for (std::size_t m = 0; m < main_models_; ++m) {
-            fewer += base.triangles[m] / saved.triangles[m] / static_cast<double>(main_models_);
-            kept += saved.triangles[m] / static_cast<double>(main_models_);
-            note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " +
-                    thousands(saved.triangles[m]);
+        for (const auto& model : main_models()) {
+            const double base = triangles_of(*model, baseline), saved = triangles_of(*model, test);
+            fewer += base / saved / static_cast<double>(main_models_);
+            kept += saved / static_cast<double>(main_models_);
+            note += (note.empty() ? "" : ", ") + model->name() + " " + thousands(base) + " -> " + thousands(saved);
         }
-        const Totals first = total(saved.views, tests[t], 0), second = total(saved.views, tests[t], 1);
-        details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3), grouped(first.pixels),
-                                rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
-        if (tests[t] == baseline) return;
-        BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, true, 2};
-        if (tests[t] == promised) row.target = target("fewer triangles, " + where + ", x");
-        result_.rows.push_back(std::move(row));
+        details.rows.push_back({where, name_of(test), thousands(kept), rounded(1 / fewer, 3)});
+        add_seen(details.rows.back(), here, test);
+        if (test == baseline) return;
+        BenchRow& row =
+            rows_.emplace_back(BenchRow{"fewer triangles, " + where + ", " + name_of(test), "x", fewer, 2, {}, note});
+        for (const SavingTarget& target : saving_targets)
+            if (test == promised && target.gaze == gaze && target.fill == fill) row.target = target.factor;
     }
 
     // ---- random views
 
-    // The models in turn, those that are huge only so often.
-    static std::vector<std::size_t> models_of_random_views(std::size_t count, const Models& models) {
-        const auto is_huge = [&](std::size_t m) { return models[m]->triangles() > huge_mesh; };
-        bool all_huge = true;
-        for (std::size_t m = 0; m < models.size(); ++m) all_huge = all_huge && is_huge(m);
-        std::vector<std::size_t> order, views(models.size());
-        for (std::size_t m = 0; order.size() < count; m = (m + 1) % models.size()) {
-            if (is_huge(m) && !all_huge && views[m] >= huge_views) continue;
-            ++views[m];
-            order.push_back(m);
-        }
+    // The models in turn, huge ones only so often.
+    static std::vector<JudgedModel*> models_of_random_views(std::size_t views, const Models& models) {
+        const auto is_huge = [](const auto& model) { return model->triangles() > huge_mesh; };
+        const bool all_huge = std::ranges::all_of(models, is_huge);
+        constexpr std::ptrdiff_t huge_views = 6; // of each such mesh
+        std::vector<JudgedModel*> order;
+        for (std::size_t m = 0; order.size() < views; m = (m + 1) % models.size())
+            if (!is_huge(models[m]) || all_huge || std::ranges::count(order, models[m].get()) < huge_views)
+                order.push_back(models[m].get());
         return order;
     }
 
-    // `uniform`: draws a number between two.
-    template <class Uniform>
-    Look random_look(std::size_t i, Uniform&& uniform) const {
-        const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
-        const double fill = 0.03 * std::pow(50.0, uniform(0, 1)); // 3% to 150%
-        Look how = look({across * std::cos(turn), across * std::sin(turn), z}, fill, 0);
+    ToldLook random_look(std::size_t i, Random& random) const {
+        const glm::dvec3 direction = random.direction();
+        ToldLook how = look(direction, 0.03 * std::pow(50.0, random.between(0, 1)), 0); // 3% to 150%
         if (i % 3 == 2) {
-            how.view.fov_degrees = uniform(10, 70);
+            how.view.fov_degrees = random.between(10, 70);
             how.text += ", field " + rounded(*how.view.fov_degrees, 3);
         }
-        perception::Display display;
-        std::optional<perception::Luminance> background;
         if (i % 4 >= 2) {
-            const double ppd = 20 * std::pow(6.0, uniform(0, 1)); // to 120
-            set_pixels_per_degree(display, perception::PixelsPerDegree(ppd));
-            if (uniform(0, 1) < 0.5) display.peak = perception::Luminance(1000);
-            background = to_luminance(display, std::pow(uniform(0, 1), 3));
-            how.text += ", " + rounded(ppd, 3) + " pixels per degree, " + rounded(display.peak.value(), 4) +
-                        " cd/m2, before " + rounded(background->value(), 3);
+            const double ppd = 20 * std::pow(6.0, random.between(0, 1)); // to 120
+            set_pixels_per_degree(how.display, perception::PixelsPerDegree(ppd));
+            if (random.between(0, 1) < 0.5) how.display.peak = perception::Luminance(1000);
+            how.background = to_luminance(how.display, std::pow(random.between(0, 1), 3));
+            how.text += ", " + rounded(ppd, 3) + " pixels per degree, " + rounded(how.display.peak.value(), 4) +
+                        " cd/m2, before " + rounded(how.background->value(), 3);
         }
-        how.around = {display, background};
         if (i % 2) {
-            const double degrees = uniform(0, 70), where = uniform(0, 2 * std::numbers::pi);
+            const double degrees = random.between(0, 70), where = random.between(0, 2 * std::numbers::pi);
             const glm::dvec2 centre(options_.window_px * 0.5);
-            const double px = session::gaze_aside(display, window(), degrees).x - centre.x;
+            const double px = session::gaze_aside(how.display, window(), degrees).x - centre.x;
             how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
             how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(degrees, 3) + " degrees aside");
         }
         return how;
     }
 
-    // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside. Of the models, and
-    // of regular waves drawn at random, which no factor was fitted on.
-    Result<void> random_views() {
+    // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside. Of the models,
+    // and of regular waves drawn at random, which no factor was fitted on.
+    void random_views() {
         const std::uint64_t seed = options_.seed ? *options_.seed : std::random_device()();
-        std::mt19937_64 random(seed);
-        const auto uniform = [&](double low, double high) {
-            return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
-        };
+        Random random(seed);
         const std::size_t own = models_.size(), waved = options_.quick ? 1 : 4;
         for (std::size_t i = 0; i < waved; ++i) {
-            const double waves = 2 * std::pow(16.0, uniform(0, 1)), height = 0.0005 * std::pow(64.0, uniform(0, 1));
+            const double waves = 2 * std::pow(16.0, random.between(0, 1)),
+                         height = 0.0005 * std::pow(64.0, random.between(0, 1));
             HardMesh mesh = waved_square(options_.quick ? 3'000 : 60'000, height, waves);
             mesh.name = rounded(waves, 3) + " waves " + rounded(height, 2) + " high";
-            if (auto added = add_hard(models_, mesh); !added) return added;
+            add(models_, mesh);
         }
-        const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
-        const std::vector<std::size_t> order = models_of_random_views(count, models_);
-        std::vector<Judged> found;
-        for (std::size_t i = 0; i < count; ++i) {
-            progress(i, count, "random views");
-            const Look how = random_look(i, uniform);
-            if (auto ok = judge("random", models_, order[i], how, found); !ok) return ok;
+        const std::size_t views = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
+        const std::vector<JudgedModel*> order = models_of_random_views(views, models_);
+        AllJudged found;
+        for (std::size_t i = 0; i < views; ++i) {
+            progress(i, views);
+            judge(*order[i], random_look(i, random), found);
         }
-        add_visibility_rows(std::to_string(count) + " random views, seed " + std::to_string(seed), found, models_);
+        add_visibility_rows(std::to_string(views) + " random views, seed " + std::to_string(seed), found);
         models_.resize(own);
-        return {};
     }
 
     // ---- where the viewer looks
 
     // The promised test by eccentricity: of the models, and of regular patterns, whose errors are alike everywhere.
-    Result<void> aside() {
-        Models models;
-        for (std::size_t m = 0; m < main_models_; ++m) models.push_back(std::move(models_[m]));
-        for (const HardMesh& mesh : open_sheets(options_.quick ? 3'000 : 60'000)) {
-            if (mesh.name.find("waves") == mesh.name.npos) continue;
-            if (auto added = add_hard(models, mesh); !added) return added;
-            if (options_.quick) break;
-        }
-        const double near_and_far[] = {0.9, 0.3}; // of the window's height
-        std::vector<Judged> found;
-        const std::size_t fill_count = options_.quick ? 1 : std::size(near_and_far);
-        const std::size_t all = models.size() * fill_count * direction_count();
-        std::size_t done = 0;
-        for (std::size_t m = 0; m < models.size(); ++m)
-            for (std::size_t f = 0; f < fill_count; ++f)
-                for (std::size_t d = 0; d < direction_count(); ++d) {
-                    progress(done++, all, "aside");
+    void aside() {
+        Models waves;
+        for (const HardMesh& mesh : open_sheets(options_.quick ? 3'000 : 60'000))
+            if (mesh.name.find("waves") != mesh.name.npos && (waves.empty() || !options_.quick)) add(waves, mesh);
+        std::vector<JudgedModel*> models;
+        for (const auto& model : main_models()) models.push_back(model.get());
+        for (const auto& model : waves) models.push_back(model.get());
+        const std::vector<double> near_and_far = options_.quick ? std::vector{0.9} : std::vector{0.9, 0.3};
+        AllJudged found;
+        const std::size_t all = models.size() * near_and_far.size() * some_directions().size();
+        for (JudgedModel* const model : models)
+            for (const double fill : near_and_far)
+                for (const glm::dvec3& direction : some_directions()) {
+                    progress(found.size() / std::size(eccentricities), all);
                     for (const double degrees : eccentricities)
-                        if (auto ok = judge("aside", models, m, look(directions[d], near_and_far[f], degrees), found,
-                                            {&promised, 1});
-                            !ok)
-                            return ok;
+                        judge(*model, look(direction, fill, degrees), found, {&promised, 1});
                 }
-        BenchTable details{
-            "By where the viewer looks, degrees from the window's centre; " + std::to_string(all) + " views each, of " +
-                std::to_string(models.size()) + " meshes: V of the default observer by both judges, median and largest",
-            {{"degrees aside", "triangles of the models", "V", "largest", "second: V", "largest", "visible pixels"}}};
-        for (std::size_t e = 0; e < std::size(eccentricities); ++e) {
-            std::vector<double> v[judges.size()];
-            std::uint64_t pixels = 0, kept = 0;
-            for (std::size_t i = e; i < found.size(); i += std::size(eccentricities)) {
-                for (std::size_t j = 0; j < judges.size(); ++j) {
-                    v[j].push_back(found[i].verdicts.largest[j]);
-                    pixels += found[i].verdicts.visible_pixels[j];
-                }
-                if (found[i].model < main_models_) kept += found[i].verdicts.triangles;
+        BenchTable details{"By where the viewer looks, degrees from the window's centre; " + std::to_string(all) +
+                               " views each, of " + std::to_string(models.size()) +
+                               " meshes: V of the default observer by both judges, median and largest",
+                           {{"degrees aside"},
+                            {"triangles of the models"},
+                            {"V"},
+                            {"largest"},
+                            {"second: V"},
+                            {"largest"},
+                            {"visible pixels"}}};
+        for (const double degrees : eccentricities) {
+            const AllJudged here = those(found, [&](const Judged& j) { return j.look.aside_degrees == degrees; });
+            double pixels = 0, kept = 0;
+            for (const Judged& j : here) {
+                pixels += static_cast<double>(j.visible[0] + j.visible[1]);
+                if (std::ranges::find(main_models(), j.model, &std::unique_ptr<JudgedModel>::get) !=
+                    main_models().end())
+                    kept += j.triangles;
             }
-            std::vector<std::string> row = {eccentricities[e] > 0 ? rounded(eccentricities[e], 2) : "looked at",
-                                            grouped(kept)};
-            for (auto& of_judge : v) {
-                row.push_back(rounded(median(of_judge), 2));
-                row.push_back(rounded(*std::max_element(of_judge.begin(), of_judge.end()), 3));
+            std::vector<Cell> row = {degrees > 0 ? rounded(degrees, 2) : "looked at", count(kept)};
+            for (const std::size_t judge : {0, 1}) {
+                std::vector<double> v;
+                for (const Judged& j : here) v.push_back(j.v[judge]);
+                row.insert(row.end(), {number(median(v), 2), number(std::ranges::max(v), 3)});
             }
-            row.push_back(grouped(pixels));
+            row.push_back(count(pixels));
             details.rows.push_back(std::move(row));
         }
-        result_.details.push_back(std::move(details));
-        add_visibility_rows(std::to_string(found.size()) + " views by where the viewer looks", found, models);
-        for (std::size_t m = 0; m < main_models_; ++m) models_[m] = std::move(models[m]);
-        return {};
+        report_.tables.push_back(std::move(details));
+        add_visibility_rows(std::to_string(found.size()) + " views by where the viewer looks", found);
     }
 
     // ---- far away
 
-    Result<void> far_away() {
-        std::vector<std::size_t> large;
-        for (std::size_t m = 0; m < models_.size(); ++m)
-            if (models_[m]->triangles() > large_mesh) large.push_back(m);
-        const bool has_large = !large.empty();
+    void far_away() {
+        std::vector<JudgedModel*> models;
+        for (const auto& model : models_)
+            if (model->triangles() > large_mesh) models.push_back(model.get());
+        const bool has_large = !models.empty();
         if (!has_large)
-            for (std::size_t m = 0; m < models_.size(); ++m) large.push_back(m);
+            for (const auto& model : models_) models.push_back(model.get());
         const struct {
-            const char* name;
+            std::string name;
             double fill;
             bool by_share;
-        } distances[] = {{"2 pixels", 2.0 / options_.window_px, false},
-                         {"20 pixels", 20.0 / options_.window_px, true},
-                         {"5% of the height", 0.05, true}};
-        std::vector<Judged> found;
-        std::size_t done = 0;
-        const std::size_t all = std::size(distances) * large.size() * direction_count();
+            double target;
+        } distances[] = {{"2 pixels", 2.0 / options_.window_px, false, 200},
+                         {"20 pixels", 20.0 / options_.window_px, true, 5},
+                         {"5% of the height", 0.05, true, 50}};
+        AllJudged found;
+        const std::size_t all = std::size(distances) * models.size() * some_directions().size();
         for (const auto& distance : distances) {
-            std::vector<Judged> here;
-            for (const std::size_t m : large) {
-                for (std::size_t d = 0; d < direction_count(); ++d) {
-                    progress(done++, all, "far away");
-                    if (auto ok = judge("far", models_, m, look(directions[d], distance.fill, 0), here); !ok) return ok;
+            AllJudged here;
+            for (JudgedModel* const model : models)
+                for (const glm::dvec3& direction : some_directions()) {
+                    progress((found.size() + here.size()) / std::size(tests), all);
+                    judge(*model, look(direction, distance.fill, 0), here);
                 }
-            }
             for (const FoldTest test : tests) {
-                double most = 0, sum = 0, count = 0;
+                double most = 0, sum = 0, views = 0;
                 std::string worst;
                 for (const Judged& one : here) {
                     if (one.test != test) continue;
-                    const double kept = one.verdicts.triangles;
-                    const double value = distance.by_share ? 100 * kept / models_[one.model]->triangles() : kept;
-                    sum += value;
-                    ++count;
-                    if (!(value <= most)) {
-                        most = value;
-                        worst = models_[one.model]->name();
-                    }
+                    const double kept = one.triangles;
+                    const double value = distance.by_share ? 100 * kept / one.model->triangles() : kept;
+                    sum += value, ++views;
+                    if (!(value <= most)) most = value, worst = one.model->name();
                 }
-                BenchRow row{std::string("kept at ") + distance.name + ", " + name_of(test),
-                             distance.by_share ? "%" : "triangles",
-                             "the most, of " + worst + "; mean " + rounded(sum / count, 3) +
-                                 (has_large ? "" : "; no mesh has more than " + grouped(large_mesh) + " triangles"),
-                             most,
-                             {},
-                             false,
-                             distance.by_share ? 1 : 0};
-                if (test == promised) row.target = target(std::string("kept at ") + distance.name + ", " + row.unit);
-                result_.rows.push_back(std::move(row));
+                BenchRow& row = rows_.emplace_back(BenchRow{"kept at " + distance.name + ", " + name_of(test),
+                                                            distance.by_share ? "%" : "triangles", most,
+                                                            distance.by_share ? 1 : 0});
+                row.note = "the most, of " + worst + "; mean " + rounded(sum / views, 3) +
+                           (has_large ? "" : "; no mesh has more than " + grouped(large_mesh) + " triangles");
+                if (test == promised) row.target = distance.target;
             }
             found.insert(found.end(), here.begin(), here.end());
         }
-        add_visibility_rows("far away", found, models_);
-        return {};
+        add_visibility_rows("far away", found);
     }
 
     // ---- meshes made to be hard
 
-    Result<void> hard() {
-        Models hard_models;
-        const int triangles = options_.quick ? 3'000 : 24'000;
-        for (const HardMesh& mesh : hard_meshes(triangles)) {
-            if (auto added = add_hard(hard_models, mesh); !added) return added;
-        }
+    void hard() {
+        Models models;
+        for (const HardMesh& mesh : hard_meshes(options_.quick ? 3'000 : 24'000)) add(models, mesh);
         const std::vector<double> distances = options_.quick ? std::vector{0.85} : std::vector{0.85, 0.3, 0.08};
-        const glm::dvec3 direction(0.3, 0.5, 1);
-        std::vector<Judged> found;
-        const std::size_t all = hard_models.size() * distances.size() * std::size(gazes);
-        for (std::size_t m = 0; m < hard_models.size(); ++m)
+        AllJudged found;
+        const std::size_t all = models.size() * distances.size() * std::size(gazes);
+        for (const auto& model : models)
             for (const double fill : distances)
                 for (const double gaze : gazes) {
-                    progress(found.size() / std::size(tests), all, "hard meshes");
-                    if (auto ok = judge("hard", hard_models, m, look(direction, fill, gaze), found); !ok) return ok;
+                    progress(found.size() / std::size(tests), all);
+                    judge(*model, look({0.3, 0.5, 1}, fill, gaze), found);
                 }
         BenchTable details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V "
                            "of the second judge",
-                           {{"mesh", "test", "kept", "visible", "largest V", "second: visible", "V"}}};
-        for (std::size_t m = 0; m < hard_models.size(); ++m) {
-            std::vector<Judged> of_mesh;
-            for (const Judged& one : found)
-                if (one.model == m) of_mesh.push_back(one);
+                           {{"mesh"}, {"test"}, {"kept"}, {"visible"}, {"largest V"}, {"second: visible"}, {"V"}}};
+        for (const auto& model : models) {
+            const AllJudged of_mesh = those(found, [&](const Judged& j) { return j.model == model.get(); });
             for (const FoldTest test : tests) {
-                const Totals first = total(of_mesh, test, 0), second = total(of_mesh, test, 1);
                 double kept = 0;
                 for (const Judged& one : of_mesh)
                     if (one.test == test)
-                        kept += one.verdicts.triangles / static_cast<double>(first.views) / hard_models[m]->triangles();
-                details.rows.push_back({hard_models[m]->name(), name_of(test), percent(kept), grouped(first.pixels),
-                                        rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
+                        kept +=
+                            one.triangles / static_cast<double>(Totals(of_mesh, test, 0).views) / model->triangles();
+                details.rows.push_back({model->name(), name_of(test), percent(kept, 3)});
+                add_seen(details.rows.back(), of_mesh, test);
             }
         }
-        result_.details.push_back(std::move(details));
-        add_visibility_rows("hard meshes", found, hard_models);
-        return {};
+        report_.tables.push_back(std::move(details));
+        add_visibility_rows("hard meshes", found);
     }
 
     // ---- a tolerance in pixels
 
-    // The largest tolerances of which nothing can be seen in any of the looks.
-    struct SafeTolerances {
-        static constexpr double largest_px = 32, precision = 1.05;
-        double px[std::size(geometric_tests)][std::size(gazes)];
-        SafeTolerances() { std::fill_n(&px[0][0], std::size(geometric_tests) * std::size(gazes), largest_px); }
-    };
-
-    // By bisection, and only where the one so far is not safe; view by view, so that the full model is drawn once for
-    // all tests and gazes.
-    Result<SafeTolerances> safe_tolerances() {
-        SafeTolerances safe;
-        std::size_t done = 0;
-        const std::size_t all = main_models_ * wanted_fills().size() * direction_count();
-        for (std::size_t model = 0; model < main_models_; ++model)
-            for (const double fill : wanted_fills())
-                for (std::size_t d = 0; d < direction_count(); ++d) {
-                    progress(done++, all, "tolerances in pixels");
-                    for (std::size_t g = 0; g < std::size(gazes); ++g)
-                        for (std::size_t t = 0; t < std::size(geometric_tests); ++t)
-                            if (auto ok = lower_tolerance(safe.px[t][g], geometric_tests[t], model,
-                                                          look(directions[d], fill, gazes[g]));
-                                !ok)
-                                return ok.error();
+    // The largest tolerance of which nothing can be seen in any of the looks, by bisection, and only in looks in which
+    // the one so far is not safe.
+    double safe_tolerance(FoldTest test, double gaze) {
+        constexpr double precision = 1.05;
+        double tolerance = 32;
+        for (const auto& model : main_models())
+            for (const double fill : fills())
+                for (const glm::dvec3& direction : some_directions()) {
+                    model->look(look(direction, fill, gaze));
+                    const auto is_safe = [&](double px) {
+                        return model->judge(session::Request{.goal = Goal::pixels(px), .fold_test = test})
+                                   .verdict.visible == 0;
+                    };
+                    if (is_safe(tolerance)) continue;
+                    double low = 1e-3, high = tolerance;
+                    while (high > low * precision) {
+                        const double middle = std::sqrt(low * high);
+                        (is_safe(middle) ? low : high) = middle;
+                    }
+                    tolerance = low;
                 }
-        return safe;
+        return tolerance;
     }
 
-    Result<void> lower_tolerance(double& tolerance, FoldTest test, std::size_t model, const Look& how) {
-        if (auto looked = models_[model]->look(how.view); !looked) return looked;
-        const auto is_safe = [&](double px) -> Result<bool> {
-            WhatOptions what = what_of(test, how);
-            what.request.goal = Goal::pixels(px);
-            const auto verdict = models_[model]->judge(what, Judge::modern);
-            if (!verdict) return verdict.error();
-            return verdict->visible_pixels == 0;
-        };
-        const auto safe = is_safe(tolerance);
-        if (!safe) return safe.error();
-        if (*safe) return {};
-        double low = 1e-3, high = tolerance;
-        while (high > low * SafeTolerances::precision) {
-            const double middle = std::sqrt(low * high);
-            const auto is = is_safe(middle);
-            if (!is) return is.error();
-            (*is ? low : high) = middle;
-        }
-        tolerance = low;
-        return {};
-    }
-
-    // The mean of the looks.
-    Result<double> kept_by(FoldTest test, double pixels, const std::vector<std::pair<std::size_t, Look>>& looks) {
+    // The mean of the models and directions.
+    double kept_by(const session::Request& request, double gaze, double fill) {
         double sum = 0;
-        for (const auto& [model, how] : looks) {
-            if (auto looked = models_[model]->look(how.view); !looked) return looked.error();
-            WhatOptions what = what_of(test, how);
-            if (pixels > 0) what.request.goal = Goal::pixels(pixels);
-            const auto count = models_[model]->count(what);
-            if (!count) return count.error();
-            sum += *count;
-        }
-        return sum / static_cast<double>(looks.size());
+        for (const auto& model : main_models())
+            for (const glm::dvec3& direction : some_directions()) {
+                model->look(look(direction, fill, gaze));
+                sum += model->count(request);
+            }
+        return sum / static_cast<double>(main_models_ * some_directions().size());
     }
 
-    Result<void> tolerance() {
-        using Looks = std::vector<std::pair<std::size_t, Look>>;
-        const auto looks_of = [&](double gaze, double fill) {
-            Looks looks;
-            for (std::size_t m = 0; m < main_models_; ++m)
-                for (std::size_t d = 0; d < direction_count(); ++d)
-                    looks.emplace_back(m, look(directions[d], fill, gaze));
-            return looks;
-        };
+    void tolerance() {
         BenchTable details{
             "One tolerance for all views against one threshold: what each keeps, in triangles, mean of " +
-                std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) + " meshes",
-            {{"test", "tolerance", "looked at"}}};
-        for (const double gaze : {0.0, gaze_degrees})
-            for (const double fill : wanted_fills()) details.rows[0].push_back(gaze_name(gaze) + ", " + percent(fill));
-        const auto add_line = [&](FoldTest test, double pixels, const std::string& text,
-                                  const std::string& where) -> Result<void> {
-            std::vector<std::string> line = {name_of(test), text, where};
-            for (const double gaze : {0.0, gaze_degrees})
-                for (const double fill : wanted_fills()) {
-                    const auto kept = kept_by(test, pixels, looks_of(gaze, fill));
-                    if (!kept) return kept.error();
-                    line.push_back(thousands(*kept));
-                }
-            details.rows.push_back(std::move(line));
-            return {};
+                std::to_string(some_directions().size()) + " directions and " + std::to_string(main_models_) +
+                " meshes",
+            {{"test"}, {"tolerance"}, {"looked at"}}};
+        constexpr double both[] = {0, gaze_degrees};
+        for (const double gaze : both)
+            for (const double fill : fills())
+                details.columns.push_back({gaze_name(gaze) + ", " + percent(fill, 3).text});
+        const auto add_line = [&](const session::Request& request, const std::string& text, const std::string& where) {
+            std::vector<Cell>& line =
+                details.rows.emplace_back(std::vector<Cell>{name_of(*request.fold_test), text, where});
+            for (const double gaze : both)
+                for (const double fill : fills()) line.push_back(thousands(kept_by(request, gaze, fill)));
         };
-        const auto found = safe_tolerances();
-        if (!found) return found.error();
-        for (std::size_t t = 0; t < std::size(geometric_tests); ++t) {
-            const FoldTest test = geometric_tests[t];
+        std::size_t done = 0;
+        for (const FoldTest test : geometric_tests) {
             double safe[2] = {};
-            for (const double gaze : {0.0, gaze_degrees}) {
-                const double px = safe[gaze > 0] = found->px[t][gaze > 0 ? 0 : 1]; // as `gazes` has them
-                if (auto added = add_line(test, px, rounded(px, 2) + " px", "safe: " + gaze_name(gaze)); !added)
-                    return added;
+            for (const double gaze : both) {
+                progress(done++, std::size(geometric_tests) * std::size(both));
+                const double px = safe[gaze > 0] = safe_tolerance(test, gaze);
+                add_line({.goal = Goal::pixels(px), .fold_test = test}, rounded(px, 2) + " px",
+                         "safe: " + gaze_name(gaze));
             }
-            result_.rows.push_back(
-                {"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea",
-                 "x",
-                 rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +
-                     " px: no one tolerance does for both; the perceptual threshold is 1 everywhere",
-                 safe[1] / safe[0],
-                 {},
-                 true,
-                 1});
+            rows_.push_back({"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea",
+                             "x",
+                             safe[1] / safe[0],
+                             1,
+                             {},
+                             rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +
+                                 " px: no one tolerance does for both; the perceptual threshold is 1 everywhere"});
         }
-        for (const FoldTest test : tests)
-            if (auto added = add_line(test, 0, "threshold 1", "everywhere"); !added) return added;
-        result_.details.push_back(std::move(details));
-        return {};
+        for (const FoldTest test : tests) add_line({.fold_test = test}, "threshold 1", "everywhere");
+        report_.tables.push_back(std::move(details));
     }
 
-    // ---- models of sight
-
-    SensitivityBenchOptions sensitivity_options() const {
-        return {options_.reference, options_.quick, options_.targets};
-    }
-    Result<void> add(Result<std::vector<BenchRow>> rows) {
-        if (!rows) return rows.error();
-        std::move(rows->begin(), rows->end(), std::back_inserter(result_.rows));
-        return {};
-    }
-    Result<void> csf() { return add(bench_csf(sensitivity_options())); }
-    Result<void> observers() { return add(bench_observers(sensitivity_options())); }
-
-    // ---- what it costs
-
-    // The largest of the models, from +Z at 90% of the window's height.
-    Result<JudgedModel*> subject() {
-        const auto largest = std::max_element(models_.begin(), models_.end(), [](const auto& a, const auto& b) {
-            return a->triangles() < b->triangles();
-        });
-        if (auto looked = (*largest)->look(look(directions[0], fills[0], 0).view); !looked) return looked.error();
-        return largest->get();
-    }
-
-    Result<void> speed() {
-        const auto model = subject();
-        if (!model) return model.error();
-        for (const FoldTest test : tests)
-            if (auto measured = full_tests(**model, test); !measured) return measured;
-        return moving_lights(**model);
-    }
-
-    Result<void> full_tests(JudgedModel& model, FoldTest test) {
-        const auto session = model.session(test);
-        if (!session) return session.error();
-        (*session)->set_gaze(std::nullopt);
-        const auto recipe = (*session)->recipe(model.view(), what_of(test, {}).request);
-        if (!recipe) return recipe.error();
-        const Pinned pinned;
-        const double rate = full_tests_per_second((*session)->tree(), *recipe->criterion, recipe->viewpoint, {},
-                                                  options_.quick ? 10 : 60);
-        result_.rows.push_back({"full tests from scratch, " + name_of(test), "M/s",
-                                model.name() + ", every node, one thread", rate / 1e6, target("full tests, M/s"), true,
-                                1});
-        return {};
-    }
-
-    // The light goes around the model by a degree a frame, the eye is still.
-    Result<void> moving_lights(JudgedModel& model) {
-        const auto bounds = vdtree::LightBounds::measure(model.tree());
-        if (!bounds) return bounds.error();
-        const auto shared = std::make_shared<const vdtree::LightBounds>(*bounds);
-        const auto wanted = static_cast<Index>(std::min<double>(lit_active, 0.5 * model.triangles()));
-        for (const auto& [kind, name] :
-             {std::pair{TurningLight::directional, "directional"}, std::pair{TurningLight::point, "point"},
-              std::pair{TurningLight::highlights, "directional with highlights"}})
-            if (auto measured = moving_light(model, shared, wanted, kind, name); !measured) return measured;
-        return {};
-    }
-
-    Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds,
-                              Index wanted, TurningLight kind, const char* name) {
-        const auto session = model.session(baseline);
-        if (!session) return session.error();
-        const vdtree::VertexTree& tree = (*session)->tree();
-        perception::FoldTestOptions options;
-        vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, model.view(), options, {}, false);
-        options.scene =
-            perception::lit_scene(tree, *bounds, lighting_at(tree, kind, 0), viewpoint.eye, (*session)->background());
-        const auto made = perception::lit_distances(tree, bounds, model.view(), options);
-        if (!made) return made.error();
-        vdtree::Cut cut(tree);
-        vdtree::FollowOptions following;
-        const auto follow = [&](double degrees) {
-            viewpoint.lighting = lighting_at(tree, kind, degrees);
-            const auto stats = cut.follow(*made, viewpoint, following);
-            return stats ? *stats : vdtree::AdjustStats{};
-        };
-        const AimedThreshold aimed = aim_for(wanted, [&](float threshold) {
-            following.threshold = threshold;
-            return follow(0).triangles;
-        });
-        following.threshold = aimed.threshold;
-        const Pinned pinned;
-        std::vector<double> milliseconds, changes;
-        const int frames = options_.quick ? 20 : 200, warm_up = 10;
-        for (int frame = 0; frame < frames + warm_up; ++frame) {
-            const auto start = BenchClock::now();
-            const auto stats = follow(frame);
-            static_cast<void>(cut.indices());
-            if (frame < warm_up) continue;
-            milliseconds.push_back(seconds_since(start) * 1e3);
-            changes.push_back(static_cast<double>(stats.folds + stats.unfolds));
-        }
-        result_.rows.push_back({std::string("moving light, ") + name + ", 1 degree a frame", "ms",
-                                model.name() + ", " + grouped(aimed.triangles) + " triangles active, " +
-                                    rounded(median(changes), 3) + " changes a frame",
-                                median(milliseconds), target("moving light, ms"), false, 2});
-        return {};
-    }
-
-    const PerceptionBenchOptions& options_;
-    std::optional<render::Context> context_;
-    perception::CsfModel second_; // of the second judge
+    const PerceptionOptions& options_;
+    render::Context context_;
     ProgressBar bar_;
+    const char* group_ = ""; // that is being measured
     Models models_;
     std::size_t main_models_ = 0;
-    PerceptionBenchResult result_;
+    std::string title_;
+    std::vector<BenchRow> rows_;
+    BenchReport report_;
 };
 
 } // namespace
 
-Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options) {
-    const auto second =
-        options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
-    if (!second) return second.error();
-    return PerceptionBench(options, *second).run();
-}
+BenchReport bench_perception(const PerceptionOptions& options) { return PerceptionBench(options).run(); }
 
 } // namespace unseen::app

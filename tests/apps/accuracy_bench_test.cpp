@@ -36,7 +36,7 @@ protected:
 TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
     write_ball("ball.obj");
     const Outcome outcome = bench({"accuracy", "--quick", "ball.obj", "--seconds", "5", "--window", "96", "--csv",
-                                   "points.csv", "--html", "page.html", "--plots", "plots", "--json", "-"});
+                                   "points.csv", "--plots", "plots", "--json", "-"});
     if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const Json report = outcome.json();
@@ -45,7 +45,6 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
                                                          "spheres", "tests", "trees"}))
         << "levels and pictures of depth are of scenes";
     EXPECT_EQ(error(points, "closed form, double"), 0);
-    EXPECT_LT(error(points, "closed form, float"), 1e-5) << "the twin is the formula";
     EXPECT_LT(error(points, "the program's table"), 0.005) << "what csf.h promises";
     EXPECT_GT(error(points, "table, 16 an axis, linear"), error(points, "table, 64 an axis, linear"));
     EXPECT_EQ(error(points, "imperceptible, followed"), 0) << "what a cut becomes does not depend on the way to it";
@@ -76,13 +75,11 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
                              "cone",
                              "without conserving light",
                              "without stages",
-                             "modern, 16 bits",
                              "modern, half the resolution",
                              "modern, a quarter",
                              "modern, 1 band",
                              "modern, 5 bands",
                              "rpg99",
-                             "rpg99, 16 bits",
                              "imperceptible, from scratch",
                              "imperceptible, followed, 1 ms at most",
                              "budget, exact",
@@ -93,10 +90,6 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
                              "4 frames old"})
         named(points, name);
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(read_text(path("points.csv")), '\n')), points.size() + 1);
-    const std::string page = read_text(path("page.html"));
-    EXPECT_THAT(page, HasSubstr("<svg"));
-    EXPECT_THAT(page, HasSubstr("the program's table"));
-    EXPECT_THAT(page, Not(HasSubstr("src="))) << "nothing is loaded from elsewhere";
     for (const Json& axis : report["axes"])
         EXPECT_TRUE(std::filesystem::exists(path("plots/accuracy_" + axis["key"].get<std::string>() + ".png")));
 }
