@@ -250,7 +250,7 @@ struct Cone {
     }
 };
 
-// The leaves of some nodes, and the smallest radius around each.
+// The leaves of some nodes.
 class SphereSets {
 public:
     SphereSets(const vdtree::SoundTree& tree, std::size_t nodes) : tree_(tree) {

@@ -22,17 +22,17 @@ struct BenchOptions {
 
 // Cuts that follow a view, budgets, memory and building, against what was promised of them. Cuts are measured on one
 // thread, pinned to one core, by the wall clock; medians. Trees are built by the command `unseen`, which tells its peak
-// memory.
-struct EngineOptions
-    : BenchOptions { // inputs: the mesh; if empty the dragon where quickstart has put it, else a sphere
+// memory. Inputs: the mesh; if empty the dragon where quickstart has put it, else a sphere with bumps.
+struct EngineOptions : BenchOptions {
     std::vector<std::uint64_t> sizes = {}; // triangles, ascending; smaller ones are simplified, larger ones subdivided
     std::string keep = {};                 // a folder for meshes and trees, used again if they are there
 };
 BenchReport bench_engine(const EngineOptions& options);
 
-// What fold tests save, and whether anything of it can be seen; against what was promised.
+// What fold tests save, and whether anything of it can be seen; against what was promised. Inputs: the meshes and the
+// others; if there are no meshes, installed ones.
 inline constexpr std::array perception_groups = {"savings", "aside", "random", "far", "hard", "tolerance"};
-struct PerceptionOptions : BenchOptions { // inputs: the meshes and the others; if there are no meshes, installed ones
+struct PerceptionOptions : BenchOptions {
     std::vector<std::string> meshes = {}; // of all groups
     std::vector<std::string> others = {}; // in the random views and far away, too
     std::vector<std::string> only = {};   // of perception_groups; empty: all
