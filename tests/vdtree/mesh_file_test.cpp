@@ -337,7 +337,7 @@ double cut_area(const std::vector<glm::dvec3>& polygon) {
     meshio::PolygonTriangulator polygons;
     Mesh mesh;
     mesh.positions = polygon;
-    polygons.triangulate(polygon, [&](const Triangle& t) { mesh.triangles.push_back(t); });
+    for (const Triangle& t : polygons.cut(polygon)) mesh.triangles.push_back(t);
     EXPECT_EQ(mesh.triangles.size(), polygon.size() - 2);
     EXPECT_EQ(polygons.fanned_concave(), 0u);
     return area(mesh);
@@ -369,11 +369,11 @@ TEST(Polygons, KeepTheirOrientationInEveryPlane) {
         const glm::dvec3 up = glm::cross(axis[0], axis[1]);
         meshio::PolygonTriangulator polygons;
         double sum = 0.0;
-        polygons.triangulate(polygon, [&](const Triangle& t) {
+        for (const Triangle& t : polygons.cut(polygon)) {
             const glm::dvec3 normal = glm::cross(polygon[t[1]] - polygon[t[0]], polygon[t[2]] - polygon[t[0]]);
             EXPECT_GE(glm::dot(normal, up), 0.0);
             sum += glm::length(normal) / 2.0;
-        });
+        }
         EXPECT_NEAR(sum, std::abs(expected), 1e-12);
     }
 }
@@ -386,7 +386,7 @@ TEST(Polygons, KeepTheirAreaAtExtremeScales) {
         for (glm::dvec3& p : scaled) p *= scale;
         meshio::PolygonTriangulator polygons;
         arrow.triangles.clear();
-        polygons.triangulate(scaled, [&](const Triangle& t) { arrow.triangles.push_back(t); });
+        for (const Triangle& t : polygons.cut(scaled)) arrow.triangles.push_back(t);
         EXPECT_NEAR(area(arrow), 2.0, 1e-12) << scale; // of the cut at plain size: squares would leave the range
     }
 }
@@ -431,10 +431,10 @@ TEST(Polygons, GiveNMinusTwoTrianglesWhateverTheirShape) {
         std::vector<glm::dvec3> polygon(static_cast<std::size_t>(3 + round % 12));
         for (glm::dvec3& p : polygon) p = {coordinate(random), coordinate(random), round % 2 ? coordinate(random) : 0};
         std::size_t count = 0;
-        polygons.triangulate(polygon, [&](const Triangle& t) {
+        for (const Triangle& t : polygons.cut(polygon)) {
             ++count;
             for (const Index corner : t) EXPECT_LT(corner, polygon.size());
-        });
+        }
         EXPECT_EQ(count, polygon.size() - 2);
     }
 }

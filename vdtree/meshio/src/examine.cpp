@@ -4,12 +4,9 @@
 #include "weld.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstddef>
-#include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 

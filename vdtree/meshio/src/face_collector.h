@@ -2,10 +2,8 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
+
+#include <glm/vec3.hpp>
 
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
@@ -39,9 +37,8 @@ public:
         }
         points_.clear();
         for (std::size_t i = 0; i < corners.size(); ++i) points_.push_back(result_.mesh.positions[index(i)]);
-        polygons_.triangulate(points_, [&](const Triangle& t) {
+        for (const Triangle& t : polygons_.cut(points_))
             result_.mesh.triangles.push_back({index(t[0]), index(t[1]), index(t[2])});
-        });
     }
 
     // Every second triangle of a strip runs the other way round. With restarts, -1 begins a new one.
@@ -89,8 +86,8 @@ private:
             if (has_restarts && corner == -1) continue;
             if (corner >= 0 && static_cast<std::uint64_t>(corner) < vertices.count) continue;
             leave_out_face(result_.bad, [&] {
-                return where() + " uses vertex " + std::to_string(corner) + ", but the vertices are numbered 0 to " +
-                       std::to_string(static_cast<std::int64_t>(vertices.count) - 1);
+                return text_of(where(), " uses vertex ", corner, ", but the vertices are numbered 0 to ",
+                               static_cast<std::int64_t>(vertices.count) - 1);
             });
             return false;
         }

@@ -1,11 +1,10 @@
 // Pieces of text and numbers that become a file when all of them are there.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <bit>
 #include <cctype>
 #include <charconv>
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -31,11 +30,16 @@ public:
         const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
         text({digits.data(), end});
     }
+    // Each with a space before it.
+    void numbers(const auto& values, int count) {
+        for (int i = 0; i < count; ++i) {
+            text(" ");
+            number(values[i]);
+        }
+    }
     template <class Value>
-    void binary(Value value) { // little-endian
-        auto raw = std::bit_cast<std::array<char, sizeof(Value)>>(value);
-        if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-        text({raw.data(), raw.size()});
+    void binary(Value value) { // little-endian, as in memory
+        text({reinterpret_cast<const char*>(&value), sizeof value});
     }
 
     Result<void> finish() {

@@ -1,13 +1,15 @@
-#include "gltf_data.h"
-
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cstring>
-#include <limits>
 #include <utility>
 
+#include "gltf_data.h"
+
+#ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER
+#include <meshoptimizer.h>
+#endif
+
+#include <unseen/meshio/scene_file.h>
+
 #include "text_scanner.h"
+#include "value_types.h"
 
 namespace unseen::meshio::gltf {
 
@@ -39,12 +41,7 @@ std::optional<std::string> decode_base64(std::string_view text) {
 bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
 
 // Of views that are compressed: stands for what they hold uncompressed, and may have no data.
-bool is_fallback(const json& buffer) {
-    const json* extensions = member(buffer, "extensions");
-    const json* extension = extensions && extensions->is_object() ? member(*extensions, meshopt_extension) : nullptr;
-    const json* fallback = extension && extension->is_object() ? member(*extension, "fallback") : nullptr;
-    return fallback != nullptr && *fallback == true;
-}
+bool is_fallback(const json& buffer) { return within(buffer, {"extensions", meshopt_extension, "fallback"}) == true; }
 
 } // namespace
 
@@ -145,66 +142,66 @@ std::string Buffers::read_beside(const std::string& uri, const std::string& wher
 
 namespace {
 
-std::size_t component_bytes(int type) {
-    switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return 1;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return 2;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-    case TINYGLTF_COMPONENT_TYPE_FLOAT: return 4;
-    default: return 0;
+// Nothing where a file's number means no type.
+std::optional<ValueType> type_of(int component) {
+    switch (component) {
+    case TINYGLTF_COMPONENT_TYPE_BYTE: return ValueType::int8;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return ValueType::uint8;
+    case TINYGLTF_COMPONENT_TYPE_SHORT: return ValueType::int16;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return ValueType::uint16;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return ValueType::uint32;
+    case TINYGLTF_COMPONENT_TYPE_FLOAT: return ValueType::float32;
+    default: return std::nullopt;
     }
 }
 
-template <class Stored>
-Stored stored_at(const char* bytes) {
-    std::array<char, sizeof(Stored)> raw;
-    std::memcpy(raw.data(), bytes, sizeof(Stored));
-    if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-    return std::bit_cast<Stored>(raw);
+std::optional<ValueType> index_type_of(int component) {
+    const auto type = type_of(component);
+    const bool is_index = type == ValueType::uint8 || type == ValueType::uint16 || type == ValueType::uint32;
+    return is_index ? type : std::nullopt;
 }
 
-template <class Stored>
-double scaled_at(const char* bytes, bool is_normalized) {
-    const double value = static_cast<double>(stored_at<Stored>(bytes));
-    // glTF 2.0, 3.6.2.2: the most negative integer stands for -1 as well.
-    return is_normalized ? std::max(value / static_cast<double>(std::numeric_limits<Stored>::max()), -1.0) : value;
+double component_at(const char* bytes, ValueType type, bool is_normalized) {
+    return with_type(type, [&](auto tag) {
+        using Stored = typename decltype(tag)::type;
+        const auto value = static_cast<double>(load_value<Stored>(bytes));
+        const bool is_share = is_normalized && sizeof(Stored) < 4; // of whole numbers
+        // glTF 2.0, 3.6.2.2: the most negative integer stands for -1 as well.
+        return is_share ? std::max(value / static_cast<double>(std::numeric_limits<Stored>::max()), -1.0) : value;
+    });
 }
 
-double component_at(const char* bytes, int type, bool is_normalized) {
-    switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE: return scaled_at<std::int8_t>(bytes, is_normalized);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return scaled_at<std::uint8_t>(bytes, is_normalized);
-    case TINYGLTF_COMPONENT_TYPE_SHORT: return scaled_at<std::int16_t>(bytes, is_normalized);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return scaled_at<std::uint16_t>(bytes, is_normalized);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return static_cast<double>(stored_at<std::uint32_t>(bytes));
-    default: return static_cast<double>(stored_at<float>(bytes));
-    }
-}
-
-bool is_index_type(int type) {
-    return type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE || type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
-           type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-}
-
-Index index_at(const char* row, int type) { return static_cast<Index>(component_at(row, type, false)); }
-
-std::size_t component_size_of(int type, const std::string& where) {
-    const std::size_t size = component_bytes(type);
-    if (size == 0) fail(where, " has the unknown component type ", type, "; correct the JSON.");
-    return size;
-}
-
-} // namespace
+Index index_at(const char* row, ValueType type) { return static_cast<Index>(component_at(row, type, false)); }
 
 // Rows of bytes that are known to lie inside a buffer.
-struct Accessors::Rows {
+struct Rows {
     const char* first = nullptr;
     std::size_t stride = 0;
     std::size_t count = 0;
     const char* operator[](std::size_t i) const { return first + i * stride; }
 };
+
+Rows rows_of(const tinygltf::Model& model, const Buffers& buffers, int view_index, std::size_t offset,
+             std::size_t count, std::size_t size, const std::string& where) {
+    if (static_cast<std::size_t>(view_index) >= model.bufferViews.size())
+        fail(where, " uses buffer view ", view_index, ", but there are ", model.bufferViews.size(),
+             "; correct the JSON.");
+    const tinygltf::BufferView& view = model.bufferViews[static_cast<std::size_t>(view_index)];
+    if (static_cast<std::size_t>(view.buffer) >= buffers.count())
+        fail("buffer view ", view_index, " uses buffer ", view.buffer, ", but there are ", buffers.count(),
+             "; correct the JSON.");
+    const std::string_view bytes = buffers[static_cast<std::size_t>(view.buffer)];
+    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
+        fail("buffer view ", view_index, " ends behind its buffer; the data are cut short or the JSON is wrong.");
+    const std::size_t stride = view.byteStride == 0 ? size : view.byteStride;
+    if (stride < size) fail(where, " has a stride smaller than its elements; correct the JSON.");
+    const std::size_t room = view.byteLength - std::min(offset, view.byteLength);
+    const bool fits = count == 0 || (room >= size && count - 1 <= (room - size) / stride);
+    if (!fits) fail(where, " ends behind its buffer view; the data are cut short or the JSON is wrong.");
+    return count == 0 ? Rows{} : Rows{bytes.data() + view.byteOffset + offset, stride, count};
+}
+
+} // namespace
 
 const tinygltf::Accessor& Accessors::accessor(int index) const {
     if (index < 0 || static_cast<std::size_t>(index) >= model_.accessors.size())
@@ -212,92 +209,179 @@ const tinygltf::Accessor& Accessors::accessor(int index) const {
     return model_.accessors[static_cast<std::size_t>(index)];
 }
 
-Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
-                                   const std::string& where) const {
-    if (static_cast<std::size_t>(view_index) >= model_.bufferViews.size())
-        fail(where, " uses buffer view ", view_index, ", but there are ", model_.bufferViews.size(),
-             "; correct the JSON.");
-    const tinygltf::BufferView& view = model_.bufferViews[static_cast<std::size_t>(view_index)];
-    if (static_cast<std::size_t>(view.buffer) >= buffers_.count())
-        fail(numbered("buffer view", static_cast<std::size_t>(view_index)), " uses buffer ", view.buffer,
-             ", but there are ", buffers_.count(), "; correct the JSON.");
-    const std::string_view bytes = buffers_[static_cast<std::size_t>(view.buffer)];
-    if (view.byteOffset > bytes.size() || view.byteLength > bytes.size() - view.byteOffset)
-        fail(numbered("buffer view", static_cast<std::size_t>(view_index)),
-             " ends behind its buffer; the data are cut short or the JSON is wrong.");
-    const std::size_t stride = view.byteStride == 0 ? size : view.byteStride;
-    if (stride < size) fail(where, " has a stride smaller than its elements; correct the JSON.");
-    const std::size_t room = view.byteLength - std::min(offset, view.byteLength);
-    const bool fits = count == 0 || (room >= size && count - 1 <= (room - size) / stride);
-    if (!fits) fail(where, " ends behind its buffer view; the data are cut short or the JSON is wrong.");
-    if (count == 0) return {};
-    return {bytes.data() + view.byteOffset + offset, stride, count};
+int Accessors::components_of(int index) const {
+    const int type = accessor(index).type;
+    const bool is_vector = type == TINYGLTF_TYPE_VEC2 || type == TINYGLTF_TYPE_VEC3 || type == TINYGLTF_TYPE_VEC4;
+    return is_vector ? tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)) : 0;
 }
 
-template <class Put>
-void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where,
-                                Put&& put) const {
-    const int index_type = a.sparse.indices.componentType;
-    if (!is_index_type(index_type)) fail(where, " has sparse indices of a wrong type; correct the JSON.");
+template <class Value, class Decode>
+std::vector<Value> Accessors::read(int index, std::size_t size, Value missing, Decode&& decode) const {
+    const tinygltf::Accessor& a = accessor(index);
+    const std::string where = text_of("accessor ", index);
+    const auto rows = [&](int view, std::size_t offset, std::size_t count, std::size_t row_size) {
+        return rows_of(model_, buffers_, view, offset, count, row_size, where);
+    };
+    const Rows dense = a.bufferView < 0 ? Rows{} : rows(a.bufferView, a.byteOffset, a.count, size);
+    std::vector<Value> values(a.count, missing);
+    for (std::size_t i = 0; i < dense.count; ++i) decode(dense[i], values[i]);
+    if (!a.sparse.isSparse) return values;
+    const auto& indices = a.sparse.indices;
+    const auto& others = a.sparse.values;
+    const auto index_type = index_type_of(indices.componentType);
+    if (!index_type) fail(where, " has sparse indices of a wrong type; correct the JSON.");
     const auto count = static_cast<std::size_t>(a.sparse.count);
     if (count > a.count) fail(where, " replaces more elements than it has; correct its sparse count.");
-    const Rows at = rows_of(a.sparse.indices.bufferView, static_cast<std::size_t>(a.sparse.indices.byteOffset), count,
-                            component_bytes(index_type), where);
-    const Rows values =
-        rows_of(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset), count, size, where);
+    const Rows at =
+        rows(indices.bufferView, static_cast<std::size_t>(indices.byteOffset), count, byte_size(*index_type));
+    const Rows replaced = rows(others.bufferView, static_cast<std::size_t>(others.byteOffset), count, size);
     for (std::size_t i = 0; i < count; ++i) {
-        const Index target = index_at(at[i], index_type);
+        const Index target = index_at(at[i], *index_type);
         if (target >= a.count)
             fail(where, " replaces element ", target, " of ", a.count, "; correct its sparse indices.");
-        put(target, values[i]);
+        decode(replaced[i], values[target]);
     }
-}
-
-int Accessors::components_of(int index) const {
-    switch (accessor(index).type) {
-    case TINYGLTF_TYPE_VEC2: return 2;
-    case TINYGLTF_TYPE_VEC3: return 3;
-    case TINYGLTF_TYPE_VEC4: return 4;
-    default: return 0;
-    }
+    return values;
 }
 
 std::vector<glm::dvec4> Accessors::vectors(int index, int components, const char* use) const {
     const tinygltf::Accessor& a = accessor(index);
-    const std::string where = numbered("accessor", static_cast<std::size_t>(index));
     const int found = components_of(index);
     const bool fits = components == 0 ? found == 3 || found == 4 : found == components;
-    if (!fits) fail(where, " has the wrong type for ", use, "; correct the JSON.");
-    const std::size_t component_size = component_size_of(a.componentType, where);
-    const std::size_t size = static_cast<std::size_t>(found) * component_size;
-
-    if (a.bufferView < 0 && !a.sparse.isSparse) fail(where, " has no bufferView; correct the JSON.");
-    const Rows rows = a.bufferView < 0 ? Rows{} : rows_of(a.bufferView, a.byteOffset, a.count, size, where);
-    std::vector<glm::dvec4> values(a.count, glm::dvec4(0.0, 0.0, 0.0, 1.0));
-    const auto decode = [&](const char* row, glm::dvec4& value) {
-        for (int i = 0; i < found; ++i)
-            value[i] = component_at(row + static_cast<std::size_t>(i) * component_size, a.componentType, a.normalized);
-    };
-    for (std::size_t i = 0; i < rows.count; ++i) decode(rows[i], values[i]);
-    if (a.sparse.isSparse)
-        for_each_sparse(a, size, where, [&](std::size_t at, const char* row) { decode(row, values[at]); });
-    return values;
+    if (!fits) fail("accessor ", index, " has the wrong type for ", use, "; correct the JSON.");
+    const auto type = type_of(a.componentType);
+    if (!type) fail("accessor ", index, " has the unknown component type ", a.componentType, "; correct the JSON.");
+    if (a.bufferView < 0 && !a.sparse.isSparse) fail("accessor ", index, " has no bufferView; correct the JSON.");
+    const std::size_t bytes = byte_size(*type);
+    return read(index, static_cast<std::size_t>(found) * bytes, glm::dvec4(0, 0, 0, 1),
+                [&](const char* row, glm::dvec4& value) {
+                    for (int i = 0; i < found; ++i)
+                        value[i] = component_at(row + static_cast<std::size_t>(i) * bytes, *type, a.normalized);
+                });
 }
 
 std::vector<Index> Accessors::indices(int index) const {
     const tinygltf::Accessor& a = accessor(index);
-    const std::string where = numbered("accessor", static_cast<std::size_t>(index));
-    if (a.type != TINYGLTF_TYPE_SCALAR || !is_index_type(a.componentType) || a.bufferView < 0)
-        fail(where, " cannot hold indices: they are unsigned integers in a bufferView; correct the JSON.");
-    const std::size_t size = component_bytes(a.componentType);
-    const Rows rows = rows_of(a.bufferView, a.byteOffset, a.count, size, where);
-    std::vector<Index> values(a.count);
-    for (std::size_t i = 0; i < a.count; ++i) values[i] = index_at(rows[i], a.componentType);
-    if (a.sparse.isSparse) {
-        for_each_sparse(a, size, where,
-                        [&](std::size_t at, const char* row) { values[at] = index_at(row, a.componentType); });
+    const auto type = index_type_of(a.componentType);
+    if (a.type != TINYGLTF_TYPE_SCALAR || !type || a.bufferView < 0)
+        fail("accessor ", index, " cannot hold indices: they are unsigned integers in a bufferView; correct the JSON.");
+    return read(index, byte_size(*type), Index{0},
+                [&](const char* row, Index& value) { value = index_at(row, *type); });
+}
+
+// ---- buffer views that EXT_meshopt_compression made small ----
+
+namespace {
+
+#ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER
+
+// No codec of the extension stores less than two bits of sixteen bytes; what claims more is no such data. Bytes for each
+// byte.
+constexpr std::size_t most_growth = 64;
+constexpr std::size_t least_bound = 4096; // bytes: headers count where there is little
+// Of all views together, where a file is small: bytes.
+constexpr std::size_t least_bound_of_all = std::size_t{16} << 20;
+
+struct Packed {
+    std::size_t count = 0, stride = 0;
+    std::string_view bytes;
+    std::string mode, filter;
+};
+
+std::size_t size_of(const json& in, const char* key, std::size_t missing, const std::string& where) {
+    const json* value = member(in, key);
+    if (value == nullptr) return missing;
+    return static_cast<std::size_t>(to_integer_in_range(*value, max_size, where + ": " + key));
+}
+
+Packed packed_in(const json& extension, const Buffers& buffers, const std::string& where) {
+    const auto text = [&](const char* key, const char* missing) {
+        const json& value = within(extension, {key});
+        return value.is_string() ? value.get<std::string>() : std::string(missing);
+    };
+    Packed packed;
+    packed.count = size_of(extension, "count", 0, where), packed.stride = size_of(extension, "byteStride", 0, where);
+    packed.mode = text("mode", ""), packed.filter = text("filter", "NONE");
+    const std::size_t buffer = size_of(extension, "buffer", buffers.count(), where);
+    const std::size_t offset = size_of(extension, "byteOffset", 0, where);
+    const std::size_t length = size_of(extension, "byteLength", 0, where);
+    if (buffer >= buffers.count() || offset > buffers[buffer].size() || length > buffers[buffer].size() - offset)
+        fail(where, ": its compressed bytes end behind their buffer; the data are cut short or the JSON is wrong.");
+    packed.bytes = buffers[buffer].substr(offset, length);
+    return packed;
+}
+
+// What the library demands of its callers, and a size that such data can have.
+void check(const Packed& packed, const std::string& where) {
+    const bool is_vertices = packed.mode == "ATTRIBUTES";
+    const bool fits = is_vertices ? packed.stride % 4 == 0 && packed.stride >= 4 && packed.stride <= 256
+                                  : packed.stride == 2 || packed.stride == 4;
+    if (!fits) fail(where, ": its byteStride is ", packed.stride, "; correct the JSON.");
+    if (packed.mode == "TRIANGLES" && packed.count % 3 != 0)
+        fail(where, ": ", packed.count, " indices make no whole number of triangles; correct it.");
+    if (packed.count > (least_bound + most_growth * packed.bytes.size()) / packed.stride)
+        fail(where, ": ", packed.bytes.size(), " bytes cannot hold its ", packed.count,
+             " elements; the data are cut short or the JSON is wrong.");
+}
+
+void undo_filter(const Packed& packed, std::string& out, const std::string& where) {
+    const bool has_filter = packed.filter != "NONE";
+    const bool fits = packed.filter == "OCTAHEDRAL"    ? packed.stride == 4 || packed.stride == 8
+                      : packed.filter == "QUATERNION"  ? packed.stride == 8
+                      : packed.filter == "EXPONENTIAL" ? packed.stride % 4 == 0
+                                                       : !has_filter;
+    if (!fits || (has_filter && packed.mode != "ATTRIBUTES"))
+        fail(where, ": its filter is not known, or does not go with its mode and byteStride; correct the JSON.");
+    if (packed.filter == "OCTAHEDRAL") meshopt_decodeFilterOct(out.data(), packed.count, packed.stride);
+    if (packed.filter == "QUATERNION") meshopt_decodeFilterQuat(out.data(), packed.count, packed.stride);
+    if (packed.filter == "EXPONENTIAL") meshopt_decodeFilterExp(out.data(), packed.count, packed.stride);
+}
+
+std::string unpacked(const Packed& packed, const std::string& where) {
+    check(packed, where);
+    std::string out(packed.count * packed.stride, '\0');
+    const auto* bytes = reinterpret_cast<const unsigned char*>(packed.bytes.data());
+    const std::size_t size = packed.bytes.size();
+    int failed = -1;
+    if (packed.mode == "ATTRIBUTES")
+        failed = meshopt_decodeVertexBuffer(out.data(), packed.count, packed.stride, bytes, size);
+    else if (packed.mode == "TRIANGLES")
+        failed = meshopt_decodeIndexBuffer(out.data(), packed.count, packed.stride, bytes, size);
+    else if (packed.mode == "INDICES")
+        failed = meshopt_decodeIndexSequence(out.data(), packed.count, packed.stride, bytes, size);
+    else fail(where, ": its mode is ", in_quotes(packed.mode), ", which is none; correct the JSON.");
+    if (failed != 0) fail(where, ": its compressed bytes are damaged.");
+    undo_filter(packed, out, where);
+    return out;
+}
+
+#endif
+
+} // namespace
+
+void unpack_views(json& document, Buffers& buffers) {
+#ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER
+    const auto views = document.find("bufferViews");
+    if (views == document.end() || !views->is_array()) return;
+    std::size_t room = 0; // many views may name the same bytes
+    for (std::size_t i = 0; i < buffers.count(); ++i) room += buffers[i].size();
+    room = std::max(least_bound_of_all, most_growth * room);
+    for (std::size_t i = 0; i < views->size(); ++i) {
+        json& view = (*views)[i];
+        const json& extension = within(view, {"extensions", meshopt_extension});
+        if (!extension.is_object()) continue;
+        const std::string where = numbered("buffer view", i);
+        std::string bytes = unpacked(packed_in(extension, buffers, where), where);
+        if (bytes.size() > room)
+            fail("its compressed buffer views hold more than files of its size do; split the scene.");
+        room -= bytes.size();
+        view["byteLength"] = bytes.size();
+        view["byteOffset"] = 0;
+        view["buffer"] = buffers.add(std::move(bytes));
     }
-    return values;
+#else
+    (void)document, (void)buffers;
+#endif
 }
 
 } // namespace unseen::meshio::gltf

@@ -1,18 +1,10 @@
 // The bytes that a glTF document describes: its buffers, each read or decoded once, and the typed rows in them.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <deque>
-#include <filesystem>
 #include <limits>
 #include <map>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <vector>
-
-#include <glm/vec4.hpp>
 
 #include "gltf_document.h"
 
@@ -68,11 +60,6 @@ private:
 inline constexpr const char* meshopt_extension = "EXT_meshopt_compression";
 void unpack_views(json& document, Buffers& buffers);
 
-inline constexpr const char* instancing_extension = "EXT_mesh_gpu_instancing";
-// Gives each instance a node of its own below the node that has them, so that all else sees only nodes. Values that
-// instances have beside their places are left out, with a warning.
-void expand_instances(json& document, const Buffers& buffers, std::vector<Message>& warnings);
-
 class Accessors {
 public:
     Accessors(const tinygltf::Model& model, const Buffers& buffers) : model_(model), buffers_(buffers) {}
@@ -85,12 +72,10 @@ public:
     std::vector<Index> indices(int index) const;
 
 private:
-    struct Rows;
     const tinygltf::Accessor& accessor(int index) const;
-    Rows rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
-                 const std::string& where) const;
-    template <class Put>
-    void for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where, Put&& put) const;
+    // Of rows of a size in bytes.
+    template <class Value, class Decode>
+    std::vector<Value> read(int index, std::size_t size, Value missing, Decode&& decode) const;
 
     const tinygltf::Model& model_;
     const Buffers& buffers_;

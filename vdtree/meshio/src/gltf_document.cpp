@@ -1,14 +1,13 @@
-#include "gltf_document.h"
-
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
-#include <limits>
 #include <utility>
 
+#include "gltf_document.h"
+
+#include <set>
+
+#include "gltf_nodes.h"
+#include "kept_arrays.h"
 #include "text_scanner.h"
+#include "value_types.h"
 
 namespace unseen::meshio::gltf {
 namespace {
@@ -25,10 +24,7 @@ constexpr std::size_t glb_header_bytes = 12;
 constexpr std::size_t chunk_header_bytes = 8;
 
 std::uint32_t word_at(std::string_view bytes, std::size_t offset) {
-    std::array<char, 4> raw;
-    std::memcpy(raw.data(), bytes.data() + offset, raw.size());
-    if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-    return std::bit_cast<std::uint32_t>(raw);
+    return load_value<std::uint32_t>(bytes.data() + offset);
 }
 
 // Recursive code behind the parser must not run out of stack, nor its structures of memory.
@@ -103,16 +99,25 @@ std::string to_text(const json& document) { return document.dump(-1, ' ', false,
 
 TextureSource source_of(const json& texture) {
     const auto index_in = [](const json& object) -> std::optional<std::size_t> {
-        const json* source = object.is_object() ? member(object, "source") : nullptr;
-        if (source == nullptr || !source->is_number_unsigned()) return std::nullopt;
-        return source->get<std::size_t>();
+        const json& source = within(object, {"source"});
+        if (!source.is_number_unsigned()) return std::nullopt;
+        return source.get<std::size_t>();
     };
     if (const auto own = index_in(texture)) return {own, {}};
-    const json* extensions = texture.is_object() ? member(texture, "extensions") : nullptr;
-    if (extensions != nullptr && extensions->is_object())
-        for (const auto& [name, extension] : extensions->items())
+    if (const json& extensions = within(texture, {"extensions"}); extensions.is_object())
+        for (const auto& [name, extension] : extensions.items())
             if (const auto other = index_in(extension)) return {other, name};
     return {};
+}
+
+const json& within(const json& value, std::initializer_list<const char*> keys) {
+    static const json none;
+    const json* found = &value;
+    for (const char* key : keys) {
+        if (!found->is_object() || !found->contains(key)) return none;
+        found = &(*found)[key];
+    }
+    return *found;
 }
 
 const json* member(const json& object, const char* key) {
@@ -139,13 +144,10 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
 }
 
 std::optional<std::uint32_t> colour_uv_set(const json& material) {
-    const auto within = [](const json* object, const char* key) {
-        return object != nullptr && object->is_object() ? member(*object, key) : nullptr;
-    };
-    const json* texture = within(within(&material, "pbrMetallicRoughness"), "baseColorTexture");
-    const json* set = within(within(within(texture, "extensions"), "KHR_texture_transform"), "texCoord");
-    if (set == nullptr) set = within(texture, "texCoord");
-    if (set == nullptr) return 0;
+    const json& texture = within(material, {"pbrMetallicRoughness", "baseColorTexture"});
+    const json* set = &within(texture, {"extensions", "KHR_texture_transform", "texCoord"});
+    if (set->is_null()) set = &within(texture, {"texCoord"});
+    if (set->is_null()) return 0;
     for (std::uint32_t known = 0; known <= last_uv_set; ++known)
         if (*set == known) return known;
     return std::nullopt;
@@ -183,11 +185,10 @@ public:
 
 private:
     void check_version() {
-        const json* asset = member(document_, "asset");
-        const json* version = asset != nullptr && asset->is_object() ? member(*asset, "version") : nullptr;
-        if (version == nullptr || !version->is_string()) fail("it has no asset version; it is no glTF file.");
-        if (!version->get_ref<const std::string&>().starts_with("2."))
-            fail("its version is ", in_quotes(version->get_ref<const std::string&>()),
+        const json& version = within(document_, {"asset", "version"});
+        if (!version.is_string()) fail("it has no asset version; it is no glTF file.");
+        if (!version.get_ref<const std::string&>().starts_with("2."))
+            fail("its version is ", in_quotes(version.get_ref<const std::string&>()),
                  ", and only 2 is read; convert it.");
         reduced_["asset"]["version"] = "2.0";
     }
@@ -295,13 +296,11 @@ private:
 
     // Files may offer plain data beside compressed ones; many do not, and yet call the extension optional.
     void refuse_draco(const json& primitive, const json& attributes) const {
-        const json* extensions = member(primitive, "extensions");
-        const json* position = member(attributes, "POSITION");
-        if (extensions == nullptr || !extensions->is_object() || member(*extensions, draco_extension) == nullptr ||
-            position == nullptr || !position->is_number_unsigned())
-            return;
+        const json& position = within(attributes, {"POSITION"});
+        const json& extensions = within(primitive, {"extensions"});
+        if (!extensions.is_object() || !extensions.contains(draco_extension) || !position.is_number_unsigned()) return;
         const json& accessors = array_of(document_, "accessors");
-        const auto index = position->get<std::size_t>();
+        const auto index = position.get<std::size_t>();
         if (index < accessors.size() && accessors[index].is_object() && !accessors[index].contains("bufferView") &&
             !accessors[index].contains("sparse"))
             fail(where_, " is compressed by ", draco_extension, ", which is not read; export it without.");
@@ -355,6 +354,173 @@ Reduced reduce(const json& document) {
     Reducer reducer(document);
     tinygltf::Model model = to_model(reducer.reduce());
     return {std::move(model), reducer.has_tangents(), reducer.has_other_attributes()};
+}
+
+// ---- what a cut can keep, and what it cannot
+
+namespace {
+
+// Extensions without which the positions or triangles cannot be read.
+constexpr std::string_view unsupported_extensions[] = {draco_extension, "KHR_meshopt_compression"};
+// Only of how vertices are stored, which is done otherwise when they are written.
+constexpr std::string_view quantization = "KHR_mesh_quantization";
+
+// Extensions of materials, textures, lights and descriptions name no vertices: they are kept as they are.
+bool is_kept(std::string_view extension) {
+    const auto has = [&](std::string_view part) { return extension.find(part) != std::string_view::npos; };
+    return has("_materials_") || has("_texture_") || has("_lights_") || has("_xmp") ||
+           extension == "KHR_node_visibility";
+}
+
+bool any_has(const json& elements, const char* key) {
+    return std::any_of(elements.begin(), elements.end(),
+                       [&](const json& element) { return element.is_object() && element.contains(key); });
+}
+
+bool has_morph_targets(const json& document) {
+    const json& meshes = array_of(document, "meshes");
+    return std::any_of(meshes.begin(), meshes.end(), [](const json& mesh) {
+        return mesh.is_object() && any_has(array_of(mesh, "primitives"), "targets");
+    });
+}
+
+// The names of required extensions that nobody here knows. Fails on those without which nothing can be read.
+std::set<std::string> unknown_required(const json& document) {
+    std::set<std::string> unknown;
+    for (const json& extension : array_of(document, "extensionsRequired")) {
+        if (!extension.is_string()) continue;
+        const auto& required = extension.get_ref<const std::string&>();
+        if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
+            std::end(unsupported_extensions))
+            fail("it needs the extension ", required, ", which is not read; export it without.");
+        if (required == meshopt_extension && !has_meshoptimizer())
+            fail("it needs the extension ", required,
+                 ", and this build is without the library meshoptimizer; install "
+                 "libmeshoptimizer-dev and build again, or export it without.");
+        if (!is_kept(required) && required != quantization && required != meshopt_extension &&
+            required != lod_extension && required != instancing_extension)
+            unknown.insert(required);
+    }
+    return unknown;
+}
+
+// Removes the extensions of an object, and of all within it, that are not kept.
+void strip_extensions(json& value, std::set<std::string>& stripped) {
+    if (value.is_object()) {
+        if (const auto found = value.find("extensions"); found != value.end() && found->is_object()) {
+            for (auto extension = found->begin(); extension != found->end();) {
+                if (is_kept(extension.key())) {
+                    ++extension;
+                    continue;
+                }
+                stripped.insert(extension.key());
+                extension = found->erase(extension);
+            }
+            if (found->empty()) value.erase(found);
+        }
+        for (auto& [key, inner] : value.items())
+            if (key != "extras") strip_extensions(inner, stripped);
+    } else if (value.is_array()) {
+        for (json& inner : value) strip_extensions(inner, stripped);
+    }
+}
+
+void keep_names(json& document, const char* key) {
+    const auto names = document.find(key);
+    if (names == document.end()) return;
+    json kept = json::array();
+    for (const json& name : array_of(document, key))
+        if (name.is_string() && is_kept(name.get_ref<const std::string&>())) kept.push_back(name);
+    if (kept.empty()) document.erase(names);
+    else *names = std::move(kept);
+}
+
+// Without what names accessors.
+json kept_mesh(json mesh) {
+    mesh.erase("weights");
+    json primitives = json::array();
+    for (const json& primitive : array_of(mesh, "primitives")) {
+        json kept = json::object();
+        for (const char* key : {"material", "extensions", "extras"})
+            if (const json* value = member(primitive, key)) kept[key] = *value;
+        if (any_has(json::array({primitive}), "targets") && mesh.contains("extras") && mesh["extras"].is_object())
+            mesh["extras"].erase("targetNames");
+        primitives.push_back(std::move(kept));
+    }
+    mesh["primitives"] = std::move(primitives);
+    return mesh;
+}
+
+json kept_image(json image) {
+    image.erase("bufferView");
+    if (const json* uri = member(image, "uri"); uri != nullptr && uri->is_string()) {
+        const auto& text = uri->get_ref<const std::string&>();
+        if (text.starts_with("data:")) {
+            if (!image.contains("mimeType")) image["mimeType"] = text.substr(5, text.find_first_of(";,") - 5);
+            image.erase("uri");
+        }
+    }
+    return image;
+}
+
+} // namespace
+
+void check_kept(const json& document, const LeftOut& drop, std::vector<Message>& warnings) {
+    const std::set<std::string> unknown = unknown_required(document);
+    struct Thing {
+        const char *what, *name;
+        bool is_there, is_dropped;
+        std::string details;
+    };
+    const Thing things[] = {
+        {"skins", "skins", any_has(array_of(document, "nodes"), "skin"), drop.skins, "; the mesh is in its bind pose"},
+        {"morph targets", "morph-targets", has_morph_targets(document), drop.morph_targets, ""},
+        {"animations", "animations", !array_of(document, "animations").empty(), drop.animations, ""},
+        {"unknown extensions", "extensions", !unknown.empty(), drop.extensions,
+         ": " + listed({unknown.begin(), unknown.end()})}};
+    std::string refused, names;
+    for (const Thing& thing : things) {
+        if (!thing.is_there) continue;
+        if (thing.is_dropped) {
+            warnings.push_back(std::string(thing.what) + " were left out" + thing.details + ".");
+            continue;
+        }
+        refused += (refused.empty() ? "" : " and ") + std::string(thing.what);
+        names += (names.empty() ? "" : ",") + std::string(thing.name);
+    }
+    if (!refused.empty())
+        throw Fault{"it has " + refused + ", which a simplified mesh cannot keep" +
+                    (unknown.empty() || drop.extensions ? "" : " (" + listed({unknown.begin(), unknown.end()}) + ")") +
+                    "; leave them out with " + Message::of("{read.drop = }") + names + "."};
+}
+
+json without_geometry(json document, const std::vector<SourceDocument::File>& images, std::vector<Message>& warnings) {
+    for (const char* key : {"accessors", "bufferViews", "buffers", "animations", "skins"}) document.erase(key);
+    std::set<std::string> stripped;
+    strip_extensions(document, stripped);
+    stripped.erase(std::string(quantization));
+    stripped.erase(meshopt_extension);
+    stripped.erase(draco_extension); // there were plain data, too
+    if (stripped.erase(lod_extension) > 0)
+        warnings.push_back("of its levels of detail (MSFT_lod) the finest were read.");
+    if (!stripped.empty())
+        warnings.push_back(
+            "what extensions say that are not known was left out: " + listed({stripped.begin(), stripped.end()}) + ".");
+    for (const char* key : {"extensionsUsed", "extensionsRequired"}) keep_names(document, key);
+    const auto change_each = [&](const char* key, auto&& change) {
+        if (const auto found = document.find(key); found != document.end())
+            for (json& element : *found) element = element.is_object() ? change(std::move(element)) : json::object();
+    };
+    change_each("meshes", kept_mesh);
+    change_each("images", kept_image);
+    for (std::size_t i = 0; i < images.size(); ++i)
+        if (!images[i].uri.empty()) document["images"][i]["uri"] = images[i].uri; // as it is written again
+    change_each("nodes", [](json node) {
+        node.erase("skin");
+        node.erase("weights");
+        return node;
+    });
+    return document;
 }
 
 } // namespace unseen::meshio::gltf

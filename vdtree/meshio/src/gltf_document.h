@@ -2,12 +2,9 @@
 // would believe or fetch reaches it.
 #pragma once
 
-#include <cstdint>
+#include <initializer_list>
 #include <limits>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
@@ -47,6 +44,8 @@ inline constexpr const char* lod_extension = "MSFT_lod";
 
 const json* member(const json& object, const char* key);   // null: it has none
 const json& array_of(const json& object, const char* key); // empty: it has none
+// The value at the end of a path of keys, null where there is none.
+const json& within(const json& value, std::initializer_list<const char*> keys);
 std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const std::string& where); // from 0 on
 inline constexpr std::int64_t max_size = std::int64_t{1} << 53; // integers above are not exact in JSON
 inline constexpr std::int64_t max_int = std::numeric_limits<int>::max();

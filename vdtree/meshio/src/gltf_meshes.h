@@ -1,9 +1,6 @@
 // A glTF file, opened: all of it as one mesh, or its meshes by themselves.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include <glm/mat3x3.hpp>
 
 #include "gltf_data.h"

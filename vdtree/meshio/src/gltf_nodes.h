@@ -1,14 +1,7 @@
 // The nodes of a glTF scene, with their places in the world.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <vector>
-
-#include <glm/mat4x4.hpp>
-
-#include "gltf_document.h"
+#include "gltf_data.h"
 
 namespace unseen::meshio::gltf {
 
@@ -29,5 +22,10 @@ std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t nod
 
 // Nodes with a mesh that are not shown, and are no other level of detail of one.
 std::uint64_t hidden_meshes(const json& document, const tinygltf::Model& model, const std::vector<ShownNode>& shown);
+
+inline constexpr const char* instancing_extension = "EXT_mesh_gpu_instancing";
+// Gives each instance a node of its own below the node that has them, so that all else sees only nodes. Values that
+// instances have beside their places are left out, with a warning.
+void expand_instances(json& document, const Buffers& buffers, std::vector<Message>& warnings);
 
 } // namespace unseen::meshio::gltf

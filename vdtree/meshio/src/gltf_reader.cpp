@@ -3,20 +3,15 @@
 // (gltf_data.h), so that files cannot make it allocate, decode images or touch the file system.
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <memory>
-#include <optional>
-#include <set>
-#include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"

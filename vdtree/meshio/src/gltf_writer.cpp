@@ -1,26 +1,27 @@
 #include "gltf_writer.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
 
 #ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER
 #include <meshoptimizer.h>
 #endif
 
-#include "file_output.h"
 #include "gltf_data.h"
+#include "mesh_writers.h"
 
 namespace unseen::meshio {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using vdtree::AtomicFile;
 using vdtree::Triangle;
 
 namespace {
@@ -65,8 +66,7 @@ template <class Number>
 void put(std::string& bytes, std::size_t at, double value) {
     constexpr double low = std::numeric_limits<Number>::lowest(), high = std::numeric_limits<Number>::max();
     const auto number = static_cast<Number>(std::lround(std::clamp(value, low, high)));
-    for (std::size_t i = 0; i < sizeof(Number); ++i) // little-endian
-        bytes[at + i] = static_cast<char>(static_cast<std::uint64_t>(number) >> (8 * i) & 0xFF);
+    std::memcpy(bytes.data() + at, &number, sizeof number);
 }
 
 } // namespace
@@ -101,7 +101,7 @@ GltfOrder optimized(std::span<const Triangle> triangles, std::size_t vertices) {
 #endif
 
 // With a stride: vertices, which may be compressed.
-std::size_t GltfFile::add_view(std::string_view bytes, std::size_t component_bytes, int target, std::size_t stride) {
+std::size_t GltfFile::add_view(std::string_view bytes, int target, std::size_t stride) {
     json view = {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", bytes.size()}};
     if (target != no_target) view["target"] = target;
     if (options_.meshopt && target != no_target) {
@@ -119,45 +119,41 @@ std::size_t GltfFile::add_view(std::string_view bytes, std::size_t component_byt
         view["byteOffset"] = unpacked_bytes_;
         unpacked_bytes_ += aligned(bytes.size());
         bytes = packed_.back();
-        component_bytes = 1;
     }
     if (stride > 0) view["byteStride"] = stride;
     views_.push_back(std::move(view));
-    pieces_.push_back({bytes, component_bytes});
+    pieces_.push_back(bytes);
     bytes_ += aligned(bytes.size());
     return views_.size() - 1;
 }
 
+std::size_t GltfFile::add_accessor(std::size_t view, int component_type, std::size_t count, const std::string& type) {
+    accessors_.push_back({{"bufferView", view}, {"componentType", component_type}, {"count", count}, {"type", type}});
+    return accessors_.size() - 1;
+}
+
 std::size_t GltfFile::add_vectors(std::span<const float> values, std::size_t components) {
     const std::size_t view =
-        add_view(bytes_of(values), sizeof(float), array_buffer, options_.meshopt ? components * sizeof(float) : 0);
-    accessors_.push_back({{"bufferView", view},
-                          {"componentType", float_component},
-                          {"count", values.size() / components},
-                          {"type", components == 1 ? "SCALAR" : "VEC" + std::to_string(components)}});
-    return accessors_.size() - 1;
+        add_view(bytes_of(values), array_buffer, options_.meshopt ? components * sizeof(float) : 0);
+    return add_accessor(view, float_component, values.size() / components,
+                        components == 1 ? "SCALAR" : text_of("VEC", components));
 }
 
 std::size_t GltfFile::add_packed(std::string bytes, std::size_t stride, std::size_t components, int component_type,
                                  bool normalized) {
-    packed_.push_back(std::move(bytes));
-    const std::string_view packed = packed_.back();
-    const std::size_t view = add_view(packed, 1, array_buffer, stride);
-    accessors_.push_back({{"bufferView", view},
-                          {"componentType", component_type},
-                          {"count", packed.size() / stride},
-                          {"type", "VEC" + std::to_string(components)}});
-    if (normalized) accessors_.back()["normalized"] = true;
+    const std::string_view packed = packed_.emplace_back(std::move(bytes));
+    const std::size_t accessor = add_accessor(add_view(packed, array_buffer, stride), component_type,
+                                              packed.size() / stride, text_of("VEC", components));
+    if (normalized) accessors_[accessor]["normalized"] = true;
     is_quantized_ = true;
-    return accessors_.size() - 1;
+    return accessor;
 }
 
 GltfGrid GltfFile::grid_for(glm::vec3 low, glm::vec3 high) const {
     GltfGrid grid;
     if (!options_.quantize) return grid;
-    double extent = 0;
-    for (int axis = 0; axis < 3; ++axis)
-        extent = std::max(extent, static_cast<double>(high[axis]) - static_cast<double>(low[axis]));
+    const glm::dvec3 size = glm::dvec3(high) - glm::dvec3(low);
+    const double extent = std::max({size.x, size.y, size.z});
     grid.origin = glm::dvec3(low);
     const double step = extent / grid_steps;
     if (std::isfinite(1 / step)) grid.step = step;
@@ -171,36 +167,29 @@ json GltfFile::transform_of(const GltfGrid& grid) {
 
 // The only accessor whose bounds glTF wants.
 std::size_t GltfFile::add_positions(std::span<const glm::vec3> positions, const GltfGrid& grid) {
+    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+    std::size_t accessor = 0;
     if (grid.is_used()) {
         constexpr std::size_t stride = 8; // three of 16 bits, in fours of bytes
         std::string bytes(positions.size() * stride, '\0');
-        std::array<double, 3> low, high;
-        low.fill(grid_steps), high.fill(0);
-        for (std::size_t i = 0; i < positions.size(); ++i)
-            for (int axis = 0; axis < 3; ++axis) {
-                const auto k = static_cast<std::size_t>(axis);
-                const double place = (static_cast<double>(positions[i][axis]) - grid.origin[axis]) / grid.step;
-                const double number = std::clamp(std::round(place), 0.0, grid_steps);
-                put<std::uint16_t>(bytes, i * stride + 2 * k, number);
-                low[k] = std::min(low[k], number), high[k] = std::max(high[k], number);
-            }
-        const std::size_t accessor = add_packed(std::move(bytes), stride, 3, unsigned_short_component, false);
-        for (std::size_t k = 0; k < 3; ++k) {
-            accessors_[accessor]["min"].push_back(static_cast<int>(low[k]));
-            accessors_[accessor]["max"].push_back(static_cast<int>(high[k]));
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+            const glm::dvec3 place = (glm::dvec3(positions[i]) - grid.origin) / grid.step;
+            const glm::dvec3 number = glm::clamp(glm::round(place), 0.0, grid_steps);
+            for (int k = 0; k < 3; ++k)
+                put<std::uint16_t>(bytes, i * stride + 2 * static_cast<std::size_t>(k), number[k]);
+            low = glm::min(low, number), high = glm::max(high, number);
         }
-        return accessor;
+        accessor = add_packed(std::move(bytes), stride, 3, unsigned_short_component, false);
+    } else {
+        for (const glm::vec3& p : positions) low = glm::min(low, glm::dvec3(p)), high = glm::max(high, glm::dvec3(p));
+        accessor = add_vectors(floats_of(positions), 3);
     }
-    glm::vec3 low = positions[0], high = low;
-    for (const glm::vec3& p : positions) {
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = std::min(low[axis], p[axis]);
-            high[axis] = std::max(high[axis], p[axis]);
-        }
-    }
-    const std::size_t accessor = add_vectors(floats_of(positions), 3);
-    accessors_[accessor]["min"] = {low.x, low.y, low.z};
-    accessors_[accessor]["max"] = {high.x, high.y, high.z};
+    const auto bounds = [&](const glm::dvec3& of) {
+        if (grid.is_used()) return json{static_cast<int>(of.x), static_cast<int>(of.y), static_cast<int>(of.z)};
+        return json{static_cast<float>(of.x), static_cast<float>(of.y), static_cast<float>(of.z)};
+    };
+    accessors_[accessor]["min"] = bounds(low);
+    accessors_[accessor]["max"] = bounds(high);
     return accessor;
 }
 
@@ -225,36 +214,26 @@ std::size_t GltfFile::add_attribute(const std::string& name, std::span<const flo
 }
 
 std::size_t GltfFile::add_indices(std::span<const Triangle> triangles) {
-    return add_view(bytes_of(triangles), sizeof(vdtree::Index), element_array_buffer);
+    return add_view(bytes_of(triangles), element_array_buffer);
 }
 
-std::size_t GltfFile::add_bytes(std::string_view bytes) { return add_view(bytes, 1, no_target); }
+std::size_t GltfFile::add_bytes(std::string_view bytes) { return add_view(bytes, no_target); }
 
 json GltfFile::primitive(const json& attributes, std::size_t index_view, std::uint64_t first_triangle,
                          std::uint64_t count) {
-    accessors_.push_back({{"bufferView", index_view},
-                          {"byteOffset", first_triangle * sizeof(Triangle)},
-                          {"componentType", unsigned_int_component},
-                          {"count", count * 3},
-                          {"type", "SCALAR"}});
-    return {{"attributes", attributes}, {"indices", accessors_.size() - 1}, {"mode", triangles_mode}};
+    const std::size_t indices = add_accessor(index_view, unsigned_int_component, count * 3, "SCALAR");
+    accessors_[indices]["byteOffset"] = first_triangle * sizeof(Triangle);
+    return {{"attributes", attributes}, {"indices", indices}, {"mode", triangles_mode}};
 }
 
 Result<void> GltfFile::write_data(const fs::path& file, std::string_view before) const {
-    Result<AtomicFile> target = AtomicFile::create(file);
-    if (!target) return target.error();
-    FileOutput out(std::move(*target));
-    out.text(before);
-    for (const Piece& piece : pieces_) {
-        if (std::endian::native == std::endian::little || piece.component_bytes == 1) {
-            out.text(piece.bytes);
-        } else {
-            for (std::size_t i = 0; i < piece.bytes.size(); i += piece.component_bytes)
-                for (std::size_t k = piece.component_bytes; k-- > 0;) out.text(piece.bytes.substr(i + k, 1));
+    return write_file(file, [&](FileOutput& out) {
+        out.text(before);
+        for (const std::string_view piece : pieces_) {
+            out.text(piece);
+            out.text(std::string(aligned(piece.size()) - piece.size(), '\0'));
         }
-        out.text(std::string(aligned(piece.bytes.size()) - piece.bytes.size(), '\0'));
-    }
-    return out.finish();
+    });
 }
 
 Result<void> GltfFile::write(const fs::path& file, json document) const {
@@ -292,11 +271,7 @@ Result<void> GltfFile::write(const fs::path& file, json document) const {
                                                     "': it is there already and belongs to something else; choose "
                                                     "another name."};
         if (const Result<void> written = write_data(data, {}); !written) return written;
-        Result<AtomicFile> target = AtomicFile::create(file);
-        if (!target) return target.error();
-        FileOutput out(std::move(*target));
-        out.text(text);
-        return out.finish();
+        return write_file(file, [&](FileOutput& out) { out.text(text); });
     }
     text.resize(aligned(text.size()), ' ');
     constexpr std::uint64_t headers = 12 + 8 + 8;
@@ -306,8 +281,8 @@ Result<void> GltfFile::write(const fs::path& file, json document) const {
                      "Cannot write '" + file.string() + "': it would exceed the 4 GiB of a GLB file; write PLY."};
     }
     const auto word = [](std::uint64_t value) {
-        std::string bytes;
-        for (int i = 0; i < 4; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xFF);
+        std::string bytes(4, '\0');
+        std::memcpy(bytes.data(), &value, bytes.size());
         return bytes;
     };
     return write_data(file, "glTF" + word(2) + word(total) + word(text.size()) + "JSON" + text + word(bytes_) +

@@ -2,14 +2,8 @@
 // written at the end.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <deque>
-#include <filesystem>
-#include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
@@ -63,18 +57,15 @@ public:
     Result<void> write(const std::filesystem::path& file, nlohmann::json document) const;
 
 private:
-    struct Piece {
-        std::string_view bytes;
-        std::size_t component_bytes;
-    };
-    std::size_t add_view(std::string_view bytes, std::size_t component_bytes, int target, std::size_t stride = 0);
+    std::size_t add_view(std::string_view bytes, int target, std::size_t stride = 0);
+    std::size_t add_accessor(std::size_t view, int component_type, std::size_t count, const std::string& type);
     std::size_t add_vectors(std::span<const float> values, std::size_t components);
     std::size_t add_packed(std::string bytes, std::size_t stride, std::size_t components, int component_type,
                            bool normalized);
     Result<void> write_data(const std::filesystem::path& file, std::string_view before) const;
 
     GltfOptions options_;
-    std::vector<Piece> pieces_;
+    std::vector<std::string_view> pieces_;
     std::deque<std::string> packed_; // what pieces refer to that was made here
     nlohmann::json views_ = nlohmann::json::array(), accessors_ = nlohmann::json::array();
     std::uint64_t bytes_ = 0, unpacked_bytes_ = 0;

@@ -1,13 +1,10 @@
 #include "kept_arrays.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
-#include <limits>
 #include <set>
+#include <utility>
 
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include "mesh_readers.h"
 #include "restore.h"
@@ -47,15 +44,8 @@ public:
         find_nearest();
     }
 
-    bool are_below(std::size_t vertices) const {
-        return std::all_of(supports_.begin(), supports_.end(), [&](const LeafRange& support) {
-            for (Index leaf = support.first; leaf < support.end; ++leaf)
-                if (tree_.source_vertices()[leaf] >= vertices) return false;
-            return true;
-        });
-    }
-
-    VertexArray gather(const VertexArray& array) const {
+    Result<VertexArray> gather(const VertexArray& array) const {
+        if (const auto sound = check_supports(tree_, supports_, array.size()); !sound) return sound.error();
         VertexArray out{array.name, array.type, array.components, array.role, {}};
         const std::size_t bytes = array.tuple_bytes();
         out.values.resize(supports_.size() * bytes);
@@ -153,10 +143,9 @@ Result<std::vector<VertexArray>> arrays_of_cut(const Cut& cut, const ExtractedMe
             out.push_back(array);
             continue;
         }
-        if (!source.are_below(array.size()))
-            return Error{ErrorCode::malformed_data,
-                         "The source document is not that of the tree's mesh. Build the tree again."};
-        out.push_back(source.gather(array));
+        auto gathered = source.gather(array);
+        if (!gathered) return gathered.error();
+        out.push_back(std::move(*gathered));
     }
     return out;
 }

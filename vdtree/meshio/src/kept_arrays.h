@@ -1,10 +1,7 @@
 // What readers do with arrays of vertices, and what writers need of those of a cut.
 #pragma once
 
-#include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>

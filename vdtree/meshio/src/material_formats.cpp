@@ -1,14 +1,12 @@
 #include "material_formats.h"
 
 #include <algorithm>
-#include <cmath>
-#include <map>
-#include <set>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <nlohmann/json.hpp>
+#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 
@@ -22,6 +20,7 @@
 namespace unseen::meshio {
 
 namespace fs = std::filesystem;
+using gltf::within;
 using nlohmann::json;
 
 namespace {
@@ -149,17 +148,6 @@ const json& at(const json& document, const char* array, const json& index) {
     if (!index.is_number_unsigned() || index.get<std::size_t>() >= elements.size()) return none;
     const json& element = elements[index.get<std::size_t>()];
     return element.is_object() ? element : none;
-}
-
-// The value at the end of a path of keys, or null.
-const json& within(const json& value, std::initializer_list<const char*> keys) {
-    static const json none;
-    const json* found = &value;
-    for (const char* key : keys) {
-        if (!found->is_object() || !found->contains(key)) return none;
-        found = &(*found)[key];
-    }
-    return *found;
 }
 
 double number_or(const json& value, double missing) { return value.is_number() ? value.get<double>() : missing; }

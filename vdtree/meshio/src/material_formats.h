@@ -1,9 +1,6 @@
 // Source documents of one format as those of the other, as far as it can say the same.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include <unseen/meshio/source_document.h>
 
 namespace unseen::meshio {

@@ -3,21 +3,8 @@
 
 #include <unseen/meshio/examine.h>
 
-#include "file_output.h"
-#include "formats.h"
-#include "mesh_readers.h"
+#include "mesh_writers.h"
 #include "text_scanner.h"
-
-#include <algorithm>
-#include <cerrno>
-#include <cmath>
-#include <cstdint>
-#include <cstdio>
-#include <cstring>
-#include <memory>
-#include <new>
-#include <optional>
-#include <stdexcept>
 
 namespace unseen::meshio {
 
@@ -25,10 +12,25 @@ namespace fs = std::filesystem;
 
 namespace {
 
+// ---- formats
+
+bool is_ply(std::string_view bytes) { return bytes.starts_with("ply") && bytes.size() > 3 && is_space(bytes[3]); }
+bool is_glb(std::string_view bytes) { return bytes.starts_with("glTF"); }
+
+constexpr Format formats[] = {
+    // name, endings, signature, reader, writer, values of vertices, materials
+    {"PLY", {".ply", ""}, is_ply, read_ply, write_ply, true, false},
+    {"OBJ", {".obj", ""}, nullptr, read_obj, write_obj, false, true},
+    {"glTF", {".glb", ".gltf"}, is_glb, read_gltf, write_gltf, false, true},
+    {"VTP", {".vtp", ""}, is_vtk_xml, read_vtp, write_vtp, true, false},
+    {"STL", {".stl", ""}, nullptr, read_stl, write_stl, false, false},
+    {"OFF", {".off", ""}, starts_with_off_keyword, read_off, write_off, false, false},
+};
+
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 
 const Format* format_by_signature(std::string_view bytes) {
-    for (const Format& format : formats())
+    for (const Format& format : formats)
         if (format.has_signature != nullptr && format.has_signature(bytes)) return &format;
     return nullptr;
 }
@@ -161,6 +163,22 @@ void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
 }
 
 } // namespace
+
+const Format* format_named(const std::filesystem::path& file) {
+    const std::string ending = lower_ending(file);
+    for (const Format& format : formats)
+        if (!ending.empty() && std::find(format.endings.begin(), format.endings.end(), ending) != format.endings.end())
+            return &format;
+    return nullptr;
+}
+
+std::vector<std::string> written_endings() {
+    std::vector<std::string> endings;
+    for (const Format& format : formats)
+        for (const std::string_view ending : format.endings)
+            if (!ending.empty()) endings.emplace_back(ending);
+    return endings;
+}
 
 ReadResult finish_reading(const MeshSource& source, ReadResult result) {
     settle_bad_parts(source, result);

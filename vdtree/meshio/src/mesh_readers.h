@@ -1,17 +1,12 @@
 // The readers behind read_mesh: one function a format, all from bytes in memory.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
 #include <new>
-#include <optional>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 #include <type_traits>
 
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/colour.h>

@@ -1,23 +1,18 @@
 // Writes meshes as PLY, OBJ, glTF, STL and OFF.
 #include "mesh_writers.h"
 
-#include "formats.h"
 #include "gltf_writer.h"
 #include "kept_arrays.h"
-#include "mesh_readers.h"
 #include "ply_slots.h"
 #include "value_types.h"
 
-#include <algorithm>
-#include <array>
-#include <cctype>
-#include <cmath>
-#include <limits>
 #include <map>
 #include <set>
-#include <vector>
+#include <utility>
 
-#include <nlohmann/json.hpp>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 namespace unseen::meshio {
 
@@ -129,20 +124,20 @@ private:
 };
 
 void write_ply_header(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, bool has_floats) {
-    const std::string real = has_floats ? "float" : "double";
     // Few programs read unsigned indices, so they are used only where needed.
     const bool needs_unsigned =
         mesh.positions.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
-    out.text("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.positions.size()) + "\n");
-    for (const char* name : {"x", "y", "z"}) out.text("property " + real + " " + name + "\n");
-    if (!mesh.normals.empty()) out.text("property float nx\nproperty float ny\nproperty float nz\n");
-    if (!mesh.colours.empty())
-        for (const char* name : {"red", "green", "blue", "alpha"})
-            out.text(std::string("property uchar ") + name + "\n");
-    if (!mesh.uvs.empty()) out.text("property float s\nproperty float t\n");
+    const auto properties = [&](const char* type, std::initializer_list<const char*> names) {
+        for (const char* name : names) out.text(text_of("property ", type, " ", name, "\n"));
+    };
+    out.text(text_of("ply\nformat binary_little_endian 1.0\nelement vertex ", mesh.positions.size(), "\n"));
+    properties(has_floats ? "float" : "double", {"x", "y", "z"});
+    if (!mesh.normals.empty()) properties("float", {"nx", "ny", "nz"});
+    if (!mesh.colours.empty()) properties("uchar", {"red", "green", "blue", "alpha"});
+    if (!mesh.uvs.empty()) properties("float", {"s", "t"});
     columns.write_header(out);
-    out.text("element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar " +
-             (needs_unsigned ? "uint" : "int") + " vertex_indices\nend_header\n");
+    out.text(text_of("element face ", mesh.triangles.size(), "\nproperty list uchar ", needs_unsigned ? "uint" : "int",
+                     " vertex_indices\nend_header\n"));
 }
 
 Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, const Progress& progress) {
@@ -154,25 +149,17 @@ Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumn
     const auto goes_on = [&](double items_done) { return !progress || progress(items_done / item_count, "writing"); };
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         if (i % items_a_report == 0 && !goes_on(static_cast<double>(i))) return cancelled();
-        for (int axis = 0; axis < 3; ++axis)
-            if (has_floats) out.binary(static_cast<float>(mesh.positions[i][axis]));
-            else out.binary(mesh.positions[i][axis]);
-        if (!mesh.normals.empty())
-            for (int axis = 0; axis < 3; ++axis) out.binary(mesh.normals[i][axis]);
-        if (!mesh.colours.empty()) {
-            for (int channel = 0; channel < 3; ++channel) out.binary(to_byte(linear_to_srgb(mesh.colours[i][channel])));
-            out.binary(to_byte(mesh.colours[i].a));
-        }
-        if (!mesh.uvs.empty()) {
-            out.binary(mesh.uvs[i].x);
-            out.binary(mesh.uvs[i].y);
-        }
+        if (has_floats) out.binary(glm::vec3(mesh.positions[i]));
+        else out.binary(mesh.positions[i]);
+        if (!mesh.normals.empty()) out.binary(mesh.normals[i]);
+        if (!mesh.colours.empty()) out.binary(encoded_bytes(mesh.colours[i]));
+        if (!mesh.uvs.empty()) out.binary(mesh.uvs[i]);
         columns.write_row(out, i);
     }
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         if (i % items_a_report == 0 && !goes_on(vertex_count + static_cast<double>(i))) return cancelled();
         out.binary(std::uint8_t{3});
-        for (const Index corner : mesh.triangles[i]) out.binary(corner);
+        out.binary(mesh.triangles[i]);
     }
     return {};
 }
@@ -211,32 +198,21 @@ void write_obj_corner(FileOutput& out, const MeshView& mesh, Index vertex) {
     out.number(number);
 }
 
-template <class Vector>
-void write_vector(FileOutput& out, const Vector& vector, int size) {
-    for (int i = 0; i < size; ++i) {
-        out.text(" ");
-        out.number(vector[i]);
-    }
-}
-
 void write_obj_vertices(FileOutput& out, const MeshView& mesh) {
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
         out.text("v");
-        write_vector(out, mesh.positions[i], 3);
-        if (!mesh.colours.empty()) {
-            const glm::vec4& c = mesh.colours[i];
-            write_vector(out, glm::vec3(linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b)), 3);
-        }
+        out.numbers(mesh.positions[i], 3);
+        if (!mesh.colours.empty()) out.numbers(encoded(mesh.colours[i]), 3);
         out.text("\n");
     }
     for (const glm::vec2& uv : mesh.uvs) {
         out.text("vt");
-        write_vector(out, uv, 2);
+        out.numbers(uv, 2);
         out.text("\n");
     }
     for (const glm::vec3& normal : mesh.normals) {
         out.text("vn");
-        write_vector(out, normal, 3);
+        out.numbers(normal, 3);
         out.text("\n");
     }
 }
@@ -252,12 +228,7 @@ void write_obj_to(FileOutput& out, const MeshView& mesh) {
             const bool is_material = change.range->kind == MeshRange::Kind::material;
             names[is_material ? "usemtl" : "g"] = change.starts ? one_line(change.range->name) : std::string();
         }
-        for (const auto& [keyword, name] : names) {
-            out.text(keyword);
-            out.text(" ");
-            out.text(name);
-            out.text("\n");
-        }
+        for (const auto& [keyword, name] : names) out.text(text_of(keyword, " ", name, "\n"));
         out.text("f");
         for (const Index corner : mesh.triangles[i]) write_obj_corner(out, mesh, corner);
         out.text("\n");
@@ -312,17 +283,11 @@ GltfFrame gltf_frame(const MeshView& mesh) {
     GltfFrame frame;
     if (are_floats(mesh)) return frame;
     frame.is_identity = false;
-    glm::dvec3 low = mesh.positions[0];
-    glm::dvec3 high = low;
-    for (const glm::dvec3& p : mesh.positions) {
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = std::min(low[axis], p[axis]);
-            high[axis] = std::max(high[axis], p[axis]);
-        }
-    }
+    glm::dvec3 low = mesh.positions[0], high = low;
+    for (const glm::dvec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
     frame.origin = low / 2.0 + high / 2.0; // halves first: the sum may overflow
-    double extent = 0.0;
-    for (int axis = 0; axis < 3; ++axis) extent = std::max(extent, high[axis] / 2.0 - low[axis] / 2.0);
+    const glm::dvec3 half = high / 2.0 - low / 2.0;
+    const double extent = std::max({half.x, half.y, half.z});
     // Well inside the range of float, and a power of two so that it costs no digits.
     constexpr double largest_plain = 1e30, smallest_plain = 1e-30;
     if (extent > largest_plain || (extent > 0.0 && extent < smallest_plain))
@@ -359,16 +324,20 @@ std::uint8_t to_byte(float channel) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
 }
 
+glm::vec4 encoded(const glm::vec4& c) { return {linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b), c.a}; }
+
+std::array<std::uint8_t, 4> encoded_bytes(const glm::vec4& colour) {
+    const glm::vec4 c = encoded(colour);
+    return {to_byte(c.r), to_byte(c.g), to_byte(c.b), to_byte(c.a)};
+}
+
 Result<void> write_ply(const MeshToWrite& to) {
     const PlyColumns columns(to.mesh, to.arrays, to.notes);
     return write_file(to.file, [&](FileOutput& out) { return write_ply_to(out, to.mesh, columns, to.progress); });
 }
 
 Result<void> write_obj(const MeshToWrite& to) {
-    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
-        write_obj_to(out, to.mesh);
-        return {};
-    });
+    return write_file(to.file, [&](FileOutput& out) { write_obj_to(out, to.mesh); });
 }
 
 Result<void> write_gltf(const MeshToWrite& to) {
@@ -418,43 +387,37 @@ Result<void> write_stl(const MeshToWrite& to) {
     if (!mesh.colours.empty() || !mesh.uvs.empty() || !mesh.normals.empty())
         to.notes.push_back(
             "STL has triangles alone: normals, colours and texture coordinates of vertices were left out.");
-    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+    return write_file(to.file, [&](FileOutput& out) {
         out.text(std::string("written by unseen") + std::string(63, ' '));
         out.binary(static_cast<std::uint32_t>(mesh.triangles.size()));
         for (const Triangle& t : mesh.triangles) {
             const glm::dvec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
             const glm::vec3 normal = unit(glm::vec3(glm::normalize(glm::cross(b - a, c - a))));
-            for (int k = 0; k < 3; ++k) out.binary(normal[k]);
-            for (const glm::dvec3& corner : {a, b, c})
-                for (int k = 0; k < 3; ++k) out.binary(static_cast<float>(corner[k]));
+            out.binary(normal);
+            for (const glm::dvec3& corner : {a, b, c}) out.binary(glm::vec3(corner));
             out.binary(std::uint16_t{0});
         }
-        return {};
     });
 }
 
 Result<void> write_off(const MeshToWrite& to) {
     const MeshView& mesh = to.mesh;
-    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
+    return write_file(to.file, [&](FileOutput& out) {
         const std::string keyword = std::string(mesh.uvs.empty() ? "" : "ST") + (mesh.colours.empty() ? "" : "C") +
                                     (mesh.normals.empty() ? "" : "N") + "OFF\n";
         out.text(keyword + std::to_string(mesh.positions.size()) + " " + std::to_string(mesh.triangles.size()) + " 0");
         for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
             out.text("\n");
-            write_vector(out, mesh.positions[v], 3);
-            if (!mesh.normals.empty()) write_vector(out, mesh.normals[v], 3);
-            if (!mesh.colours.empty()) {
-                const glm::vec4& c = mesh.colours[v];
-                write_vector(out, glm::vec4(linear_to_srgb(c.r), linear_to_srgb(c.g), linear_to_srgb(c.b), c.a), 4);
-            }
-            if (!mesh.uvs.empty()) write_vector(out, mesh.uvs[v], 2);
+            out.numbers(mesh.positions[v], 3);
+            if (!mesh.normals.empty()) out.numbers(mesh.normals[v], 3);
+            if (!mesh.colours.empty()) out.numbers(encoded(mesh.colours[v]), 4);
+            if (!mesh.uvs.empty()) out.numbers(mesh.uvs[v], 2);
         }
         for (const Triangle& triangle : mesh.triangles) {
             out.text("\n3");
-            write_vector(out, triangle, 3);
+            for (const Index corner : triangle) out.text(text_of(" ", corner));
         }
         out.text("\n");
-        return {};
     });
 }
 

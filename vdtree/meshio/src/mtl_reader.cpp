@@ -2,11 +2,9 @@
 #include "mtl_reader.h"
 #include "text_scanner.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <span>
 #include <unordered_set>
+#include <utility>
 
 namespace unseen::meshio {
 

@@ -1,10 +1,7 @@
 // Material libraries of Wavefront OBJ.
 #pragma once
 
-#include <set>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "named_files.h"
 

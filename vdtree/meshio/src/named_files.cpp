@@ -1,6 +1,9 @@
-#include "named_files.h"
-
 #include <algorithm>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "named_files.h"
 
 namespace unseen::meshio {
 

@@ -1,15 +1,9 @@
 // The files that a mesh file names: images and material libraries.
 #pragma once
 
-#include <filesystem>
 #include <map>
-#include <memory>
-#include <optional>
 #include <set>
-#include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "mesh_readers.h"
 

@@ -6,14 +6,11 @@
 #include "text_scanner.h"
 #include "weld.h"
 
-#include <algorithm>
 #include <array>
-#include <limits>
-#include <map>
-#include <memory>
-#include <set>
 #include <unordered_map>
-#include <vector>
+#include <utility>
+
+#include <glm/vec3.hpp>
 
 namespace unseen::meshio {
 

@@ -1,11 +1,11 @@
 // OFF: Geomview's object file format, ASCII, with its prefixes ST, C and N.
+#include <array>
+#include <utility>
+
+#include <glm/vec3.hpp>
+
 #include "face_collector.h"
 #include "text_scanner.h"
-
-#include <algorithm>
-#include <array>
-#include <limits>
-#include <vector>
 
 namespace unseen::meshio {
 

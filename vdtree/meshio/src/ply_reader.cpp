@@ -1,19 +1,12 @@
 // PLY: G. Turk, The PLY polygon file format (1994). ASCII and both byte orders; any properties in any order.
+#include <utility>
+
 #include "face_collector.h"
 #include "kept_arrays.h"
 #include "mesh_readers.h"
 #include "ply_slots.h"
 #include "text_scanner.h"
 #include "value_types.h"
-
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <limits>
-#include <optional>
-#include <type_traits>
-#include <vector>
 
 namespace unseen::meshio {
 

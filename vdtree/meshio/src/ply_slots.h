@@ -1,7 +1,6 @@
 // Names in PLY: of types, and of those properties of vertices that have a meaning.
 #pragma once
 
-#include <cstdint>
 #include <string_view>
 #include <utility>
 

@@ -1,6 +1,7 @@
 // Polygons as triangles.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -23,12 +24,6 @@ using vdtree::Triangle;
 // concave polygons are fanned and counted. One object for each file, used from one thread.
 class PolygonTriangulator {
 public:
-    // Calls add with three positions in `corners` for each triangle. `positions` holds the corners' positions.
-    template <class Add>
-    void triangulate(std::span<const glm::dvec3> positions, Add&& add) {
-        for (const Triangle& corners : cut(positions)) add(corners);
-    }
-
     // The triangles as indices into `positions`; valid until the next call.
     std::span<const Triangle> cut(std::span<const glm::dvec3> positions);
 

@@ -2,15 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <map>
-#include <optional>
-#include <string>
 #include <tuple>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
 
 #include "gltf_document.h"
 #include "mesh_readers.h"
@@ -33,16 +34,10 @@ public:
         find_kinds();
     }
 
-    // Whether the vertices of the input that the tree names are there.
-    bool is_sound() const {
-        return std::all_of(supports_.begin(), supports_.end(), [&](const LeafRange& support) {
-            for (Index leaf = support.first; leaf < support.end; ++leaf)
-                if (tree_.source_vertices()[leaf] >= document_.vertex_parts.size()) return false;
-            return true;
-        });
-    }
-
-    std::vector<RestoredPart> run() {
+    Result<std::vector<RestoredPart>> run() {
+        const std::size_t vertices =
+            extracted_.source_triangles.size() == extracted_.mesh.triangles.size() ? document_.vertex_parts.size() : 0;
+        if (const auto sound = check_supports(tree_, supports_, vertices); !sound) return sound.error();
         std::map<std::uint32_t, RestoredPart> parts;
         std::size_t run = 0;
         const auto& runs = document_.runs;
@@ -176,6 +171,15 @@ std::vector<LeafRange> supports_of(const Cut& cut, const ExtractedMesh& extracte
     return supports;
 }
 
+Result<void> check_supports(const VertexTree& tree, std::span<const LeafRange> supports, std::size_t vertices) {
+    for (const LeafRange& support : supports)
+        for (Index leaf = support.first; leaf < support.end; ++leaf)
+            if (tree.source_vertices()[leaf] >= vertices)
+                return Error{ErrorCode::malformed_data,
+                             "The source document is not that of the tree's mesh. Build the tree again."};
+    return {};
+}
+
 NodeFrame frame_of(const glm::dmat4& to_world) {
     NodeFrame frame;
     glm::dmat3 linear(to_world);
@@ -200,26 +204,23 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document) {
     std::vector<std::string> uvs(document.parts.size(), gltf::uv_attribute(0));
     if (document.format != SourceDocument::Format::gltf) return uvs;
     const gltf::json source = gltf::parse_json(document.json);
-    const gltf::json& meshes = gltf::array_of(source, "meshes");
-    const gltf::json& materials = gltf::array_of(source, "materials");
     for (std::size_t i = 0; i < uvs.size(); ++i) {
-        const gltf::json& primitive = meshes.at(static_cast<std::size_t>(document.parts[i].mesh))
-                                          .at("primitives")
-                                          .at(static_cast<std::size_t>(document.parts[i].primitive));
-        const gltf::json* material = gltf::member(primitive, "material");
-        if (material == nullptr) continue;
-        uvs[i] = gltf::uv_attribute(gltf::colour_uv_set(materials.at(material->get<std::size_t>())).value_or(0));
+        const auto element = [](const gltf::json& array, std::int32_t number) -> const gltf::json& {
+            return array.at(static_cast<std::size_t>(number));
+        };
+        const Part& part = document.parts[i];
+        const gltf::json& mesh = element(gltf::array_of(source, "meshes"), part.mesh);
+        const gltf::json& material = gltf::within(element(mesh.at("primitives"), part.primitive), {"material"});
+        if (material.is_null()) continue;
+        const gltf::json& used = gltf::array_of(source, "materials").at(material.get<std::size_t>());
+        uvs[i] = gltf::uv_attribute(gltf::colour_uv_set(used).value_or(0));
     }
     return uvs;
 }
 
 Result<std::vector<RestoredPart>> restore(const Cut& cut, const ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs) {
-    Restorer restorer(cut, extracted, document, uvs);
-    if (!restorer.is_sound() || extracted.source_triangles.size() != extracted.mesh.triangles.size())
-        return Error{ErrorCode::malformed_data,
-                     "The source document is not that of the tree's mesh. Build the tree again."};
-    return restorer.run();
+    return Restorer(cut, extracted, document, uvs).run();
 }
 
 } // namespace unseen::meshio

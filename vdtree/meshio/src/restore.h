@@ -1,10 +1,7 @@
 // A cut taken apart into the parts of its source document, each with the attributes that it had there.
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include <unseen/meshio/source_document.h>
@@ -18,6 +15,9 @@ struct LeafRange {
 };
 // By vertex. Cost: the tree's leaves.
 std::vector<LeafRange> supports_of(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted);
+
+// Fails if the vertices of the input that they stand for are not all below a number.
+Result<void> check_supports(const vdtree::VertexTree& tree, std::span<const LeafRange> supports, std::size_t vertices);
 
 struct RestoredPart {
     std::uint32_t part = 0;

@@ -1,19 +1,18 @@
 #include <unseen/meshio/scene_file.h>
 
-#include <algorithm>
-#include <cctype>
-#include <cmath>
-#include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 
 #include "file_output.h"
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"
+#include "text_scanner.h"
 
 namespace unseen::meshio {
 
@@ -21,6 +20,7 @@ namespace fs = std::filesystem;
 using gltf::json;
 using gltf::member;
 using gltf::numbered;
+using gltf::within;
 
 namespace {
 
@@ -35,36 +35,28 @@ bool is_finite_matrix(const glm::dmat4& m) {
     return true;
 }
 
-const json* object_at(const json* in, const char* key) {
-    const json* value = in != nullptr && in->is_object() ? member(*in, key) : nullptr;
-    return value != nullptr && value->is_object() ? value : nullptr;
-}
-
 std::string name_in(const json& object) {
-    const json* name = member(object, "name");
-    return name != nullptr && name->is_string() ? name->get<std::string>() : std::string();
+    const json& name = within(object, {"name"});
+    return name.is_string() ? name.get<std::string>() : std::string();
 }
 
-bool is_background_name(const std::string& name) {
+bool is_background_name(std::string_view name) {
     constexpr std::string_view mark = "background";
-    if (name.size() < mark.size()) return false;
-    for (std::size_t i = 0; i < mark.size(); ++i)
-        if (std::tolower(static_cast<unsigned char>(name[i])) != mark[i]) return false;
-    return name.size() == mark.size() || !std::isalpha(static_cast<unsigned char>(name[mark.size()]));
+    return equals_ignoring_case(name.substr(0, mark.size()), mark) &&
+           (name.size() == mark.size() || !std::isalpha(static_cast<unsigned char>(name[mark.size()])));
 }
 
-// True, false, or nothing is said.
-bool is_marked(const json& node, const std::string& where) {
-    const json* mark = object_at(object_at(&node, "extras"), "unseen");
-    const json* value = mark != nullptr ? member(*mark, "background") : nullptr;
-    if (value == nullptr) return false;
-    if (!value->is_boolean()) fail(where, ": extras.unseen.background should be true or false; correct it.");
-    return value->get<bool>();
+// Whether an object of the extras says so.
+bool says(const json& extras, const char* key, const std::string& where) {
+    const json* said = extras.is_object() ? member(extras, key) : nullptr;
+    if (said == nullptr) return false;
+    if (!said->is_boolean()) fail(where, ".", key, " should be true or false; correct it.");
+    return said->get<bool>();
 }
 
 double number_in(const json& object, const char* key, double missing, double low, double high,
                  const std::string& where) {
-    const json* value = member(object, key);
+    const json* value = object.is_object() ? member(object, key) : nullptr;
     if (value == nullptr) return missing;
     const double number = value->is_number() ? value->get<double>() : std::nan("");
     if (!(number >= low && number <= high))
@@ -93,7 +85,8 @@ public:
             const json& node = gltf::array_of(document_, "nodes")[placed.node];
             const std::string where = quoted(numbered("node", placed.node), name_in(node));
             is_background[i] = (placed.parent != gltf::no_parent && is_background[placed.parent]) ||
-                               is_background_name(name_in(node)) || is_marked(node, where);
+                               is_background_name(name_in(node)) ||
+                               says(within(node, {"extras", "unseen"}), "background", where + ": extras.unseen");
             contents_.is_scene = contents_.is_scene || is_background[i];
             const auto mesh = gltf::mesh_of(model_, placed.node);
             if ((mesh || has_camera(node) || light_of(node)) && !is_finite_matrix(placed.to_world))
@@ -131,8 +124,8 @@ private:
     }
 
     static const json* light_of(const json& node) {
-        const json* extension = object_at(object_at(&node, "extensions"), lights_extension);
-        return extension != nullptr ? member(*extension, "light") : nullptr;
+        const json& extension = within(node, {"extensions", lights_extension});
+        return extension.is_object() ? member(extension, "light") : nullptr;
     }
     static bool has_camera(const json& node) { return member(node, "camera") != nullptr; }
 
@@ -145,26 +138,16 @@ private:
         return array[i];
     }
 
-    bool says_casts_shadow(const json& of, const std::string& where) const {
-        const json* extras = object_at(&of, "extras");
-        const json* said = extras != nullptr ? member(*extras, "casts_shadow") : nullptr;
-        if (said == nullptr) return false;
-        if (!said->is_boolean()) fail(where, ": extras.casts_shadow should be true or false; correct it.");
-        return said->get<bool>();
-    }
-
     void add_light(const json& node, const glm::dmat4& to_world, const std::string& of_node) {
         const json* index = light_of(node);
         if (index == nullptr) return;
-        const json* extension = object_at(object_at(&document_, "extensions"), lights_extension);
-        static const json none = json::array();
+        const json& extension = within(document_, {"extensions", lights_extension});
         const json& light =
-            element(extension != nullptr ? gltf::array_of(*extension, "lights") : none, *index, "light", of_node);
+            element(extension.is_object() ? gltf::array_of(extension, "lights") : extension, *index, "light", of_node);
         const std::string where = of_node + ": its light";
         SceneLight read;
         read.name = name_in(light);
-        const json* type = member(light, "type");
-        const std::string kind = type != nullptr && type->is_string() ? type->get<std::string>() : std::string();
+        const json& kind = within(light, {"type"});
         if (kind == "point") read.kind = SceneLight::Kind::point;
         else if (kind == "spot") read.kind = SceneLight::Kind::spot;
         else if (kind != "directional") fail(where, " is neither directional, point nor spot; correct its type.");
@@ -185,17 +168,16 @@ private:
         read.position = glm::dvec3(to_world[3]);
         if (read.kind != SceneLight::Kind::point) read.direction = unit(-glm::dvec3(to_world[2]), where);
         if (read.kind == SceneLight::Kind::spot) {
-            const json* spot = object_at(&light, "spot");
-            static const json usual = json::object();
+            const json& spot = within(light, {"spot"});
             constexpr double right_angle = std::numbers::pi / 2 + 1e-6; // rounded up from single floats
-            read.inner_radians = number_in(spot ? *spot : usual, "innerConeAngle", 0, 0, right_angle, where);
-            read.outer_radians =
-                number_in(spot ? *spot : usual, "outerConeAngle", usual_outer_radians, 0, right_angle, where);
+            read.inner_radians = number_in(spot, "innerConeAngle", 0, 0, right_angle, where);
+            read.outer_radians = number_in(spot, "outerConeAngle", usual_outer_radians, 0, right_angle, where);
             read.outer_radians = std::min(read.outer_radians, std::numbers::pi / 2);
             if (!(read.inner_radians < read.outer_radians))
                 fail(where, ": its innerConeAngle should be less than its outerConeAngle; correct it.");
         }
-        read.casts_shadow = says_casts_shadow(light, where) || says_casts_shadow(node, of_node);
+        read.casts_shadow = says(within(light, {"extras"}), "casts_shadow", where + ": extras") ||
+                            says(within(node, {"extras"}), "casts_shadow", of_node + ": extras");
         contents_.lights.push_back(std::move(read));
     }
 
@@ -204,18 +186,17 @@ private:
         if (index == nullptr) return;
         const json& camera = element(gltf::array_of(document_, "cameras"), *index, "camera", of_node);
         const std::string where = of_node + ": its camera";
-        const json* type = member(camera, "type");
-        if (type != nullptr && *type == "orthographic") {
+        if (within(camera, {"type"}) == "orthographic") {
             ++orthographic_;
             return;
         }
-        const json* perspective = object_at(&camera, "perspective");
-        if (perspective == nullptr || member(*perspective, "yfov") == nullptr)
+        const json& perspective = within(camera, {"perspective"});
+        if (!perspective.is_object() || member(perspective, "yfov") == nullptr)
             fail(where, " has no perspective with a yfov; correct it.");
         constexpr double least = 1e-5, most = std::numbers::pi - 1e-3; // radians
         SceneCamera read;
         read.name = name_in(camera).empty() ? name_in(node) : name_in(camera);
-        read.fov_y_degrees = number_in(*perspective, "yfov", 1, least, most, where) * (180 / std::numbers::pi);
+        read.fov_y_degrees = number_in(perspective, "yfov", 1, least, most, where) * (180 / std::numbers::pi);
         read.eye = glm::dvec3(to_world[3]);
         read.forward = unit(-glm::dvec3(to_world[2]), where);
         const glm::dvec3 up = unit(glm::dvec3(to_world[1]), where);
@@ -229,13 +210,13 @@ private:
     }
 
     void read_light_settings() {
-        const json* unseen = object_at(object_at(&document_, "extras"), "unseen");
-        if (unseen == nullptr) return;
+        const json& unseen = within(document_, {"extras", "unseen"});
         constexpr double largest = 1e12;
         const std::string where = "extras.unseen";
-        if (member(*unseen, "exposure") != nullptr)
-            contents_.exposure = number_in(*unseen, "exposure", 1, 1 / largest, largest, where);
-        if (member(*unseen, "ambient") != nullptr) contents_.ambient = number_in(*unseen, "ambient", 0, 0, 1, where);
+        if (unseen.is_object() && member(unseen, "exposure") != nullptr)
+            contents_.exposure = number_in(unseen, "exposure", 1, 1 / largest, largest, where);
+        if (unseen.is_object() && member(unseen, "ambient") != nullptr)
+            contents_.ambient = number_in(unseen, "ambient", 0, 0, 1, where);
     }
 
     void tell() {

@@ -1,25 +1,19 @@
 // Values whose type a file tells.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
-#include <limits>
-#include <span>
-#include <string_view>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include <unseen/meshio/source_document.h>
 
 #include "text_scanner.h"
 
 namespace unseen::meshio {
+
+static_assert(std::endian::native == std::endian::little, "Files are written as numbers lie in memory.");
 
 // Calls f(std::type_identity<T>) with the type of the values.
 template <class F>

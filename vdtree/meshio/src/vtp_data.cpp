@@ -1,10 +1,5 @@
 #include "vtp_data.h"
 
-#include <algorithm>
-#include <array>
-#include <cstring>
-#include <span>
-
 #include <zlib.h>
 
 #include "mesh_readers.h"

@@ -4,12 +4,9 @@
 
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <string>
 #include <string_view>
-#include <vector>
+#include <utility>
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/internal/budget.h>

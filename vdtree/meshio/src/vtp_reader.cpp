@@ -1,13 +1,10 @@
 // VTK's XML format for polygons: VTK File Formats, https://docs.vtk.org, "XML File Formats". What lies raw behind the
 // XML makes the file no XML, so it is cut off first.
-#include <algorithm>
-#include <limits>
 #include <map>
-#include <optional>
 #include <set>
-#include <string>
-#include <string_view>
-#include <vector>
+#include <utility>
+
+#include <glm/vec3.hpp>
 
 #include <pugixml.hpp>
 

@@ -1,11 +1,9 @@
 // VTK's polygons in its XML format: VTK File Formats, https://docs.vtk.org, "XML File Formats".
-#include <algorithm>
-#include <cstdint>
 #include <functional>
-#include <limits>
 #include <set>
-#include <string>
-#include <vector>
+#include <utility>
+
+#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 
@@ -127,9 +125,9 @@ private:
 
     std::string array(ValueType type, const std::string& name, std::uint32_t components, std::size_t tuples,
                       std::function<void()> write) {
-        const std::string xml = std::string("        <DataArray type=\"") + vtp_name(type) + "\" Name=\"" +
-                                xml_text(name) + "\" NumberOfComponents=\"" + std::to_string(components) +
-                                "\" format=\"appended\" offset=\"" + std::to_string(offset_) + "\"/>\n";
+        const std::string xml =
+            text_of("        <DataArray type=\"", vtp_name(type), "\" Name=\"", xml_text(name),
+                    "\" NumberOfComponents=\"", components, "\" format=\"appended\" offset=\"", offset_, "\"/>\n");
         blocks_.push_back({tuples * components * byte_size(type), std::move(write)});
         offset_ += sizeof(std::uint64_t) + blocks_.back().bytes;
         return xml;
@@ -140,26 +138,19 @@ private:
         else out_.binary(static_cast<std::int32_t>(value));
     }
     void put(const VertexArray& array) {
-        with_type(array.type, [&](auto tag) {
-            using T = typename decltype(tag)::type;
-            for (std::size_t at = 0; at < array.values.size(); at += sizeof(T))
-                out_.binary(load_value<T>(array.values.data() + at));
-        });
+        out_.text({reinterpret_cast<const char*>(array.values.data()), array.values.size()});
     }
-    template <class Vector>
-    void put_all(std::span<const Vector> vectors) {
-        for (const Vector& vector : vectors)
-            for (int k = 0; k < Vector::length(); ++k) out_.binary(vector[k]);
+    void put_all(const auto& vectors) {
+        for (const auto& vector : vectors) out_.binary(vector);
     }
     void put_positions(bool has_floats) {
         if (!has_floats) return put_all(mesh_.positions);
-        for (const glm::dvec3& p : mesh_.positions)
-            for (int k = 0; k < 3; ++k) out_.binary(static_cast<float>(p[k]));
+        for (const glm::dvec3& p : mesh_.positions) out_.binary(glm::vec3(p));
     }
     void put_colours(std::uint32_t components) {
         for (const glm::vec4& colour : mesh_.colours) {
-            for (int k = 0; k < 3; ++k) out_.binary(to_byte(linear_to_srgb(colour[k])));
-            if (components == 4) out_.binary(to_byte(colour.a));
+            const auto bytes = encoded_bytes(colour);
+            out_.text({reinterpret_cast<const char*>(bytes.data()), components});
         }
     }
 
@@ -172,10 +163,8 @@ private:
 } // namespace
 
 Result<void> write_vtp(const MeshToWrite& to) {
-    return write_file(to.file, [&](FileOutput& out) -> Result<void> {
-        VtpWriter(out, to.mesh).write(point_data_of(to.mesh, to.arrays));
-        return {};
-    });
+    return write_file(to.file,
+                      [&](FileOutput& out) { VtpWriter(out, to.mesh).write(point_data_of(to.mesh, to.arrays)); });
 }
 
 } // namespace unseen::meshio

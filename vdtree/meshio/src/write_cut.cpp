@@ -3,16 +3,15 @@
 
 #include <algorithm>
 #include <map>
-#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include <unseen/meshio/scene_file.h>
 
-#include "formats.h"
 #include "kept_arrays.h"
 #include "material_formats.h"
+#include "mesh_writers.h"
 #include "restore.h"
 
 namespace unseen::meshio {
@@ -164,10 +163,7 @@ private:
         if (!values) return 0;
         for (std::size_t i = 0; i < values->size(); i += components) {
             out_.text(keyword);
-            for (std::size_t k = 0; k < components; ++k) {
-                out_.text(" ");
-                out_.number((*values)[i + k]);
-            }
+            out_.numbers(&(*values)[i], static_cast<int>(components));
             out_.text("\n");
         }
         return std::exchange(count, count + values->size() / components) + 1;

@@ -1,11 +1,6 @@
 // What writers of cuts share.
 #pragma once
 
-#include <filesystem>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include <unseen/meshio/source_document.h>
 
 #include "gltf_document.h"

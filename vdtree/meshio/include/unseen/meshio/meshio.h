@@ -17,7 +17,7 @@
 //     OFF          rw    -       rw       rw       rw           -          -          -
 //
 // (1) objects and groups. (2) Facets' normals are read if vertices are not welded, and written as computed.
-// A new format is a reader, a writer and a line of the table in src/formats.cpp.
+// A new format is a reader, a writer and a line of the table in src/mesh_file.cpp.
 #pragma once
 
 #include <unseen/meshio/examine.h>

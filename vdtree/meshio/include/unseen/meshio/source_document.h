@@ -122,9 +122,6 @@ struct SourceDocument {
     std::vector<Channel> channels = {};
     std::vector<std::uint32_t> vertex_parts = {}; // by vertex of the mesh: a part that uses it
     std::vector<VertexArray> arrays = {};         // all as long as the mesh has vertices; names are unique
-
-    // The part of a triangle of the mesh. Precondition: there are runs.
-    std::uint32_t part_of(std::uint64_t triangle) const;
 };
 
 // As bytes that unpack() takes; docs/file-format.md describes them.
