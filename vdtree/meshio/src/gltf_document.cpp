@@ -4,6 +4,8 @@
 
 #include <set>
 
+#include <unseen/meshio/scene_file.h>
+
 #include "gltf_nodes.h"
 #include "kept_arrays.h"
 #include "text_scanner.h"
