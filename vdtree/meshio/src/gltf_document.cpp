@@ -168,9 +168,8 @@ public:
         check_version();
         copy_array("bufferViews", "buffer view", [&](const json& in, json& out) {
             integer(in, out, "buffer", max_int, true);
-            integer(in, out, "byteOffset", max_size, false);
-            integer(in, out, "byteLength", max_size, true);
-            integer(in, out, "byteStride", max_size, false);
+            for (const char* key : {"byteOffset", "byteLength", "byteStride"})
+                integer(in, out, key, max_size, std::string_view(key) == "byteLength");
         });
         copy_array("accessors", "accessor", [&](const json& in, json& out) { accessor(in, out); });
         copy_array("materials", "material", [&](const json& in, json& out) { name(in, out); });
@@ -234,15 +233,16 @@ private:
     }
 
     void name(const json& in, json& out) const {
-        if (const json* value = member(in, "name"); value != nullptr && value->is_string()) out["name"] = *value;
+        if (const json& value = within(in, {"name"}); value.is_string()) out["name"] = value;
     }
 
     // More sets of coordinates and colours are found in attacks, not in meshes.
     static bool is_read(std::string_view attribute) {
-        constexpr std::string_view read[] = {"POSITION",   "NORMAL",     "TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2",
-                                             "TEXCOORD_3", "TEXCOORD_4", "TEXCOORD_5", "TEXCOORD_6", "TEXCOORD_7",
-                                             "COLOR_0",    "COLOR_1",    "COLOR_2",    "COLOR_3"};
-        return std::find(std::begin(read), std::end(read), attribute) != std::end(read);
+        const auto is_set = [&](std::string_view prefix, char last) {
+            return attribute.size() == prefix.size() + 1 && attribute.starts_with(prefix) && attribute.back() >= '0' &&
+                   attribute.back() <= last;
+        };
+        return attribute == "POSITION" || attribute == "NORMAL" || is_set("TEXCOORD_", '7') || is_set("COLOR_", '3');
     }
 
     const json& object(const json& in, const char* key) const {
@@ -256,11 +256,11 @@ private:
         integer(in, out, "byteOffset", max_size, false);
         integer(in, out, "componentType", max_int, true);
         integer(in, out, "count", max_size, true);
-        const json* type = member(in, "type");
-        if (type == nullptr || !type->is_string()) fail(where_, " has no type; correct the JSON.");
-        out["type"] = *type;
-        if (const json* normalized = member(in, "normalized"); normalized != nullptr && normalized->is_boolean())
-            out["normalized"] = *normalized;
+        const json& type = within(in, {"type"});
+        if (!type.is_string()) fail(where_, " has no type; correct the JSON.");
+        out["type"] = type;
+        if (const json& normalized = within(in, {"normalized"}); normalized.is_boolean())
+            out["normalized"] = normalized;
         if (member(in, "sparse") == nullptr) return;
         const json& sparse = object(in, "sparse");
         json copied;
@@ -281,9 +281,7 @@ private:
         for (const json& primitive : array_of(in, "primitives")) {
             if (!primitive.is_object()) fail(where_, " has a primitive that is no object; correct the JSON.");
             json copied = json::object();
-            integer(primitive, copied, "indices", max_int, false);
-            integer(primitive, copied, "material", max_int, false);
-            integer(primitive, copied, "mode", max_int, false);
+            for (const char* key : {"indices", "material", "mode"}) integer(primitive, copied, key, max_int, false);
             json& attributes = copied["attributes"] = json::object();
             const json& attributes_in = object(primitive, "attributes");
             refuse_draco(primitive, attributes_in);
@@ -392,8 +390,7 @@ std::set<std::string> unknown_required(const json& document) {
     for (const json& extension : array_of(document, "extensionsRequired")) {
         if (!extension.is_string()) continue;
         const auto& required = extension.get_ref<const std::string&>();
-        if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
-            std::end(unsupported_extensions))
+        if (std::ranges::find(unsupported_extensions, required) != std::end(unsupported_extensions))
             fail("it needs the extension ", required, ", which is not read; export it without.");
         if (required == meshopt_extension && !has_meshoptimizer())
             fail("it needs the extension ", required,
@@ -455,13 +452,11 @@ json kept_mesh(json mesh) {
 
 json kept_image(json image) {
     image.erase("bufferView");
-    if (const json* uri = member(image, "uri"); uri != nullptr && uri->is_string()) {
-        const auto& text = uri->get_ref<const std::string&>();
-        if (text.starts_with("data:")) {
-            if (!image.contains("mimeType")) image["mimeType"] = text.substr(5, text.find_first_of(";,") - 5);
-            image.erase("uri");
-        }
-    }
+    const json& uri = within(image, {"uri"});
+    const std::string text = uri.is_string() ? uri.get<std::string>() : std::string();
+    if (!text.starts_with("data:")) return image;
+    if (!image.contains("mimeType")) image["mimeType"] = text.substr(5, text.find_first_of(";,") - 5);
+    image.erase("uri");
     return image;
 }
 

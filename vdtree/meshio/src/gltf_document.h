@@ -24,6 +24,18 @@ inline constexpr const char* wrong_type =
 
 std::string numbered(const char* what, std::size_t index); // "buffer 3"
 
+// False if the value is not an array of as many numbers, each in the range.
+template <class Vector>
+bool numbers_in(const json& values, double low, double high, Vector& to) {
+    bool is_valid = values.is_array() && values.size() == static_cast<std::size_t>(Vector::length());
+    for (int i = 0; is_valid && i < Vector::length(); ++i) {
+        const json& value = values[static_cast<std::size_t>(i)];
+        is_valid = value.is_number() && value.get<double>() >= low && value.get<double>() <= high;
+        if (is_valid) to[i] = value.get<typename Vector::value_type>();
+    }
+    return is_valid;
+}
+
 struct Container {
     std::string_view json_text;
     std::optional<std::string_view> bin;

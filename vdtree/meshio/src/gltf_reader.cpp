@@ -96,10 +96,9 @@ private:
                  " bufferViews; correct the JSON.");
         const auto number = [&](const char* key, std::int64_t missing) {
             const json* value = member(views_[index], key);
-            if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
             const std::string view = numbered("bufferViews", index);
-            if (value == nullptr) fail(view, " has no ", key, "; correct the JSON.");
-            return static_cast<std::size_t>(to_integer_in_range(*value, max_size, view + ": " + key));
+            if (value == nullptr && missing < 0) fail(view, " has no ", key, "; correct the JSON.");
+            return static_cast<std::size_t>(value ? to_integer_in_range(*value, max_size, view + ": " + key) : missing);
         };
         const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
                           length = number("byteLength", -1);
@@ -159,12 +158,8 @@ private:
 
     glm::vec4 colour(const json& values) const {
         glm::vec4 colour(1);
-        bool is_valid = values.is_array() && values.size() == 4;
-        for (std::size_t i = 0; is_valid && i < 4; ++i) {
-            is_valid = values[i].is_number() && values[i].get<double>() >= 0 && values[i].get<double>() <= 1;
-            if (is_valid) colour[static_cast<int>(i)] = values[i].get<float>();
-        }
-        if (!is_valid) fail(where_, ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
+        if (!numbers_in(values, 0, 1, colour))
+            fail(where_, ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
         return colour;
     }
 
@@ -213,12 +208,12 @@ private:
 
     // KHR_texture_transform: scaled, turned and moved.
     UvMap uv_map(const json& transform) const {
-        const auto numbers = [&](const char* key, glm::dvec2 missing) {
+        constexpr double any = std::numeric_limits<double>::infinity();
+        const auto numbers = [&](const char* key, glm::dvec2 value) {
             const json* values = member(transform, key);
-            if (values == nullptr) return missing;
-            if (!values->is_array() || values->size() != 2 || !(*values)[0].is_number() || !(*values)[1].is_number())
+            if (values != nullptr && !numbers_in(*values, -any, any, value))
                 fail(where_, ": the ", key, " of its texture should be 2 numbers; correct it.");
-            return glm::dvec2((*values)[0].get<double>(), (*values)[1].get<double>());
+            return value;
         };
         const json* rotation = member(transform, "rotation");
         if (rotation != nullptr && !rotation->is_number())
@@ -444,13 +439,9 @@ private:
             return;
         }
         const bool is_colour = attribute.starts_with("COLOR_"), is_normal = attribute == "NORMAL";
-        const auto values = accessors_.vectors(accessor,
-                                               is_colour   ? 0
-                                               : is_normal ? 3
-                                                           : 2,
-                                               is_colour   ? "colours"
-                                               : is_normal ? "normals"
-                                                           : "texture coordinates");
+        const auto values = is_colour   ? accessors_.vectors(accessor, 0, "colours")
+                            : is_normal ? accessors_.vectors(accessor, 3, "normals")
+                                        : accessors_.vectors(accessor, 2, "texture coordinates");
         if (is_normal) {
             mesh.normals.resize(first, missing_normal);
             for (const glm::dvec4& n : values) mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
@@ -476,8 +467,8 @@ private:
             for (const std::size_t i : corners) {
                 if (number(i) < count) continue;
                 leave_out_face(result_.bad, [&] {
-                    return "mesh " + in_quotes(mesh.name) + ": index " + std::to_string(i) + " names vertex " +
-                           std::to_string(number(i)) + ", but there are " + std::to_string(count);
+                    return text_of("mesh ", in_quotes(mesh.name), ": index ", i, " names vertex ", number(i),
+                                   ", but there are ", count);
                 });
                 return false;
             }

@@ -287,7 +287,7 @@ private:
         };
         Corner corner;
         std::int64_t number = 0;
-        at = parse_integer(at, word_end, number);
+        at = parse_number(at, word_end, number);
         check(at != nullptr);
         if (!resolve(number, positions_seen_, positions().size(), corner.position) && is_whole_) {
             is_whole_ = false;
@@ -302,7 +302,7 @@ private:
         for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
             ++at;
             if (at == word_end || *at == '/') continue;
-            at = parse_integer(at, word_end, number);
+            at = parse_number(at, word_end, number);
             check(at != nullptr);
             const bool is_there = slash == 0 ? resolve(number, uvs_seen_, uvs_.size(), corner.uv)
                                              : resolve(number, normals_seen_, normals_.size(), corner.normal);

@@ -142,7 +142,7 @@ private:
 
     std::uint64_t to_count(std::string_view word, const char* what) const {
         std::int64_t value = 0;
-        if (!to_integer(word, value) || value < 0)
+        if (!to_number(word, value) || value < 0)
             fail(line(), "the number of ", what, " should stand here, not ", in_quotes(word), ".");
         return static_cast<std::uint64_t>(value);
     }
@@ -155,7 +155,7 @@ private:
 
     std::int64_t to_index(std::string_view word, std::uint64_t face) const {
         std::int64_t value = 0;
-        if (!to_integer(word, value)) fail_number(word, "face ", face, face_count_);
+        if (!to_number(word, value)) fail_number(word, "face ", face, face_count_);
         return value;
     }
 

@@ -159,12 +159,12 @@ public:
 
     double real(ValueType) {
         double value = 0;
-        return parsed(value, to_number);
+        return parsed(value);
     }
     std::int64_t integer(ValueType type) {
         if (!is_integer(type)) return to_index(real(type));
         std::int64_t value = 0;
-        return parsed(value, to_integer);
+        return parsed(value);
     }
     void skip(ValueType, std::uint64_t count) {
         for (; count > 0; --count) word();
@@ -182,9 +182,9 @@ private:
         return word;
     }
     template <class Value>
-    Value parsed(Value value, bool (*parse)(std::string_view, Value&)) {
+    Value parsed(Value value) {
         const std::string_view number = word();
-        if (!parse(number, value)) throw BadValue{in_quotes(number) + " is no number of its type"};
+        if (!to_number(number, value)) throw BadValue{in_quotes(number) + " is no number of its type"};
         return value;
     }
 

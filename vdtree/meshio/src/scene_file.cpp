@@ -153,14 +153,9 @@ private:
         else if (kind != "directional") fail(where, " is neither directional, point nor spot; correct its type.");
         read.intensity = number_in(light, "intensity", 1, 0, brightest, where);
         if (const json* colour = member(light, "color")) {
-            bool is_valid = colour->is_array() && colour->size() == 3;
             glm::vec3 rgb(1);
-            for (std::size_t i = 0; is_valid && i < 3; ++i) {
-                is_valid = (*colour)[i].is_number() && (*colour)[i].get<double>() >= 0 &&
-                           (*colour)[i].get<double>() <= brightest;
-                if (is_valid) rgb[static_cast<int>(i)] = (*colour)[i].get<float>();
-            }
-            if (!is_valid) fail(where, ": its color should be 3 numbers from 0 on; correct it.");
+            if (!gltf::numbers_in(*colour, 0, brightest, rgb))
+                fail(where, ": its color should be 3 numbers from 0 on; correct it.");
             has_coloured_ = has_coloured_ || rgb.r != rgb.g || rgb.g != rgb.b;
             read.intensity *= static_cast<double>(rec709_luminance(rgb));
         }

@@ -8,8 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <locale>
+#include <sstream>
+#include <string>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 
 namespace unseen::meshio {
 
@@ -32,30 +36,13 @@ constexpr int base64_value(char c) {
     return -1;
 }
 
-// What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign. (Not
-// strtod, which obeys the locale.)
+// What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign.
 inline double out_of_range_number(std::string_view digits) {
-    const bool is_negative = digits.starts_with('-');
-    if (is_negative) digits.remove_prefix(1);
-    const std::size_t e = std::min(digits.find_first_of("eE"), digits.size());
-    const std::string_view mantissa = digits.substr(0, e);
-    std::int64_t exponent = 0;
-    if (e < digits.size()) {
-        const bool is_down = digits.substr(e + 1).starts_with('-');
-        std::string_view of = digits.substr(e + 1);
-        if (of.starts_with('-') || of.starts_with('+')) of.remove_prefix(1);
-        constexpr std::int64_t most = std::int64_t{1} << 60; // beyond what any text's digits make up for
-        const auto [end, error] = std::from_chars(of.data(), of.data() + of.size(), exponent);
-        if (error != std::errc() || exponent > most) exponent = most;
-        if (is_down) exponent = -exponent;
-    }
-    // The place of the first digit that is not 0.
-    const std::size_t point = std::min(mantissa.find('.'), mantissa.size()),
-                      first = mantissa.find_first_of("123456789");
-    if (first == std::string_view::npos) return is_negative ? -0.0 : 0.0;
-    exponent += static_cast<std::int64_t>(point) - static_cast<std::int64_t>(first);
-    const double value = exponent > 0 ? std::numeric_limits<double>::infinity() : 0.0;
-    return is_negative ? -value : value;
+    std::istringstream in{std::string(digits)};
+    in.imbue(std::locale::classic());
+    double value = 0;
+    in >> value;
+    return in ? value : std::copysign(std::numeric_limits<double>::infinity(), value);
 }
 
 // "1.#IND", "1.#QNAN", "1.#INF00": what C libraries of Windows printed for NaN and infinity. `end` is the end of "1.".
@@ -70,36 +57,28 @@ inline const char* parse_windows_nan(const char* end, const char* last, double& 
 }
 
 // Parses a number at `first`, with an optional leading '+', which std::from_chars does not know. Returns the end of
-// the number, or nullptr if there is none. Too large becomes infinite, too small 0.
-inline const char* parse_number(const char* first, const char* last, double& value) {
-    if (first != last && *first == '+') {
-        ++first;
-        if (first != last && *first == '-') return nullptr;
-    }
+// the number, or nullptr if there is none. Numbers too large become infinite, or the largest or smallest integer, which
+// no index accepts; those too small become 0.
+template <class Value>
+const char* parse_number(const char* first, const char* last, Value& value) {
+    if (first != last && *first == '+' && ++first != last && *first == '-') return nullptr;
     const auto [end, error] = std::from_chars(first, last, value);
-    if (error == std::errc::result_out_of_range) value = out_of_range_number({first, end});
-    return error == std::errc::invalid_argument ? nullptr : parse_windows_nan(end, last, value);
-}
-
-// The same for integers. Those beyond 64 bits become the largest or smallest of them, which no index accepts.
-inline const char* parse_integer(const char* first, const char* last, std::int64_t& value) {
-    if (first != last && *first == '+') {
-        ++first;
-        if (first != last && *first == '-') return nullptr;
+    if (error == std::errc::invalid_argument) return nullptr;
+    if constexpr (std::is_integral_v<Value>) {
+        if (error == std::errc::result_out_of_range)
+            value = *first == '-' ? std::numeric_limits<Value>::min() : std::numeric_limits<Value>::max();
+        return end;
+    } else {
+        if (error == std::errc::result_out_of_range) value = out_of_range_number({first, end});
+        return parse_windows_nan(end, last, value);
     }
-    const auto [end, error] = std::from_chars(first, last, value);
-    if (error == std::errc::result_out_of_range) value = *first == '-' ? INT64_MIN : INT64_MAX;
-    return error == std::errc::invalid_argument ? nullptr : end;
 }
 
 // The whole word must be the number.
-inline bool to_number(std::string_view word, double& value) {
+template <class Value>
+bool to_number(std::string_view word, Value& value) {
     const char* last = word.data() + word.size();
     return parse_number(word.data(), last, value) == last;
-}
-inline bool to_integer(std::string_view word, std::int64_t& value) {
-    const char* last = word.data() + word.size();
-    return parse_integer(word.data(), last, value) == last;
 }
 
 // Lines before `position`, plus one; a lone CR counts as a newline. Linear: for messages only.

@@ -81,14 +81,13 @@ public:
         const std::string ends = array(index, "offsets", 1, triangles, [=, this] {
             for (std::size_t t = 1; t <= triangles; ++t) put_index(3 * t, index);
         });
-        out_.text("<?xml version=\"1.0\"?>\n"
-                  "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
-                  "  <PolyData>\n    <Piece NumberOfPoints=\"" +
-                  std::to_string(vertices) +
-                  "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
-                  std::to_string(triangles) + "\">\n" + point_data + "      <Points>\n" + points +
-                  "      </Points>\n      <Polys>\n" + corners + ends +
-                  "      </Polys>\n    </Piece>\n  </PolyData>\n  <AppendedData encoding=\"raw\">\n   _");
+        out_.text(text_of(
+            "<?xml version=\"1.0\"?>\n"
+            "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+            "  <PolyData>\n    <Piece NumberOfPoints=\"",
+            vertices, "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"", triangles,
+            "\">\n", point_data, "      <Points>\n", points, "      </Points>\n      <Polys>\n", corners, ends,
+            "      </Polys>\n    </Piece>\n  </PolyData>\n  <AppendedData encoding=\"raw\">\n   _"));
         for (const Block& block : blocks_) {
             out_.binary(block.bytes);
             block.write();
