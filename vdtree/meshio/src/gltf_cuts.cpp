@@ -12,7 +12,6 @@
 #include "file_output.h"
 #include "gltf_data.h"
 #include "gltf_writer.h"
-#include "material_formats.h"
 #include "restore.h"
 #include "write_cut.h"
 

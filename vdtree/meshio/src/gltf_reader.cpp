@@ -17,6 +17,7 @@
 #include "gltf_nodes.h"
 #include "gltf_writer.h"
 #include "named_files.h"
+#include "restore.h"
 
 namespace unseen::meshio {
 namespace gltf {
@@ -252,11 +253,9 @@ Placement placement_of(const glm::dmat4& matrix) {
     double size = 0.0;
     for (int i = 0; i < 9; ++i) size = std::max(size, std::abs(linear[i / 3][i % 3]));
     if (size > 0.0 && std::isfinite(size)) linear /= size; // a determinant of tiny scales would underflow
-    // The cofactors are the inverse transpose times the determinant, and exist where the inverse does not.
-    const glm::dmat3 cofactors(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                               glm::cross(linear[0], linear[1]));
-    placement.is_mirrored = glm::dot(linear[0], cofactors[0]) < 0.0;
-    placement.normal_matrix = placement.is_mirrored ? -cofactors : cofactors;
+    const NormalMatrix normals = normal_matrix_of(linear);
+    placement.is_mirrored = normals.is_mirrored;
+    placement.normal_matrix = normals.matrix;
     return placement;
 }
 

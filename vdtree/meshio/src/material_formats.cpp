@@ -1,4 +1,4 @@
-#include "material_formats.h"
+#include "write_cut.h"
 
 #include <algorithm>
 #include <sstream>
@@ -16,6 +16,7 @@
 #include "gltf_writer.h"
 #include "mesh_readers.h"
 #include "mtl_reader.h"
+#include "restore.h"
 
 namespace unseen::meshio {
 
@@ -252,10 +253,7 @@ SourceDocument as_obj(SourceDocument document, const std::string& library, std::
                         "normals and light; nodes become objects in one frame; all else is left out.");
     }
     for_each_normal(document, [](const glm::dvec3& n, const Part& part) {
-        const glm::dmat3 linear(part.to_world);
-        const glm::dmat3 cofactors(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
-                                   glm::cross(linear[0], linear[1]));
-        return (glm::dot(linear[0], cofactors[0]) < 0 ? -1.0 : 1.0) * (cofactors * n);
+        return normal_matrix_of(glm::dmat3(part.to_world)).matrix * n;
     });
     for (Part& part : document.parts) {
         part.to_world = glm::dmat4(1);

@@ -166,27 +166,6 @@ Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumn
 
 // ---- OBJ ----
 
-// What changes in front of a triangle: the names of its group and its material.
-struct RangeChange {
-    std::uint64_t triangle = 0;
-    bool starts = false;
-    const MeshRange* range = nullptr;
-};
-
-std::vector<RangeChange> range_changes(const MeshView& mesh) {
-    std::vector<RangeChange> changes;
-    for (const MeshRange& range : mesh.ranges) {
-        if (range.triangle_count == 0) continue;
-        changes.push_back({range.first_triangle, true, &range});
-        changes.push_back({range.first_triangle + range.triangle_count, false, &range});
-    }
-    // Ends first, so that a range that starts where another ends wins.
-    std::stable_sort(changes.begin(), changes.end(), [](const RangeChange& a, const RangeChange& b) {
-        return a.triangle != b.triangle ? a.triangle < b.triangle : a.starts < b.starts;
-    });
-    return changes;
-}
-
 void write_obj_corner(FileOutput& out, const MeshView& mesh, Index vertex) {
     const std::uint64_t number = std::uint64_t{vertex} + 1;
     out.text(" ");
@@ -219,16 +198,18 @@ void write_obj_vertices(FileOutput& out, const MeshView& mesh) {
 
 void write_obj_to(FileOutput& out, const MeshView& mesh) {
     write_obj_vertices(out, mesh);
-    const std::vector<RangeChange> changes = range_changes(mesh);
-    std::size_t next_change = 0;
+    // By triangle and keyword: the name that holds from there on. A range that starts where another ends wins.
+    std::map<std::uint64_t, std::map<std::string_view, std::string>> names;
+    for (const MeshRange& range : mesh.ranges) {
+        if (range.triangle_count == 0) continue;
+        const char* const keyword = range.kind == MeshRange::Kind::material ? "usemtl" : "g";
+        names[range.first_triangle][keyword] = one_line(range.name);
+        names[range.first_triangle + range.triangle_count].try_emplace(keyword);
+    }
+    auto next = names.begin();
     for (std::uint64_t i = 0; i < mesh.triangles.size(); ++i) {
-        std::map<std::string_view, std::string> names; // by keyword; the last change counts
-        for (; next_change < changes.size() && changes[next_change].triangle == i; ++next_change) {
-            const RangeChange& change = changes[next_change];
-            const bool is_material = change.range->kind == MeshRange::Kind::material;
-            names[is_material ? "usemtl" : "g"] = change.starts ? one_line(change.range->name) : std::string();
-        }
-        for (const auto& [keyword, name] : names) out.text(text_of(keyword, " ", name, "\n"));
+        if (next != names.end() && next->first == i)
+            for (const auto& [keyword, name] : next++->second) out.text(text_of(keyword, " ", name, "\n"));
         out.text("f");
         for (const Index corner : mesh.triangles[i]) write_obj_corner(out, mesh, corner);
         out.text("\n");
@@ -244,63 +225,30 @@ struct GltfPrimitive {
     int material = -1;
 };
 
-struct GltfMaterials {
-    std::vector<std::string> names;
+std::vector<GltfPrimitive> gltf_primitives(const MeshView& mesh, std::vector<std::string>& materials) {
     std::vector<GltfPrimitive> primitives;
-};
-
-GltfMaterials gltf_materials(const MeshView& mesh) {
-    GltfMaterials result;
     std::map<std::string, int> numbers;
     std::uint64_t done = 0;
     const auto add = [&](std::uint64_t end, int material) {
-        if (end > done) result.primitives.push_back({done, end - done, material});
+        if (end > done) primitives.push_back({done, end - done, material});
         done = std::max(done, end);
     };
     for (const MeshRange& range : mesh.ranges) {
         const std::uint64_t end = range.first_triangle + range.triangle_count;
         if (range.kind != MeshRange::Kind::material || end <= done) continue;
-        const auto [found, is_new] = numbers.try_emplace(range.name, static_cast<int>(result.names.size()));
-        if (is_new) result.names.push_back(range.name);
+        const auto [found, is_new] = numbers.try_emplace(range.name, static_cast<int>(materials.size()));
+        if (is_new) materials.push_back(range.name);
         add(range.first_triangle, -1);
         add(end, found->second);
     }
     add(mesh.triangles.size(), -1);
-    return result;
-}
-
-// Positions of glTF are floats; where that loses digits they are taken relative to a centre, and where it leaves the
-// range of float, to a size.
-struct GltfFrame {
-    glm::dvec3 origin{0.0};
-    double scale = 1.0;
-    bool is_identity = true;
-
-    glm::vec3 to_float(const glm::dvec3& p) const { return glm::vec3((p - origin) / scale); }
-};
-
-GltfFrame gltf_frame(const MeshView& mesh) {
-    GltfFrame frame;
-    if (are_floats(mesh)) return frame;
-    frame.is_identity = false;
-    glm::dvec3 low = mesh.positions[0], high = low;
-    for (const glm::dvec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
-    frame.origin = low / 2.0 + high / 2.0; // halves first: the sum may overflow
-    const glm::dvec3 half = high / 2.0 - low / 2.0;
-    const double extent = std::max({half.x, half.y, half.z});
-    // Well inside the range of float, and a power of two so that it costs no digits.
-    constexpr double largest_plain = 1e30, smallest_plain = 1e-30;
-    if (extent > largest_plain || (extent > 0.0 && extent < smallest_plain))
-        frame.scale = std::ldexp(1.0, std::ilogb(extent));
-    return frame;
+    return primitives;
 }
 
 // glTF wants unit normals; one that says "compute me" stays zero.
 glm::vec3 unit(const glm::vec3& normal) {
-    const double x = normal.x, y = normal.y, z = normal.z;
-    const double length = std::sqrt(x * x + y * y + z * z);
-    if (!(length > 0.0) || !std::isfinite(length)) return missing_normal;
-    return {static_cast<float>(x / length), static_cast<float>(y / length), static_cast<float>(z / length)};
+    const double length = glm::length(glm::dvec3(normal));
+    return length > 0 && std::isfinite(length) ? glm::vec3(glm::dvec3(normal) / length) : missing_normal;
 }
 
 Error cannot_write(const fs::path& file, const std::string& why) {
@@ -344,10 +292,26 @@ Result<void> write_gltf(const MeshToWrite& to) {
     const MeshView& mesh = to.mesh;
     if (mesh.triangles.empty())
         return cannot_write(to.file, "the mesh has no triangles, and glTF cannot hold such a mesh; write PLY.");
-    const GltfFrame frame = gltf_frame(mesh);
+    // Positions of glTF are floats; where that loses digits they are taken relative to a centre, and where it leaves the
+    // range of float, to a size: a power of two, so that it costs no digits.
+    json node = {{"mesh", 0}};
+    glm::dvec3 origin(0);
+    double scale = 1;
+    if (!are_floats(mesh)) {
+        glm::dvec3 low = mesh.positions[0], high = low;
+        for (const glm::dvec3& p : mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
+        origin = low / 2.0 + high / 2.0; // halves first: the sum may overflow
+        const glm::dvec3 half = high / 2.0 - low / 2.0;
+        const double extent = std::max({half.x, half.y, half.z});
+        constexpr double largest_plain = 1e30, smallest_plain = 1e-30; // well inside the range of float
+        if (extent > largest_plain || (extent > 0 && extent < smallest_plain))
+            scale = std::ldexp(1.0, std::ilogb(extent));
+        node["translation"] = {origin.x, origin.y, origin.z};
+        if (scale != 1) node["scale"] = {scale, scale, scale};
+    }
     std::vector<glm::vec3> positions, normals;
     positions.reserve(mesh.positions.size());
-    for (const glm::dvec3& p : mesh.positions) positions.push_back(frame.to_float(p));
+    for (const glm::dvec3& p : mesh.positions) positions.emplace_back((p - origin) / scale);
     normals.reserve(mesh.normals.size());
     for (const glm::vec3& n : mesh.normals) normals.push_back(unit(n));
 
@@ -356,22 +320,19 @@ Result<void> write_gltf(const MeshToWrite& to) {
     if (!normals.empty()) attributes["NORMAL"] = out.add_attribute("NORMAL", floats_of(normals), 3);
     if (!mesh.colours.empty()) attributes["COLOR_0"] = out.add_attribute("COLOR_0", floats_of(mesh.colours), 4);
     if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = out.add_attribute("TEXCOORD_0", floats_of(mesh.uvs), 2);
-    const GltfMaterials materials = gltf_materials(mesh);
+    std::vector<std::string> materials;
     const std::size_t view = out.add_indices(mesh.triangles);
     json primitives = json::array();
-    for (const GltfPrimitive& primitive : materials.primitives) {
+    for (const GltfPrimitive& primitive : gltf_primitives(mesh, materials)) {
         json entry = out.primitive(attributes, view, primitive.first, primitive.count);
         if (primitive.material >= 0) entry["material"] = primitive.material;
         primitives.push_back(std::move(entry));
     }
-    json node = {{"mesh", 0}};
-    if (!frame.is_identity) node["translation"] = {frame.origin.x, frame.origin.y, frame.origin.z};
-    if (frame.scale != 1.0) node["scale"] = {frame.scale, frame.scale, frame.scale};
     json document = {{"scene", 0},
                      {"scenes", {{{"nodes", {0}}}}},
                      {"nodes", json::array({node})},
                      {"meshes", json::array({{{"primitives", primitives}}})}};
-    for (const std::string& name : materials.names) document["materials"].push_back({{"name", name}});
+    for (const std::string& name : materials) document["materials"].push_back({{"name", name}});
     return out.write(to.file, std::move(document));
 }
 

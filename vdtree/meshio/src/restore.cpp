@@ -180,6 +180,12 @@ Result<void> check_supports(const VertexTree& tree, std::span<const LeafRange> s
     return {};
 }
 
+NormalMatrix normal_matrix_of(const glm::dmat3& m) {
+    const glm::dmat3 cofactors(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
+    const bool is_mirrored = glm::dot(m[0], cofactors[0]) < 0;
+    return {is_mirrored ? -cofactors : cofactors, is_mirrored};
+}
+
 NodeFrame frame_of(const glm::dmat4& to_world) {
     NodeFrame frame;
     glm::dmat3 linear(to_world);

@@ -39,6 +39,14 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document);
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs);
 
+// How normals go where a matrix takes positions, but for their length. The cofactors are the inverse transpose times the
+// determinant, and exist where the inverse does not.
+struct NormalMatrix {
+    glm::dmat3 matrix = glm::dmat3(1);
+    bool is_mirrored = false;
+};
+NormalMatrix normal_matrix_of(const glm::dmat3& linear);
+
 // The inverse of a matrix from a node to the world, or nothing where it has none.
 struct NodeFrame {
     bool has_inverse = false, is_mirrored = false;

@@ -10,7 +10,6 @@
 #include <unseen/meshio/scene_file.h>
 
 #include "kept_arrays.h"
-#include "material_formats.h"
 #include "mesh_writers.h"
 #include "restore.h"
 
