@@ -11,7 +11,6 @@
 #include "testing.h"
 
 namespace unseen::session::as_seen_test {
-namespace {
 
 using vdtree::Mesh;
 using vdtree::VertexTree;
@@ -124,5 +123,4 @@ TEST_F(AsSeen, PicturesAreOfTheirOwnViewAlone) {
     EXPECT_THAT(error_in(session.simplify(view, request)), HasSubstr("request.shown is of pictures"));
 }
 
-} // namespace
 } // namespace unseen::session::as_seen_test

@@ -600,8 +600,6 @@ TEST_F(SimplifyTest, TakesNoOptionThatDoesNothing) {
     EXPECT_LT(triangles({"--visibility", "spheres"}), triangles({}) * 3 / 4) << "what faces away is folded";
 }
 
-// ---- what people read, and what they type
-
 TEST_F(SimplifyTest, AnswersInThreeLines) {
     EXPECT_THAT(
         succeed({"simplify", "ball.vdt", "-o", "small.glb"}).out,
@@ -846,8 +844,6 @@ TEST_F(SimplifyTest, TooLittleTimeIsNotBlamedOnTheView) {
                 fails(1, AllOf(IsAnErrorForPeople(), HasSubstr("--milliseconds"), Not(HasSubstr("move nearer")))));
 }
 
-// ---- files
-
 TEST_F(SimplifyTest, MakesTheFoldersOfItsOutputs) {
     succeed({"simplify", "ball.vdt", "-o", "new/deep/o.ply", "--json", "new/r.json"});
     EXPECT_TRUE(fs::exists(path("new/deep/o.ply")) && fs::exists(path("new/r.json")));
@@ -1002,8 +998,6 @@ TEST_F(UsageTest, ByteOrderMarksAreNoText) {
     EXPECT_THAT(rows.out, StartsWith("frequency,luminance,sensitivity\n"));
     EXPECT_EQ(run({"csf", "--csv", "-"}, mark + "frequency,luminance\n4,100\n").out, rows.out);
 }
-
-// ---- signals
 
 class SignalTest : public CommandTest {
 protected:

@@ -14,7 +14,6 @@
 #include "oracle.h"
 
 namespace unseen::app::hard_mesh_test {
-namespace {
 
 using vdtree::VertexTree;
 
@@ -193,5 +192,4 @@ TEST(LitFolds, AreUnseenUnderLightsThatStandStill) {
     }
 }
 
-} // namespace
 } // namespace unseen::app::hard_mesh_test

@@ -78,10 +78,9 @@ TEST_F(HostileFilesTest, OverwriteNothingThatTheModelNames) {
         {{"simplify", "ball.obj", "-o", "new.ply", "--json", "tex.png"}, "tex.png"},
         {{"tradeoff", "ball.obj", "--csv", "tex.png"}, "tex.png"},
         {{"build", "ball.obj", "-o", "new.vdt", "--json", "tex.png"}, "tex.png"}};
-    for (const auto& [words, output] : table) {
+    for (const auto& [words, output] : table)
         EXPECT_THAT(run(words), fails(1, HasSubstr("'" + output + "' is read: give the output another name.")))
             << ::testing::PrintToString(words);
-    }
     EXPECT_EQ(files(), before);
     EXPECT_TRUE(read_text(path("tex.png")) == texture && read_text(path("ball.mtl")) == library);
 }

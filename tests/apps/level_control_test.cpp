@@ -82,8 +82,6 @@ TEST_F(LevelControlTest, OutlivesItsSession) {
     EXPECT_TRUE(control->draw(ahead(64))) << "which goes by the gaze of the session";
 }
 
-// ---- chains -----------------------------------------------------------------------------------------------------------
-
 TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
     Session session = bodies({{0, 0, -3}});
     const auto chain = require(level_chain(session, ahead(256), {}));
@@ -93,13 +91,10 @@ TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
     EXPECT_LE(chain->triangles(1), body().triangle_count() / 2);
     for (int level = 0; level < 6; ++level) {
         EXPECT_EQ(chain->cut(level).triangle_count(), chain->triangles(level)) << level;
-        if (level > 0) {
-            EXPECT_LT(chain->triangles(level), chain->triangles(level - 1));
-        }
-        if (level > 2) {
+        if (level > 0) EXPECT_LT(chain->triangles(level), chain->triangles(level - 1));
+        if (level > 2)
             EXPECT_NEAR(chain->unseen_from(level) / chain->unseen_from(level - 1),
                         chain->unseen_from(2) / chain->unseen_from(1), 1e-6);
-        }
     }
     for (const LevelChainOptions& bad :
          {LevelChainOptions{.levels = 0}, LevelChainOptions{.levels = 17}, LevelChainOptions{.most_share = 0},
@@ -154,8 +149,6 @@ TEST_F(LevelControlTest, LevelsAreEven) {
     RecordProperty("spread", std::to_string(std::exp(ours)));
     RecordProperty("spread_by_triangles", std::to_string(std::exp(theirs)));
 }
-
-// ---- control ----------------------------------------------------------------------------------------------------------
 
 TEST_F(LevelControlTest, AStillPictureSettlesAndStays) {
     Session session = bodies(row);
@@ -392,8 +385,6 @@ TEST_F(LevelControlTest, OutlivesTheHandleOfItsContext) {
     EXPECT_TRUE(control->settle(ahead(64)));
     EXPECT_TRUE(control->thresholds(0));
 }
-
-// ---- shadows ----------------------------------------------------------------------------------------------------------
 
 // Bodies in a sun from this direction.
 Session sunlit(const std::vector<glm::dvec3>& places, glm::dvec3 towards, bool casts) {

@@ -121,9 +121,7 @@ TEST(LodDirections, AreSpreadAndOffTheAxes) {
             for (int axis = 0; axis < 3; ++axis) EXPECT_LT(std::abs(d[axis]), std::cos(4.999 * 3.14159265 / 180));
             sum += d / static_cast<double>(count);
         }
-        if (count > 1) {
-            EXPECT_LT(glm::length(sum), 0.6);
-        }
+        if (count > 1) EXPECT_LT(glm::length(sum), 0.6);
     }
     EXPECT_NE(lod_directions(1, 1)[0], lod_directions(1, 2)[0]);
 }

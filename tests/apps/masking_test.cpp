@@ -16,7 +16,6 @@
 #include "shapes.h"
 
 namespace unseen::session::masking_test {
-namespace {
 
 using perception::Elevations;
 using perception::Image;
@@ -26,8 +25,6 @@ using vdtree::NodeId;
 
 constexpr int side = 256;
 constexpr std::size_t grid_side = 32; // cells of 8 pixels
-
-// ---- by hand, in double: what perception/judge_tables.h says, away from the borders
 
 using Plane = std::vector<double>;
 
@@ -115,8 +112,6 @@ Plane pooled_maskers(const JudgeTables& tables, std::size_t band, const Level& f
     return pooled;
 }
 
-// ---- pictures
-
 Image bars(double period_px, double contrast, int from_column = 0) {
     Image image{side, side, 1, {}};
     for (int y = 0; y < side; ++y)
@@ -196,8 +191,6 @@ TEST_F(MaskingTest, RefusesCellsThatAreNone) {
     }
     EXPECT_FALSE(judge->passes().read_elevations());
 }
-
-// ---- the fold test
 
 vdtree::View view_of(int size) {
     vdtree::View view;
@@ -292,8 +285,6 @@ TEST_F(MaskedErrorTest, RefusesWhatIsNoMasking) {
                 HasSubstr("another window"));
 }
 
-// ---- scenes
-
 // Upright bars across the view, so many a unit of length, half of it open.
 Mesh grate(double bars_per_unit, double z) {
     Mesh mesh;
@@ -384,8 +375,6 @@ TEST_F(MaskedSceneTest, DoesNotCountForGazesThatAreUnsure) {
     EXPECT_EQ(made->stats.triangles,
               simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, unmasked)->stats.triangles);
 }
-
-// ---- what is drawn for it
 
 class PassesTest : public MaskedSceneTest {
 protected:
@@ -507,5 +496,4 @@ TEST_F(PassesTest, MaskingThatIsNotWorthItLeavesTheFoldTestAlone) {
     EXPECT_THAT(of(all, "masking").why, HasSubstr("too little"));
 }
 
-} // namespace
 } // namespace unseen::session::masking_test

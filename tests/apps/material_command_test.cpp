@@ -207,8 +207,6 @@ TEST_F(MaterialCommandTest, InstancesGetMeshesOfTheirOwn) {
     EXPECT_TRUE(look_the_same("in.glb", "out.glb"));
 }
 
-// ---- OBJ and MTL
-
 class ObjMaterialTest : public MaterialCommandTest {
 protected:
     // Two squares of cells, one with an image and one with a colour, side by side.
@@ -292,8 +290,6 @@ TEST_F(ObjMaterialTest, FormatsBecomeEachOther) {
     EXPECT_THAT(succeed({"simplify", "scene.glb", "--full", "-o", "out/scene.ply"}).err,
                 HasSubstr("PLY holds no materials"));
 }
-
-// ---- colours of materials
 
 // OBJ and glTF, with an image somewhere and without: the same surfaces look the same.
 TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {

@@ -12,7 +12,6 @@
 #include "temp_folder.h"
 
 namespace unseen::session::museum_test {
-namespace {
 
 using app::MuseumBars;
 
@@ -129,5 +128,4 @@ TEST_F(MuseumTest, CutsBehindBarsNeedFewerTriangles) {
                                     std::to_string(fine.masked) + " " + std::to_string(shadows.masked));
 }
 
-} // namespace
 } // namespace unseen::session::museum_test

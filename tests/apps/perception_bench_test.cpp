@@ -55,9 +55,8 @@ TEST_F(PerceptionBenchTest, MakesHardMeshes) {
     for (const Json& view : report["views"]) {
         EXPECT_GT(view["of"], 1000) << view["mesh"];
         // What pokes through thin parts no node knows of: a known limit, and what the row is there to show.
-        if (view["test"] == "luebke-hallen-safe" && view["mesh"] != "thin plates") {
+        if (view["test"] == "luebke-hallen-safe" && view["mesh"] != "thin plates")
             EXPECT_EQ(view["visible_pixels"], 0) << view;
-        }
     }
 }
 

@@ -270,8 +270,6 @@ TEST(LevelsWithin, AreCloseToTheBestOfAll) {
     EXPECT_LT(ours, 1.1 * best_of_all);
 }
 
-// ---- files and following ----------------------------------------------------------------------------------------------
-
 const vdtree::VertexTree& ball() {
     static const vdtree::VertexTree tree = support::built(shapes::bumpy_sphere(4, 0.05));
     return tree;
@@ -350,9 +348,8 @@ TEST(SelectionFile, WithDamageIsRefused) {
         std::ofstream(folder / "b.sel", std::ios::binary) << bytes;
         return read_selections(folder / "b.sel");
     };
-    for (std::size_t size = 0; size < good.size(); size += 1 + size / 50) {
+    for (std::size_t size = 0; size < good.size(); size += 1 + size / 50)
         EXPECT_THAT(error_in(read(good.substr(0, size))), HasSubstr("b.sel")) << size;
-    }
     for (std::size_t at = 0; at < good.size(); at += 7) {
         std::string bad = good;
         bad[at] = static_cast<char>(bad[at] ^ 0x40);

@@ -249,9 +249,7 @@ TEST(Session, SaysWhereItsTableHasNoSamples) {
     Session by_default = two_balls();
     const auto plan = by_default.plan(by_default.default_view(), {.fold_test = FoldTest::luebke_hallen});
     for (const session::Effect& e : plan->effects)
-        if (e.name == "beyond the csf table") {
-            EXPECT_FALSE(e.on) << e.why;
-        }
+        if (e.name == "beyond the csf table") EXPECT_FALSE(e.on) << e.why;
 }
 
 TEST(Observer, AVelocityIsOneThatTablesKnow) {

@@ -12,7 +12,6 @@
 #include "shapes.h"
 
 namespace unseen::app::shadow_cut_test {
-namespace {
 
 using Kind = vdtree::LightSource::Kind;
 using vdtree::LightSource;
@@ -186,16 +185,10 @@ TEST_P(ShadowCut, CannotBeToldFromTheWhole) {
     const perception::Judgement judgement = judged(cut->cuts);
     EXPECT_EQ(judgement.visible_pixels, 0) << judgement.max_ratio;
     // With highlights the test goes by what the lights can make of a node, hidden and not: from so near it keeps all.
-    if (setting.lighting.specular == 0) {
-        EXPECT_LT(cut->stats.triangles, full->stats.triangles);
-    }
-    if (setting.seen == Setting::Seen::nothing) {
-        EXPECT_LE(cut->stats.triangles, of_largest_nodes);
-    }
+    if (setting.lighting.specular == 0) EXPECT_LT(cut->stats.triangles, full->stats.triangles);
+    if (setting.seen == Setting::Seen::nothing) EXPECT_LE(cut->stats.triangles, of_largest_nodes);
     for (const session::Effect& effect : cut->effects) {
-        if (effect.name == "frustum culling") {
-            EXPECT_TRUE(effect.on) << effect.why;
-        }
+        if (effect.name == "frustum culling") EXPECT_TRUE(effect.on) << effect.why;
         if (effect.name == "shadows") {
             const bool keeps_none = effect.why.find("as all do here") != std::string::npos;
             EXPECT_TRUE(!keeps_none || setting.seen == Setting::Seen::nothing) << effect.why;
@@ -246,9 +239,7 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
         setting.eye.x = setting.target.x = x;
         const vdtree::View view = view_of(setting);
         const auto report = require(follower.follow(view, request));
-        if (frame == 0) {
-            EXPECT_LE(report->stats.triangles, of_largest_nodes);
-        }
+        if (frame == 0) EXPECT_LE(report->stats.triangles, of_largest_nodes);
         if (frame % judged_every != 0) continue;
         const auto difference =
             perception::judge_modern(image_of(*renderer, full, view, session->background()),
@@ -314,5 +305,4 @@ TEST_F(ShadowCut, FindsItsReachOnceForAllObjects) {
 INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 12),
                          [](const auto& of) { return std::string(settings()[of.param].name); });
 
-} // namespace
 } // namespace unseen::app::shadow_cut_test

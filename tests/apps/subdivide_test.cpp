@@ -102,9 +102,7 @@ TEST(Subdivide, NoiseMovesNewVerticesByItsShareOfTheEdge) {
     double largest = 0;
     for (std::size_t v = 0; v < 6; ++v) {
         const double moved = glm::length(rough.positions[v] - flat.positions[v]);
-        if (v < 3) {
-            EXPECT_EQ(moved, 0) << "the mesh's own vertices stay";
-        }
+        if (v < 3) EXPECT_EQ(moved, 0) << "the mesh's own vertices stay";
         EXPECT_LE(moved, 0.5 * std::sqrt(2.0) + 1e-12);
         largest = std::max(largest, moved);
     }

@@ -96,9 +96,7 @@ TEST_F(TextureCommandTest, CanBeLeftOutOrReplaced) {
     EXPECT_TRUE(build("square.obj", {"--no-texture"})["texture"].is_null());
     write_png("grey.png", Image{1, 1, 1, {0.5f}});
     EXPECT_EQ(build("square.obj", {"--texture", "grey.png"})["texture"]["width"], 1);
-    if (const auto seen = draw("t.vdt")) {
-        EXPECT_NEAR(seen->first, seen->second, 0.1);
-    }
+    if (const auto seen = draw("t.vdt")) EXPECT_NEAR(seen->first, seen->second, 0.1);
     build("square.obj");
     Json drawn;
     if (const auto seen = draw("t.vdt", {"--no-texture"}, &drawn)) {

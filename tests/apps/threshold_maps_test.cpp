@@ -172,8 +172,6 @@ TEST_F(ThresholdMapsTest, KeepsWhatTheNextReferenceNeeds) {
     EXPECT_EQ(passes->full_screen_passes() - before, 3 * static_cast<int>(1 + 4 * tables.bands.size() - 2 + 2));
 }
 
-// ---- rpg99 ------------------------------------------------------------------------------------------------------------
-
 perception::Rpg99Options of_reference(double field_degrees) {
     return {.field_degrees = field_degrees, .masked_by_both = false};
 }

@@ -57,9 +57,8 @@ TEST_F(TradeoffCommandTest, TheFrontHasNothingBetter) {
         EXPECT_NE(point["name"], "luebke-hallen") << "which is unsafe";
         for (const Json& other : report["points"]) {
             const std::string options = other["options"];
-            if (options == "--imperceptible" || options == "--imperceptible --fold-test luebke-hallen-safe") {
+            if (options == "--imperceptible" || options == "--imperceptible --fold-test luebke-hallen-safe")
                 EXPECT_LE(point["triangles"], other["triangles"]) << options;
-            }
         }
     }
     EXPECT_EQ(recommended, 1u);

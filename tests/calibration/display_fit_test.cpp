@@ -4,7 +4,6 @@
 #include "profile_files.h"
 
 namespace unseen::calibration::display_fit_test {
-namespace {
 
 class DisplayFit : public ProfileFiles {};
 
@@ -61,14 +60,12 @@ TEST_F(DisplayFit, BadTablesNameTheFileAndTheLine) {
         {"code,cdm2\n0,0.5\n255,20\n", "fewer than 3 rows"},
         {"code,cdm2\n0,0.5\n128,20\n250,30\n", "the last code must be 255"},
     };
-    for (const auto& [text, expected] : cases) {
+    for (const auto& [text, expected] : cases)
         EXPECT_THAT(error_in(read_photometer(write(text, "bad.csv"))), AllOf(HasSubstr("bad.csv"), HasSubstr(expected)))
             << text;
-    }
     EXPECT_FALSE(read_photometer(folder() / "missing.csv"));
     const auto black = require(read_photometer(write("code,cdm2\n0,0\n128,20\n255,100\n")));
     EXPECT_FALSE(with_photometer(perception::Display(), *black)) << "a display needs some black";
 }
 
-} // namespace
 } // namespace unseen::calibration::display_fit_test

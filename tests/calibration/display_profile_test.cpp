@@ -4,7 +4,6 @@
 #include "profile_files.h"
 
 namespace unseen::calibration::display_profile_test {
-namespace {
 
 using perception::Display;
 using perception::TransferFunction;
@@ -29,9 +28,7 @@ void expect_same(const Display& a, const Display& b) {
     EXPECT_EQ(a.peak, b.peak);
     EXPECT_EQ(a.black, b.black);
     EXPECT_EQ(a.transfer, b.transfer);
-    if (a.transfer == TransferFunction::gamma) {
-        EXPECT_EQ(a.gamma, b.gamma);
-    }
+    if (a.transfer == TransferFunction::gamma) EXPECT_EQ(a.gamma, b.gamma);
     EXPECT_EQ(a.ambient, b.ambient);
     EXPECT_EQ(a.reflectivity, b.reflectivity);
 }
@@ -78,11 +75,10 @@ TEST_F(DisplayProfile, TablesAndLensesGoThereAndBack) {
         {"{\"transfer\": 1e-9,", "transfer"},
         {"{\"field_deg\": 1e-9,", "field_deg"},
     };
-    for (const auto& [start, expected] : bad) {
+    for (const auto& [start, expected] : bad)
         EXPECT_THAT(error_in(read_display(write(replaced(minimal, "{", start), "bad.json"))),
                     AllOf(HasSubstr("bad.json"), HasSubstr(expected)))
             << start;
-    }
 }
 
 TEST_F(DisplayProfile, TheDiagonalGivesThePitch) {
@@ -270,5 +266,4 @@ TEST_F(DisplayProfile, WritingThroughALinkKeepsTheLink) {
     EXPECT_EQ(files_in_folder(), 2);
 }
 
-} // namespace
 } // namespace unseen::calibration::display_profile_test

@@ -7,7 +7,6 @@
 #include "shapes.h"
 
 namespace unseen::calibration::light_rig_test {
-namespace {
 
 using Kind = vdtree::LightSource::Kind;
 
@@ -153,5 +152,4 @@ TEST_F(LightRigTest, LightsCastShadowsWhereTheySaySo) {
     EXPECT_TRUE(full->casting().empty());
 }
 
-} // namespace
 } // namespace unseen::calibration::light_rig_test

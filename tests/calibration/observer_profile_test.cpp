@@ -4,7 +4,6 @@
 #include "profile_files.h"
 
 namespace unseen::calibration::observer_profile_test {
-namespace {
 
 using perception::CsfModel;
 using perception::CsfSamples;
@@ -243,5 +242,4 @@ TEST_F(ObserverProfileTest, WritingFailsWithoutLeavingAFile) {
     EXPECT_EQ(files_in_folder(), 0);
 }
 
-} // namespace
 } // namespace unseen::calibration::observer_profile_test

@@ -9,7 +9,6 @@
 #include "testing.h"
 
 namespace unseen::calibration::people_test {
-namespace {
 
 using perception::CsfModel;
 using perception::Stimulus;
@@ -46,8 +45,6 @@ TEST(People, ObeyTheLawOfArea) {
     EXPECT_LT(with.deviation_db, 4.6);
     EXPECT_GT(without.deviation_db, 8);
 }
-
-// ---- the second judge's sensitivity: Barten's form, fitted
 
 // Of still gratings, as some were shown at up to 1 Hz.
 double barten_of(CsfModel model, Stimulus s) {
@@ -88,8 +85,6 @@ TEST(People, FarAsideSeeAsCastleFallsAndNotAsGeislerAndPerrySay) {
     EXPECT_NEAR(compare(aside, barten).median_db, 0, 3);
     EXPECT_LT(compare(aside, [](const Stimulus& s) { return barten_of(CsfModel::barten_1999, s); }).median_db, -9);
 }
-
-// ---- the judges
 
 // A picture of each grating, at the contrast at which people just saw it.
 struct Pictures {
@@ -256,5 +251,4 @@ TEST(People, HaveNames) {
     EXPECT_THAT(perception::person("me").error().message, HasSubstr("median, default, strict"));
 }
 
-} // namespace
 } // namespace unseen::calibration::people_test

@@ -6,7 +6,6 @@
 #include "profile_files.h"
 
 namespace unseen::calibration::procedure_test {
-namespace {
 
 using perception::CsfSamples;
 using perception::CsfTable;
@@ -225,10 +224,9 @@ TEST_F(ProcedureTest, WhatIsFarFromVisibleIsNotPutAtTheGridsEnd) {
         while (!procedure.is_done()) answer(procedure, observer);
         for (const PlaceEstimate& e : procedure.estimates()) {
             const double truth = observer.sensitivity(e.place, plan.luminance);
-            if (truth < 0.01) {
+            if (truth < 0.01)
                 EXPECT_LT(e.sensitivity(), 0.3)
                     << e.place.frequency_cpd << " cpd " << e.place.eccentricity_deg << " deg";
-            }
         }
         EXPECT_LT(rms_error_db(procedure, observer), 1.2);
     }
@@ -329,10 +327,9 @@ TEST_F(ProcedureTest, WidePatchesThatAreSeenWorseThanSmallOnesAreRefused) {
         }
         const auto checked = check(*procedure.summation(), plan);
         EXPECT_EQ(checked.has_value(), !is_careless);
-        if (!checked) {
+        if (!checked)
             EXPECT_THAT(checked.error().message, AllOf(HasSubstr("Wide patches were seen worse than small ones"),
                                                        HasSubstr("0.46"), HasSubstr("Measure again")));
-        }
     }
     // Beyond the interval: it must lie below as a whole.
     EXPECT_TRUE(check({0.3, 0.2, 0.5}, plan));
@@ -492,17 +489,14 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
                              {"\"places\": [[0.5, 0, 0]", "\"places\": [[0.5, 0, -1]", "places[0]: the area"},
                              {"\"answers\": [\n[", "\"answers\": [\n[99", "\"answers[0]\" has no place"},
                              {"\"luminance_cdm2\": ", "\"luminance_cdm2\": -", "luminance_cdm2"}};
-    for (const BadCase& bad : cases) {
+    for (const BadCase& bad : cases)
         EXPECT_THAT(
             error_in(Procedure::resume(write(replaced(good, bad.from, bad.to), "bad.json"), CsfTable::standard())),
             AllOf(HasSubstr("bad.json"), HasSubstr(bad.expected)))
             << bad.expected;
-    }
     for_each_mutation(good, 150, [&](const std::string& text) {
         const auto resumed = Procedure::resume(write(text), CsfTable::standard());
-        if (!resumed) {
-            EXPECT_THAT(resumed.error().message, HasSubstr("profile.json"));
-        }
+        if (!resumed) EXPECT_THAT(resumed.error().message, HasSubstr("profile.json"));
     });
 }
 
@@ -522,5 +516,4 @@ TEST_F(ProcedureTest, ObserversAreDescribedByNameAndKeys) {
     }
 }
 
-} // namespace
 } // namespace unseen::calibration::procedure_test

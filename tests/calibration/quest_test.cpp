@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::calibration::quest_test {
-namespace {
 
 // The shift taken out again: the reference tabulates p(x) with its threshold where 10^(slope x) is 1.
 double unshifted(double x) {
@@ -100,5 +99,4 @@ TEST(QuestPlus, ForecastsTheExpectedVariance) {
     }
 }
 
-} // namespace
 } // namespace unseen::calibration::quest_test

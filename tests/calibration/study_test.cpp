@@ -8,7 +8,6 @@
 #include "testing.h"
 
 namespace unseen::calibration::study_test {
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -271,5 +270,4 @@ TEST(PictureObserver, SeesByTheSecondJudge) {
     EXPECT_FALSE(observer.visibility(original, other, {}));
 }
 
-} // namespace
 } // namespace unseen::calibration::study_test

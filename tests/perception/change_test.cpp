@@ -6,7 +6,6 @@
 #include "change/flicker.h"
 
 namespace unseen::perception::change_test {
-namespace {
 
 double decibels(double ratio) { return 20 * std::log10(ratio); }
 
@@ -65,8 +64,6 @@ TEST(Flicker, OfCoarseThingsIsThatOfCastlesTransientChannel) {
         EXPECT_NEAR(share_of(cpd), cpd < peak_cpd ? 1 : transient(cpd) / transient(peak_cpd), 0.02) << cpd;
     EXPECT_NEAR(share_of(0), 1, 1e-9);
 }
-
-// ---- pictures -----------------------------------------------------------------------------------------------------
 
 constexpr double grey_cdm2 = 50;
 
@@ -222,5 +219,4 @@ TEST(ChangeJudge, RefusesWhatIsNoChange) {
     EXPECT_THAT(judge_pop(here, dark, {.display = display_of(30), .beta = 0}).error().message, HasSubstr("beta"));
 }
 
-} // namespace
 } // namespace unseen::perception::change_test

@@ -13,7 +13,6 @@
 #include "testing.h"
 
 namespace unseen::perception::chroma_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::DistanceCriterion;
@@ -234,5 +233,4 @@ TEST(Chroma, FollowsTheLight) {
     EXPECT_NEAR(red(dark), 0.25f * red(tree), 1e-4f);
 }
 
-} // namespace
 } // namespace unseen::perception::chroma_test

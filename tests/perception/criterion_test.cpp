@@ -19,7 +19,6 @@
 #include "tree_file.h"
 
 namespace unseen::perception::criterion_test {
-namespace {
 
 using vdtree::Mesh;
 using vdtree::NodeId;
@@ -435,5 +434,4 @@ TEST(ViewpointOf, TakesGazesOffCentreAndNoneInParallel) {
     EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, parallel, options)));
 }
 
-} // namespace
 } // namespace unseen::perception::criterion_test

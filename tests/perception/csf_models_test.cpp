@@ -7,7 +7,6 @@
 #include "testing.h"
 
 namespace unseen::perception::csf_models_test {
-namespace {
 
 // Relative. Of formulas in double against each other.
 constexpr double classical_tolerance = 1e-9;
@@ -48,8 +47,6 @@ Stimulus flickering(Stimulus s, double hertz) {
     s.temporal = Hertz(hertz);
     return s;
 }
-
-// ---- golden values --------------------------------------------------------------------------------------------------
 
 TEST(CsfModels, ClassicalOnesAgreeWithTheReferenceToItsLastDigit) {
     // The greatest values of the published relative curves, which are scaled here.
@@ -192,8 +189,6 @@ TEST(CsfModels, DalysDistanceSharpens) {
     }
 }
 
-// ---- eccentricity and motion ----------------------------------------------------------------------------------------
-
 TEST(CsfModels, FallWithEccentricityInAnyField) {
     for (const CsfModel model : csf_models) {
         for (const VisualField field : {VisualField::nasal, VisualField::temporal, VisualField::worst}) {
@@ -248,8 +243,6 @@ TEST(CsfModels, FlickerIsADriftForModelsThatKnowNone) {
         EXPECT_NE(sensitivity(model, flickering(foveal(4, 50), 8)), sensitivity(model, moving(foveal(4, 50), 2)));
     }
 }
-
-// ---- the edges of the domain ----------------------------------------------------------------------------------------
 
 TEST(CsfModels, OutsideOfTheDomainIsNotANumber) {
     for (const CsfModel model : csf_models) {
@@ -345,5 +338,4 @@ TEST(CsfModels, HaveDistinctNames) {
         EXPECT_THAT(unknown.error().message, testing::HasSubstr(std::string(name(model))));
 }
 
-} // namespace
 } // namespace unseen::perception::csf_models_test

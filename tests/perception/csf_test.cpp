@@ -4,7 +4,6 @@
 #include "testing.h"
 
 namespace unseen::perception::csf_test {
-namespace {
 
 // Relative. The golden values have 9 digits; the forms themselves agree to about 1e-8.
 constexpr double golden_tolerance = 1e-6;
@@ -79,9 +78,7 @@ TEST(Csf, SurvivesDimLight) {
         ASSERT_TRUE(std::isfinite(s)) << luminance;
         EXPECT_GT(s, 0);
         EXPECT_LT(s, 100);
-        if (before > 0) {
-            EXPECT_NEAR(std::log(s / before), 0, 0.5) << "a jump at " << luminance;
-        }
+        if (before > 0) EXPECT_NEAR(std::log(s / before), 0, 0.5) << "a jump at " << luminance;
         before = s;
     }
 }
@@ -189,5 +186,4 @@ TEST(Csf, ModelsHaveNames) {
                 testing::AllOf(testing::HasSubstr("castel"), testing::HasSubstr("castle")));
 }
 
-} // namespace
 } // namespace unseen::perception::csf_test

@@ -122,8 +122,6 @@ TEST(CutRings, ContainTheMeshsRingsAndNest) {
     EXPECT_GT(wider, 100);
 }
 
-// ---- under lights
-
 Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree) {
     Lighting lighting;
     lighting.ambient = 0.1, lighting.specular = 0.3, lighting.shininess = 20;

@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::perception::display_test {
-namespace {
 
 constexpr TransferFunction transfer_functions[] = {TransferFunction::srgb, TransferFunction::gamma,
                                                    TransferFunction::linear};
@@ -254,5 +253,4 @@ TEST(Display, ValidationNamesTheField) {
     }
 }
 
-} // namespace
 } // namespace unseen::perception::display_test

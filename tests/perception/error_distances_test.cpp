@@ -12,7 +12,6 @@
 #include "testing.h"
 
 namespace unseen::perception::error_distances_test {
-namespace {
 
 using vdtree::Mesh;
 using vdtree::NodeId;
@@ -189,5 +188,4 @@ TEST(ErrorDistances, RefuseFactorsThatAreNone) {
         }
 }
 
-} // namespace
 } // namespace unseen::perception::error_distances_test

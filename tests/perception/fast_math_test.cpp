@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::perception::fast_math_test {
-namespace {
 
 constexpr double tolerance = 4e-7; // as the header says
 constexpr int steps = 100'000;
@@ -46,5 +45,4 @@ TEST(FastMath, ElevatesThresholdsAsDalySays) {
     }
 }
 
-} // namespace
 } // namespace unseen::perception::fast_math_test

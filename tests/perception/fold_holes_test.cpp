@@ -11,7 +11,6 @@
 #include "testing.h"
 
 namespace unseen::perception::fold_holes_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::Index;
@@ -23,8 +22,6 @@ using vdtree::View;
 constexpr int window_px = 128;
 constexpr int samples = 64; // a pixel, along an additive recurrence in both directions
 constexpr float background = 0.2f;
-
-// ---- scenes: lengths in pixels of the screen, the eye where the viewer's is
 
 float relative(double cdm2) { return static_cast<float>(to_relative(Display(), Luminance(cdm2))); }
 
@@ -98,8 +95,6 @@ std::vector<float> ring_costs(const Scene& scene, const View& view) {
     return costs;
 }
 
-// ---- the literal rule: range, sphere and facing of what the node supports
-
 double literal_cost(const VertexTree& tree, NodeId node, const View& view, const FoldTestOptions& options) {
     const NodeId interior = tree.interior_count();
     const Index first = support::sound(tree).first_leaf()[node], end = support::sound(tree).leaf_end()[node];
@@ -135,8 +130,6 @@ double literal_cost(const VertexTree& tree, NodeId node, const View& view, const
                                  .value();
     return 2 * std::max(extent, pixel) * frequency;
 }
-
-// ---- pictures without a graphics card
 
 Image picture(const Cut& cut, const View& view) {
     const VertexTree& tree = cut.tree();
@@ -450,5 +443,4 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
     EXPECT_GT(more, 10u);
 }
 
-} // namespace
 } // namespace unseen::perception::fold_holes_test

@@ -104,9 +104,8 @@ TEST(FoldErrors, GrowUpTheTreeAndHoldTheirDirections) {
             if (!(glm::length(normal) > 1e-9)) continue;
             NormalSlabs own;
             own.insert(glm::normalize(normal));
-            for (const Index leaf : t) {
+            for (const Index leaf : t)
                 ASSERT_TRUE(includes(errors[support::sound(tree).parents()[tree.interior_count() + leaf]].facing, own));
-            }
         }
     }
 }

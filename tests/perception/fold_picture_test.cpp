@@ -63,9 +63,7 @@ TEST(FoldPicture, MeasuresGratings) {
             const auto amplitudes = amplitudes_of(picture);
             // The finest has two cells a wave: what it sees depends on the phase. The coarser ones have a wave and a
             // half or more in the picture.
-            if (band > 0) {
-                EXPECT_NEAR(amplitudes[band], 0.1f, 0.025f) << band << ", phase " << phase;
-            }
+            if (band > 0) EXPECT_NEAR(amplitudes[band], 0.1f, 0.025f) << band << ", phase " << phase;
             for (std::size_t other = band + 2; other < FoldPicture::bands; ++other)
                 EXPECT_LT(amplitudes[other], 0.06f) << other << " of " << band;
         }

@@ -139,9 +139,7 @@ TEST(Pyramid, MeansAreThoseUnderAGaussian) {
         const double most = static_cast<double>(*std::max_element(mean.values.begin(), mean.values.end()));
         const double frequency = FoldStage::frequency(band), gaussian = 1 - std::exp(-frequency * frequency);
         EXPECT_LT(most, 1.1 * gaussian) << band;
-        if (band >= 5) {
-            EXPECT_GT(most, 0.5 * gaussian) << band;
-        }
+        if (band >= 5) EXPECT_GT(most, 0.5 * gaussian) << band;
         plane = next;
     }
 }
@@ -211,8 +209,6 @@ TEST(FoldStages, AreKeptInFiles) {
         EXPECT_TRUE(std::ranges::equal(stages_of(*read), stages_of(tree)));
     }
 }
-
-// ---- large triangles behind, on and through each other
 
 // Pages on one edge.
 Mesh pages(int count) {

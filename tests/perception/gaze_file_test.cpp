@@ -7,7 +7,6 @@
 #include "testing.h"
 
 namespace unseen::perception::gaze_file_test {
-namespace {
 
 class GazeFileTest : public testing::Test {
 protected:
@@ -197,9 +196,8 @@ TEST_F(GazeFileTest, BadFilesNameTheLineAndTheColumn) {
         {"time_s,x_px,y_px,confidence\n0,1,2,95\n", "line 2: column 4, 'confidence', must be within 0..1, and is 95"},
         {"time_s,x_px,y_px,worn\n0,1,2,perhaps\n", "line 2: column 4, 'worn', is no finite number"},
     };
-    for (const auto& [text, expected] : cases) {
+    for (const auto& [text, expected] : cases)
         EXPECT_THAT(error_in(read(text)), AllOf(HasSubstr(file_.string()), HasSubstr(expected))) << text;
-    }
 }
 
 // Bytes and pieces of tables in any order give a trace or an error.
@@ -257,5 +255,4 @@ TEST_F(GazeFileTest, SimulatedRecordingsAreMadeByTheirRule) {
     }
 }
 
-} // namespace
 } // namespace unseen::perception::gaze_file_test

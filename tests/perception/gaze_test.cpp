@@ -4,7 +4,6 @@
 #include "testing.h"
 
 namespace unseen::perception::gaze_test {
-namespace {
 
 GazeTrace trace_of(std::vector<GazeSample> samples) {
     auto trace = GazeTrace::create(std::move(samples));
@@ -31,9 +30,8 @@ TEST(GazeTest, BadTracesNameTheSample) {
         {{{0, {1, 2}}, {0, {1, 2}}}, "sample 1 is out of order"},
         {{{0, {1, 2}}, {1.5, {1, 2}}}, "sample 1 follows a gap of 1.5 s"},
     };
-    for (const auto& [samples, expected] : cases) {
+    for (const auto& [samples, expected] : cases)
         EXPECT_THAT(error_in(GazeTrace::create(samples)), HasSubstr(expected)) << expected;
-    }
 }
 
 TEST(GazeTest, SimulatedGazesRepeatWithTheirSeed) {
@@ -221,5 +219,4 @@ TEST(GazeTest, MarginsAreAtLeastAsLargeAsATablesSteps) {
     EXPECT_GE(seen(widened(fine, Degrees(15)), 15), 300 * (1 - 1e-9));
 }
 
-} // namespace
 } // namespace unseen::perception::gaze_test

@@ -93,8 +93,6 @@ TEST_F(ImageFiles, AreToldApartByContent) {
     EXPECT_TRUE(read_image(path("a.png"))->is_absolute);
 }
 
-// ---- PNG ----------------------------------------------------------------------------------------------------------
-
 struct PngVariant {
     int width = 9, height = 6, bits = 8, type = PNG_COLOR_TYPE_GRAY;
     bool interlaced = false, transparency = false, gamma = false;
@@ -196,8 +194,6 @@ TEST_F(ImageFiles, DamagedPngIsAnErrorAtAnyLength) {
     expect_error(store("a.png", wrong), "damaged PNG");
 }
 
-// ---- PFM ----------------------------------------------------------------------------------------------------------
-
 Bytes pfm(const std::string& header, const std::vector<float>& values, bool is_little) {
     Bytes bytes(header.begin(), header.end());
     for (const float v : values) {
@@ -237,8 +233,6 @@ TEST_F(ImageFiles, BadPfmIsAnError) {
     holes[4] = std::numeric_limits<float>::quiet_NaN();
     expect_error(store("a.pfm", pfm("Pf\n3 2\n-1\n", holes, true)), "(1, 0)");
 }
-
-// ---- EXR ----------------------------------------------------------------------------------------------------------
 
 template <class Pixel>
 fs::path make_exr(const fs::path& file, const std::vector<std::string>& names, Imf::PixelType type,
@@ -311,8 +305,6 @@ TEST_F(ImageFiles, TruncatedExrIsAnErrorAtAnyLength) {
     }
 }
 
-// ---- hostile ------------------------------------------------------------------------------------------------------
-
 constexpr std::size_t proportionate = std::size_t{80} << 20; // bytes: the 64 MiB that any file may ask for, and slack
 
 // The data window of an EXR file and the size of a PNG file, overwritten in place.
@@ -380,8 +372,6 @@ TEST_F(ImageFiles, RandomDamageNeverCrashes) {
     }
     EXPECT_LT(largest_allocation, proportionate);
 }
-
-// ---- errors of the file system, and luminance ----------------------------------------------------------------------
 
 TEST_F(ImageFiles, MissingEmptyOrForeignFilesAreErrors) {
     expect_error(path("nowhere.png"), "no such file");

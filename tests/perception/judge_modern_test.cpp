@@ -6,7 +6,6 @@
 #include "testing.h"
 
 namespace unseen::perception::judge_modern_test {
-namespace {
 
 Image flat(int width, int height, double value) {
     const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -154,8 +153,6 @@ TEST(JudgeModern, MayBeAskedAgain) {
     EXPECT_EQ(judge_modern(reference, b, {})->max_ratio, judge->judge(b)->max_ratio);
 }
 
-// ---- the second judge
-
 // Of patches of any size.
 TEST(SecondJudge, SeesWhatBartenSays) {
     for (const double freq : {2.0, 5.5}) {
@@ -196,8 +193,6 @@ TEST(SecondJudge, SeesForItsPerson) {
     EXPECT_EQ(options.display.distance.value(), 1);
     EXPECT_EQ(options.gaze_px, glm::dvec2(3, 4));
 }
-
-// ---- the first one again
 
 Image with_disc(double luminance, double contrast, double radius_deg, int side) {
     Image image = flat(side, side, luminance);
@@ -435,9 +430,8 @@ TEST(JudgeModern, StaysFiniteInTheDarkAndInFullContrast) {
                 const auto judged = judge_modern(a, b, options);
                 EXPECT_TRUE(std::isfinite(judged->max_ratio));
                 // Nobody sees in light of 1e30 cd/m2, nor behind the head.
-                if (cdm2 == 1e4f && options.gaze_px != opposite.gaze_px) {
+                if (cdm2 == 1e4f && options.gaze_px != opposite.gaze_px)
                     EXPECT_EQ(judged->visible_pixels, judged->pixels);
-                }
             }
         }
     }
@@ -478,5 +472,4 @@ TEST(JudgeModern, RefusesBadInput) {
     EXPECT_TRUE(judge_modern(good, good, options));
 }
 
-} // namespace
 } // namespace unseen::perception::judge_modern_test

@@ -4,7 +4,6 @@
 #include "testing.h"
 
 namespace unseen::perception::judge_rpg99_test {
-namespace {
 
 Image flat(int width, int height, float value) {
     return {width, height, 1,
@@ -150,5 +149,4 @@ TEST(PerceptualdiffLuminance, UsesAdobeWeightsAndGamma) {
     EXPECT_EQ(perceptualdiff_luminance({1, 1, 1, {0}}, 100).at(0, 0), 0.0F);
 }
 
-} // namespace
 } // namespace unseen::perception::judge_rpg99_test

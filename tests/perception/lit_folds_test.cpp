@@ -14,7 +14,6 @@
 #include "testing.h"
 
 namespace unseen::perception::lit_folds_test {
-namespace {
 
 using namespace vdtree;
 
@@ -289,5 +288,4 @@ TEST(LitFolds, RefuseWhatTheyDoNotKnow) {
     EXPECT_EQ(cancelled.error().code, ErrorCode::cancelled);
 }
 
-} // namespace
 } // namespace unseen::perception::lit_folds_test

@@ -13,7 +13,6 @@
 #include "tree_checks.h"
 
 namespace unseen::perception::metamorphic_test {
-namespace {
 
 using namespace vdtree;
 using shapes::random_between;
@@ -242,12 +241,9 @@ TEST_F(Metamorphic, AClosedCameraPath) {
         for (const View& view : round)
             ASSERT_TRUE(cut.follow(criterion, viewpoint_of(tree, view, options_for(view)), c.options));
         const auto at_end = require(cut.follow(criterion, start, c.options));
-        if (c.factor == 1) {
-            EXPECT_EQ(support::sorted_triangles(cut), before);
-        }
+        if (c.factor == 1) EXPECT_EQ(support::sorted_triangles(cut), before);
         EXPECT_LE(at_end->max_fold_cost, c.factor * at_least->max_fold_cost * (1 + 1e-5f));
     }
 }
 
-} // namespace
 } // namespace unseen::perception::metamorphic_test

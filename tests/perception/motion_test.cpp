@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::perception::motion_test {
-namespace {
 
 using support::spatiovelocity_sensitivity;
 
@@ -76,5 +75,4 @@ TEST(Motion, EyesFollowAlmost) {
     EXPECT_TRUE(std::isnan(retinal_velocity_of_target(DegreesPerSecond(not_a_number)).value()));
 }
 
-} // namespace
 } // namespace unseen::perception::motion_test

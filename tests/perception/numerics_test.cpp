@@ -15,15 +15,12 @@
 #include "testing.h"
 
 namespace unseen::perception::numerics_test {
-namespace {
 
 using support::flat;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double denormal = 5e-324;
-
-// ---- light and contrast
 
 double naive_contrast(double lo, double hi) { return (hi - lo) / (hi + lo); }
 
@@ -86,9 +83,7 @@ TEST(Numerics, PicturesOfNoLightAndOfTheSun) {
         for (const float other : {0.0f, 1e-6f, 1e5f, 1e6f}) {
             const auto seen = require(judge->judge(flat(33, 17, other)));
             ASSERT_TRUE(std::isfinite(seen->max_ratio)) << cdm2 << " " << other;
-            if (other >= 1e5f && other > 2 * cdm2) {
-                EXPECT_GT(seen->max_ratio, 1) << cdm2 << " " << other;
-            }
+            if (other >= 1e5f && other > 2 * cdm2) EXPECT_GT(seen->max_ratio, 1) << cdm2 << " " << other;
             for (const float v : seen->visibility.values)
                 ASSERT_TRUE(v >= 0 && std::isfinite(v)) << cdm2 << " " << other;
         }
@@ -111,9 +106,8 @@ TEST(Numerics, CodesBelow0AndAbove1) {
             const double light = decode(display, i / 200.0);
             ASSERT_GE(light, before) << i;
             before = light;
-            if (i >= 0 && i <= 200 && transfer != TransferFunction::pq) {
+            if (i >= 0 && i <= 200 && transfer != TransferFunction::pq)
                 EXPECT_NEAR(encode(display, light), i / 200.0, bound) << i;
-            }
         }
         EXPECT_TRUE(std::isnan(decode(display, not_a_number)));
     }
@@ -138,8 +132,6 @@ TEST(Numerics, GlareInBrightLight) {
     EXPECT_FALSE(std::abs(naive_second / naive_first - 1) <= 1e-3);
 }
 
-// ---- sensitivity
-
 double naive_place(double cpd) { return 12 * std::log2(cpd * 16); } // on an axis of twelfths of octaves from 1/16 cpd
 
 TEST(Numerics, FrequenciesOf0AtTheClampAndBeyondTheCutoff) {
@@ -156,9 +148,7 @@ TEST(Numerics, FrequenciesOf0AtTheClampAndBeyondTheCutoff) {
                 const double s = table.monotone_sensitivity(CyclesPerDegree(cpd), e, l);
                 ASSERT_TRUE(std::isfinite(s) && s >= 0) << cpd;
                 ASSERT_LE(s, before) << cpd << ": finer is not seen better";
-                if (cpd <= 1 / 16.0) {
-                    EXPECT_EQ(s, peak) << cpd << ": nothing coarse is folded";
-                }
+                if (cpd <= 1 / 16.0) EXPECT_EQ(s, peak) << cpd << ": nothing coarse is folded";
                 before = s;
             }
             EXPECT_LT(before, 1e-100) << "far above the cutoff nothing is seen";
@@ -183,9 +173,7 @@ TEST(Numerics, LuminancesAt00113AndBelow) {
                             {.frequency = CyclesPerDegree(1), .luminance = Luminance(cdm2), .temporal = Hertz(hertz)});
             ASSERT_TRUE(std::isfinite(s) && s >= 0 && s < 100) << cdm2;
             if (hertz > 0) continue;
-            if (before > 1e-3) {
-                EXPECT_LT(std::abs(std::log(s / before)), 0.3) << "a spike at " << cdm2;
-            }
+            if (before > 1e-3) EXPECT_LT(std::abs(std::log(s / before)), 0.3) << "a spike at " << cdm2;
             before = s;
         }
     }
@@ -237,9 +225,7 @@ TEST(Numerics, FrequenciesBackFromContrastsAtBothEnds) {
             ASSERT_TRUE(std::isfinite(cpd) && cpd >= before) << contrast;
             before = cpd;
             const double s = table.monotone_sensitivity(CyclesPerDegree(cpd), e, l);
-            if (s > 0) {
-                EXPECT_NEAR(std::log(s * contrast), 0, bound * std::max(1.0, std::log(contrast))) << contrast;
-            }
+            if (s > 0) EXPECT_NEAR(std::log(s * contrast), 0, bound * std::max(1.0, std::log(contrast))) << contrast;
         }
         for (const double none : {-denormal, -1.0, not_a_number}) EXPECT_EQ(inverse(none), infinity) << none;
         EXPECT_EQ(inverse(infinity) > before, true);
@@ -297,8 +283,6 @@ TEST(Numerics, MotionOfWhatNobodySees) {
         EXPECT_NEAR(factor(cpd, 3) / naive_velocity_factor(cpd, 3), 1, 1e-9) << cpd;
 }
 
-// ---- displays
-
 double naive_pixels_per_degree(const Display& d) { return d.distance / d.pixel_pitch * std::numbers::pi / 180; }
 
 TEST(Numerics, DisplaysOfOnePixelAndOf1And1000PixelsPerDegree) {
@@ -330,9 +314,7 @@ TEST(Numerics, PixelsOfADisplayFromNoDistance) {
     for (const double metres : {1e-300, denormal, 1e-9, 1e-3, 0.5}) {
         display.distance = Metres(metres);
         const double ppd = pixels_per_degree(display).value();
-        if (metres < 1e-9) {
-            EXPECT_LT(naive_pixels_per_degree_at(ppd, 45), 0) << "beyond a right angle";
-        }
+        if (metres < 1e-9) EXPECT_LT(naive_pixels_per_degree_at(ppd, 45), 0) << "beyond a right angle";
         double before = 0;
         for (const double angle : {0.0, 45.0, 89.0, 89.9, 90.0, 135.0, 180.0}) {
             const double there = pixels_per_degree_at(display, Degrees(angle)).value();
@@ -344,16 +326,12 @@ TEST(Numerics, PixelsOfADisplayFromNoDistance) {
         // Such displays are refused by the field's name wherever one is taken.
         const auto valid = validate(display);
         EXPECT_EQ(static_cast<bool>(valid), metres >= 1e-3);
-        if (!valid) {
-            EXPECT_THAT(valid.error().message, HasSubstr("viewing_distance_m must be a length from 1 mm"));
-        }
+        if (!valid) EXPECT_THAT(valid.error().message, HasSubstr("viewing_distance_m must be a length from 1 mm"));
     }
     display = {};
     display.lens = {{0, 20}, {40, 10}};
     EXPECT_TRUE(std::isnan(pixels_per_degree_at(display, Degrees(not_a_number)).value()));
 }
-
-// ---- pictures
 
 double naive_levels(int width, int height) { return std::log2(std::min(width, height) / 4); }
 
@@ -389,5 +367,4 @@ TEST(Numerics, MaskersOfAnyStrength) {
     EXPECT_EQ(fast_daly_elevation(0), 1);
 }
 
-} // namespace
 } // namespace unseen::perception::numerics_test

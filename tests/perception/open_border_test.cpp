@@ -90,8 +90,6 @@ TEST(OpenBorders, AreComparedAsLines) {
     EXPECT_EQ(farthest_from({}, points), std::numeric_limits<float>::infinity());
 }
 
-// ---- what folds do to borders
-
 // A flat sheet with a jagged outline and a hole; every fold is nothing but what it does to these.
 Mesh cut_out() {
     Mesh mesh = shapes::placed(shapes::grid(24), 1.0 / 24);

@@ -34,8 +34,6 @@ double luminance_of(const VertexTree& tree, NodeId node) {
     return static_cast<double>(static_cast<float>(tree.luminance()[node]));
 }
 
-// ---- what is seen at a point
-
 struct Seen {
     double nearness = 0; // 1 / depth; 0: the background
     double luminance = 0;
@@ -124,8 +122,6 @@ private:
     std::array<double, rows> offsets_;
 };
 
-// ---- what is said of a fold
-
 struct Bound {
     Sphere sphere;           // nothing changes beyond
     LuminanceRange range;    // what changes has luminances of this, before and after
@@ -172,8 +168,6 @@ Found compare(const Window& window, const std::vector<Seen>& before, const std::
     }
     return found;
 }
-
-// ---- cuts around a fold
 
 // The nodes whose fold shall be looked at: any, but seldom the largest, of which there are few.
 NodeId random_node(const VertexTree& tree, std::mt19937_64& random) {

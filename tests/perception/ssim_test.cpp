@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::perception::ssim_test {
-namespace {
 
 // Codes n/255 of a fixed pseudo-random sequence over a ramp.
 Image noisy_ramp(int width, int height, int channels, std::uint32_t seed, int amplitude) {
@@ -102,5 +101,4 @@ TEST(Ssim, RefusesWhatItCannotCompare) {
     EXPECT_FALSE(ssim(broken, broken));
 }
 
-} // namespace
 } // namespace unseen::perception::ssim_test

@@ -3,7 +3,6 @@
 #include "testing.h"
 
 namespace unseen::perception::summation_test {
-namespace {
 
 // The mean of w over discs, w = Ac / (Ac + pi r^2)^2, is the law of area.
 TEST(SummationWindow, HoldsOfDiscsWhatTheLawOfAreaSays) {
@@ -39,5 +38,4 @@ TEST(SummationWindow, LosesNothingOfAPlane) {
     EXPECT_NEAR(sum, 1, 0.02);
 }
 
-} // namespace
 } // namespace unseen::perception::summation_test

@@ -15,7 +15,6 @@
 #include "textures.h"
 
 namespace unseen::perception::textured_folds_test {
-namespace {
 
 using namespace vdtree;
 
@@ -195,5 +194,4 @@ TEST(TexturedFolds, OfOddMeshesAreNumbers) {
     }
 }
 
-} // namespace
 } // namespace unseen::perception::textured_folds_test

@@ -9,7 +9,6 @@
 #include "testing.h"
 
 namespace unseen::perception::translucency_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::Index;
@@ -104,5 +103,4 @@ TEST_P(Translucency, OfOpaqueMeshesIsNone) {
     EXPECT_LT(halves.right, 100);
 }
 
-} // namespace
 } // namespace unseen::perception::translucency_test

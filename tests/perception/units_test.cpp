@@ -4,7 +4,6 @@
 #include "testing.h"
 
 namespace unseen::perception::units_test {
-namespace {
 
 TEST(Units, ConvertDegreesToRadiansAndBack) {
     EXPECT_DOUBLE_EQ(to_radians(180.0_deg).value(), std::numbers::pi);
@@ -38,5 +37,4 @@ TEST(Units, WorkInConstantExpressions) {
     static_assert(nyquist(60.0_ppd) == 30.0_cpd);
 }
 
-} // namespace
 } // namespace unseen::perception::units_test

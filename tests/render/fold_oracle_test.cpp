@@ -16,7 +16,6 @@
 #include "temp_folder.h"
 
 namespace unseen::fold_oracle_test {
-namespace {
 
 using support::built;
 using vdtree::Cut;
@@ -270,5 +269,4 @@ TEST(FoldDistance, LeavesLittleOfAFarObject) {
     EXPECT_LT(triangles(0.9, true), near);
 }
 
-} // namespace
 } // namespace unseen::fold_oracle_test

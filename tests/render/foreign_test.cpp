@@ -305,8 +305,6 @@ TEST(Adopt, DeletesNothingOfAnotherContextWhenItsOwnIsGone) {
     }
 }
 
-// ---- the sample
-
 // The share of pixels that differ by more than rounding makes inside of a triangle.
 double different_share(const std::vector<float>& a, const std::vector<float>& b) {
     EXPECT_EQ(a.size(), b.size());
@@ -419,8 +417,6 @@ TEST(PlainGlSample, DrawsWhatTheRendererDrawsInAWindow) {
     }
     glfwDestroyWindow(window);
 }
-
-// ---- windows off centre
 
 // A window off centre is a part of a larger one that is centred.
 TEST(OffCentre, ShowsThePartOfALargerWindow) {

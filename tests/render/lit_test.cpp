@@ -13,7 +13,6 @@
 #include "shapes.h"
 
 namespace unseen::lit_test {
-namespace {
 
 using support::built;
 using vdtree::Cut;
@@ -143,5 +142,4 @@ TEST_P(Lit, RefusesLightsThatCannotBe) {
     EXPECT_NE(frame.error().message.find("The scene is black"), std::string::npos);
 }
 
-} // namespace
 } // namespace unseen::lit_test

@@ -10,7 +10,6 @@
 #include "shapes.h"
 
 namespace unseen::metamorphic_test {
-namespace {
 
 using namespace vdtree;
 using Metamorphic = render::testing::GlTest;
@@ -60,5 +59,4 @@ TEST_F(Metamorphic, PicturesOfPermutedMeshes) {
     EXPECT_GT(folded, 2 * tree.triangle_count());
 }
 
-} // namespace
 } // namespace unseen::metamorphic_test

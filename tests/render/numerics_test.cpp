@@ -9,7 +9,6 @@
 #include "scenes.h"
 
 namespace unseen::render::numerics_test {
-namespace {
 
 using Numerics = testing::GlTest;
 
@@ -51,12 +50,9 @@ TEST_F(Numerics, ShadowMapsAtGrazingLight) {
             least = std::min(least, seen[0]);
         }
         // Steeper than 64 to 1 the light is a 64th of itself, and what is lost of it counts for nothing.
-        if (std::tan(elevation) > 1 / 64.0) {
-            EXPECT_NEAR(least, 1, 1e-6) << elevation_deg;
-        }
+        if (std::tan(elevation) > 1 / 64.0) EXPECT_NEAR(least, 1, 1e-6) << elevation_deg;
     }
     EXPECT_GE(naive_hidden, 6);
 }
 
-} // namespace
 } // namespace unseen::render::numerics_test

@@ -65,9 +65,7 @@ TEST_F(OverlayTest, LightIsMixedAndNotItsCodes) {
                 continue;
             }
             const glm::u8vec4 over = pixels[static_cast<std::size_t>((y - 1) * 3 + x - 2)];
-            if (over.a == 0) {
-                EXPECT_EQ(found, below);
-            }
+            if (over.a == 0) EXPECT_EQ(found, below);
             const glm::dvec4 expected = mixed(over);
             for (int c = 0; c < 4; ++c) EXPECT_NEAR(found[c], expected[c], shader_pow) << x << ", " << y << ", " << c;
         }

@@ -475,9 +475,7 @@ TEST_F(RendererTest, DrawsWireframesOfBothShadings) {
         const Frame frame = draw(scene, frontal_view(33, 33), options);
         for (int i = 0; i < 33; ++i) {
             EXPECT_LT(at(frame, i, 32 - i), 0.35f) << "on the diagonal";
-            if (std::abs(i - 16) > 2) {
-                EXPECT_NEAR(at(frame, i, i), 0.5, value_tolerance) << "off the diagonal";
-            }
+            if (std::abs(i - 16) > 2) EXPECT_NEAR(at(frame, i, i), 0.5, value_tolerance) << "off the diagonal";
         }
     }
 }

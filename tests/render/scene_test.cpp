@@ -199,9 +199,7 @@ TEST_F(SceneTest, DrawsIntoWhatIsThereWhereNothingIsCleared) {
     ASSERT_TRUE(draw({&second, 1}, camera, to, {.colour = {}}));
     const auto alone = picture({second}, oblique_view()), layered = *read_luminance(to);
     for (std::size_t i = 0; i < alone.size(); ++i)
-        if (alone[i] != default_background) {
-            ASSERT_EQ(layered[i], alone[i]) << i;
-        }
+        if (alone[i] != default_background) ASSERT_EQ(layered[i], alone[i]) << i;
 }
 
 TEST_F(SceneTest, DrawsOneOfSeveralColours) {
@@ -304,9 +302,7 @@ TEST_F(SceneTest, TilesAreThatPartOfTheWindow) {
     for (int i = 0; i < window * window; ++i) {
         const int x = i % window - shown->left, y = i / window - shown->top;
         const bool is_in_box = x >= 0 && y >= 0 && x < shown->width && y < shown->height;
-        if (!is_in_box) {
-            ASSERT_EQ(whole[static_cast<std::size_t>(i)], default_background) << i;
-        }
+        if (!is_in_box) ASSERT_EQ(whole[static_cast<std::size_t>(i)], default_background) << i;
     }
 
     auto sheet = require(Target::create(context(), 700, 300));

@@ -10,7 +10,6 @@
 #include "shapes.h"
 
 namespace unseen::render::shadow_test {
-namespace {
 
 using vdtree::Lighting;
 using vdtree::LightSource;
@@ -154,12 +153,8 @@ TEST_F(ShadowTest, OfADirectionalLightIsWhereGeometrySays) {
             const double inside = std::min(0.2 - std::abs(at.x + 0.5), 0.2 - std::abs(at.y));
             const float seen = drawn.mask_at(x, y)[0];
             dark += 1 - static_cast<double>(seen);
-            if (inside > 3 * stretched) {
-                ASSERT_EQ(seen, 0) << at.x << " " << at.y;
-            }
-            if (inside < -3 * stretched) {
-                ASSERT_NEAR(seen, 1, 1e-6) << at.x << " " << at.y;
-            }
+            if (inside > 3 * stretched) ASSERT_EQ(seen, 0) << at.x << " " << at.y;
+            if (inside < -3 * stretched) ASSERT_NEAR(seen, 1, 1e-6) << at.x << " " << at.y;
         }
     EXPECT_NEAR(dark * 4 / (window_px * window_px), 0.16, 0.003);
     // Shade has the ambient light alone.
@@ -407,5 +402,4 @@ TEST_F(ShadowTest, AllKindsOfSurfacesAreDrawnWithThem) {
         }
 }
 
-} // namespace
 } // namespace unseen::render::shadow_test

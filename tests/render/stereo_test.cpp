@@ -8,7 +8,6 @@
 #include "shapes.h"
 
 namespace unseen::stereo_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::View;
@@ -58,5 +57,4 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
     }
 }
 
-} // namespace
 } // namespace unseen::stereo_test

@@ -16,7 +16,6 @@
 #include "textures.h"
 
 namespace unseen::texture_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::Mesh;
@@ -240,12 +239,9 @@ TEST_F(Textured, AreBoundedUnderLights) {
             const glm::dvec3 texel(vdtree::linear_colour(mesh.texture.texels[at(uv.y) * 40 + at(uv.x)]));
             const double shown = std::min(1.0, glm::dot(rgb * texel, rec709) * light + (both < 1 ? both - light : 0));
             EXPECT_GE(range.hi, shown - 1e-5) << node;
-            if (both < 1) {
-                EXPECT_LE(range.lo, shown + 1e-5) << node;
-            }
+            if (both < 1) EXPECT_LE(range.lo, shown + 1e-5) << node;
         }
     }
 }
 
-} // namespace
 } // namespace unseen::texture_test

@@ -14,7 +14,6 @@
 #include "textures.h"
 
 namespace unseen::textured_errors_test {
-namespace {
 
 using vdtree::Cut;
 using vdtree::Mesh;
@@ -196,5 +195,4 @@ TEST_P(TexturedErrors, AreSeenByNobodyUnderLights) {
     EXPECT_LT(kept / views, GetParam().most_kept_lit);
 }
 
-} // namespace
 } // namespace unseen::textured_errors_test

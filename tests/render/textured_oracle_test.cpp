@@ -13,7 +13,6 @@
 #include "textures.h"
 
 namespace unseen::textured_oracle_test {
-namespace {
 
 using support::built;
 using vdtree::Cut;
@@ -121,5 +120,4 @@ TEST(TextureDeviation, LetsEvenTexturesOnPlanesFold) {
     EXPECT_GT(inner_triangles(squeezed(textures::textured_grid(40, texture))), all * 3 / 4);
 }
 
-} // namespace
 } // namespace unseen::textured_oracle_test

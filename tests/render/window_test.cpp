@@ -44,9 +44,7 @@ protected:
     }
 
     void TearDown() override {
-        if (window_) {
-            EXPECT_EQ(window_->take_errors(), "") << "at the end of the test";
-        }
+        if (window_) EXPECT_EQ(window_->take_errors(), "") << "at the end of the test";
     }
 
     View view() const {

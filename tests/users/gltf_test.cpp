@@ -114,8 +114,6 @@ TEST_F(GltfUsers, DataAndImagesBesideTheFile) {
     EXPECT_TRUE(fs::exists(path("out/small.bin")));
 }
 
-// ---- cards of which each pixel is known
-
 struct Card {
     int wrap_s, wrap_t, set;
     bool is_beside_another; // with an image of its own, so that both are laid into one

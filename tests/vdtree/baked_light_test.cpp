@@ -9,7 +9,6 @@
 #include "textures.h"
 
 namespace unseen::vdtree::baked_light_test {
-namespace {
 
 using support::built;
 
@@ -107,5 +106,4 @@ TEST(BakedLight, IsSeldomFoundByChance) {
     EXPECT_LT(hints, trials / 4);
 }
 
-} // namespace
 } // namespace unseen::vdtree::baked_light_test

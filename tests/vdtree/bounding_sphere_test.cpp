@@ -236,8 +236,6 @@ TEST(RoundOutward, KeepsPointsWithFloatCoordinates) {
     EXPECT_EQ(round_outward({}).radius, 0);
 }
 
-// ---- how tight the spheres of a tree are
-
 struct Tightness {
     double support = 0, ring = 0; // mean of radius over smallest radius
     double worst = 0;

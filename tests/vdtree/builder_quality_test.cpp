@@ -57,15 +57,6 @@ double area(const Mesh& mesh) {
     return sum;
 }
 
-TEST(DistanceToTriangle, KnowsFacesEdgesAndCorners) {
-    const glm::dvec3 a(0, 0, 0), b(2, 0, 0), c(0, 2, 0);
-    EXPECT_DOUBLE_EQ(distance_to_triangle({0.5, 0.5, 3}, a, b, c), 3);
-    EXPECT_DOUBLE_EQ(distance_to_triangle({1, -2, 0}, a, b, c), 2);
-    EXPECT_DOUBLE_EQ(distance_to_triangle({-3, -4, 0}, a, b, c), 5);
-    EXPECT_NEAR(distance_to_triangle({2, 2, 0}, a, b, c), std::sqrt(2.0), 1e-12);
-    EXPECT_DOUBLE_EQ(distance_to_triangle({1, 1, 1}, a, a, a), std::sqrt(3.0)); // no area
-}
-
 TEST(Quadric, KeepsACubesCornersLongest) {
     // When the clusterer is down to a few dozen of the 386 vertices, each corner is still a cluster at its own place.
     const Mesh cube = shapes::cube(8);

@@ -11,7 +11,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::builder_test {
-namespace {
 
 // The direction of a normal is computed in double from float positions, here and there by other formulas.
 constexpr double direction_rounding = 1e-7;
@@ -39,8 +38,6 @@ std::vector<Case> cases() {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) all.push_back({shape, kind});
     return all;
 }
-
-// ---- the region of a node, from the definitions
 
 class Regions {
 public:
@@ -180,9 +177,7 @@ TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
             };
             ASSERT_GE(supported(node), 2) << "triangle " << t;
             tree->for_each_child(node, [&](NodeId child) {
-                if (!tree->is_leaf(child)) {
-                    ASSERT_LT(supported(child), 2) << "triangle " << t;
-                }
+                if (!tree->is_leaf(child)) ASSERT_LT(supported(child), 2) << "triangle " << t;
             });
         }
     }
@@ -311,9 +306,7 @@ TEST_P(BuiltTree, BoundsLuminance) {
         if (regions.is_coincident(node)) {
             // Nothing moves: the ring's contrast is that of the attributes which merge, and 0 where they are equal.
             ASSERT_LE(ring.hi - ring.lo, spread + luminance_rounding);
-            if (spread == 0) {
-                ASSERT_EQ(ring.hi, ring.lo);
-            }
+            if (spread == 0) ASSERT_EQ(ring.hi, ring.lo);
         } else {
             ASSERT_EQ(ring.lo, low) << "node " << node;
             ASSERT_EQ(ring.hi, high) << "node " << node;
@@ -398,8 +391,6 @@ TEST(BuildTree, DoesNotDependOnThreadsWhereThereIsWorkForAll) {
         }
     }
 }
-
-// ---- literal meshes with hand-made clusterings
 
 // A clusterer that says what it was told to say.
 auto fixed(const Clustering& clustering) {
@@ -525,8 +516,6 @@ TEST(LiteralTree, OneClusterForAll) {
     EXPECT_TRUE(verify(*tree));
 }
 
-// ---- clusterings of users
-
 TEST(UserClustering, MayBeAsDeepAsItHasVertices) {
     const Mesh mesh = shapes::grid(141); // 20164 vertices
     const Index n = static_cast<Index>(mesh.positions.size());
@@ -584,9 +573,7 @@ TEST(UserClustering, IsCheckedBeforeUse) {
     for (const auto& [what, clustering] : invalid) {
         const auto tree = build_tree(mesh.view(), fixed(clustering));
         EXPECT_FALSE(tree) << what;
-        if (!tree) {
-            EXPECT_EQ(tree.error().code, ErrorCode::invalid_argument) << what;
-        }
+        if (!tree) EXPECT_EQ(tree.error().code, ErrorCode::invalid_argument) << what;
     }
 }
 
@@ -622,8 +609,6 @@ TEST(UserClustering, IsGivenLuminanceNormalsAreasAndCoincidence) {
     EXPECT_TRUE(build_tree(mesh.view(), look));
 }
 
-// ---- input
-
 TEST(BuildTree, CountsTheTrianglesItDrops) {
     const Mesh mesh = shapes::with_degenerate_triangles(shapes::cube(2));
     const auto tree = require(build_tree(mesh.view()));
@@ -637,9 +622,7 @@ TEST(BuildTree, RefusesWhatItCannotBuildOn) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
             const auto tree = build_tree(mesh.view(), {.clusterer = kind});
             EXPECT_FALSE(tree) << what;
-            if (!tree) {
-                EXPECT_FALSE(tree.error().message.empty());
-            }
+            if (!tree) EXPECT_FALSE(tree.error().message.empty());
         }
     };
     expect_refused({}, "an empty mesh");
@@ -801,9 +784,7 @@ TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
                 ++merges;
                 const LuminanceRange ring = tree->ring_luminance()[node];
                 EXPECT_NEAR(ring.hi - ring.lo, colours_differ ? 0.5f : 0.0f, luminance_rounding);
-                if (!colours_differ) {
-                    EXPECT_EQ(ring.hi, ring.lo);
-                }
+                if (!colours_differ) EXPECT_EQ(ring.hi, ring.lo);
             }
             EXPECT_EQ(merges, 2);
         }
@@ -819,8 +800,6 @@ TEST(BuildTree, KeepsThePrecisionOfNorthings) {
         ASSERT_LT(glm::distance(p, mesh.positions[tree->source_vertices()[leaf]]), 5e-6);
     }
 }
-
-// ---- light
 
 TEST(Relit, EqualsATreeBuiltWithThatLight) {
     const Light light{.direction = glm::normalize(glm::vec3(-1, 0.2f, 0.5f)), .ambient = 0.4f};
@@ -850,9 +829,8 @@ TEST(BuildTree, LightsColoursUnlessTheyArePrelit) {
     EXPECT_TRUE(verify(*lit));
     EXPECT_EQ(support::difference(*lit, *prelit->relit(Light())), "");
     for (Index leaf = 0; leaf < lit->leaf_count(); ++leaf)
-        if (lit->source_vertices()[leaf] == 0) {
+        if (lit->source_vertices()[leaf] == 0)
             EXPECT_NEAR(lit->luminance()[lit->interior_count() + leaf], 1, packed_normal_error);
-        }
     // Without colours there is nothing that light could be baked into.
     mesh.colours.clear();
     const auto grey = require(build_tree(mesh.view(), lit_options)),
@@ -932,8 +910,6 @@ TEST(BuildTree, RefusesImpossibleLights) {
     for (const float y : long_direction->luminance()) ASSERT_TRUE(y >= 0 && y <= 1);
 }
 
-// ---- progress
-
 TEST(BuildTree, CanBeCancelledAtAnyTime) {
     const Mesh mesh = shapes::bumpy_sphere(3);
     for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
@@ -968,5 +944,4 @@ TEST(BuildTree, ReportsProgressThatGrows) {
     EXPECT_EQ(last, 1);
 }
 
-} // namespace
 } // namespace unseen::vdtree::builder_test

@@ -19,7 +19,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::clusterer_test {
-namespace {
 
 using support::ClusteringTask;
 
@@ -370,8 +369,6 @@ TEST(Quadric, KeepsLooseTrianglesThatAreSpreadOut) {
     for (const int n : left) EXPECT_EQ(n, 1);
 }
 
-// ---- parts by themselves
-
 // Both halves of a strip of squares along x, as two parts.
 struct Strip {
     PartMesh left, right;
@@ -441,5 +438,4 @@ TEST(QuadricParts, StopWhenToldTo) {
     EXPECT_GT(c.live.size(), 1u);
 }
 
-} // namespace
 } // namespace unseen::vdtree::clusterer_test

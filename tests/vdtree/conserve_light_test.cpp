@@ -10,7 +10,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::conserve_light_test {
-namespace {
 
 using support::built;
 
@@ -81,5 +80,4 @@ TEST(ConserveLight, ChangesProxiesOnlyAndNothingWhenDoneAgain) {
     EXPECT_TRUE(again->attributes().empty()) << "measured before";
 }
 
-} // namespace
 } // namespace unseen::vdtree::conserve_light_test

@@ -11,7 +11,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::criteria_test {
-namespace {
 
 using shapes::random_between;
 using shapes::random_direction;
@@ -132,8 +131,6 @@ TEST(EyeInTree, UndoesThePlacementAndTheOrigin) {
     }
 }
 
-// ---- node extent
-
 TEST(Extent, IsTheSizeOfTheProjectedSphere) {
     std::mt19937_64 random(2);
     const VertexTree tree = built(shapes::bumpy_sphere(2));
@@ -180,8 +177,6 @@ TEST(Extent, IsZeroForAPoint) {
     }
     EXPECT_EQ(points, 2);
 }
-
-// ---- displacement
 
 TEST(Displacement, IsNotExceededByAnyVertex) {
     std::mt19937_64 random(3);
@@ -265,8 +260,6 @@ TEST(Displacement, IsZeroWhereNothingMovesAndUnboundedInside) {
     }
 }
 
-// ---- both
-
 TEST(Criteria, DoNotFallFromANodeToItsParent) {
     std::mt19937_64 random(5);
     for (const shapes::Named& named : meshes_in_range()) {
@@ -348,8 +341,6 @@ TEST(Criteria, FoldFromHalfAsFarWithTwiceTheTolerance) {
             EXPECT_NEAR(one[i], 2 * two[i], 2e-3 * one[i]); // but for the spheres' own radii
     }
 }
-
-// ---- infinite costs
 
 // A node, and an eye where its support's sphere is.
 struct EyeAtSphere {
@@ -506,8 +497,6 @@ TEST(UnboundedCosts, AreOrderedAndUnbounded) {
     EXPECT_FALSE(is_unbounded(1e20f));
 }
 
-// ---- the frustum
-
 // Whether a point (relative to the tree's origin) is in front of the eye and within the window. The window's planes
 // are moved outward by `play` of the point's distance from the eye.
 bool in_window(const VertexTree& tree, const View& view, glm::dvec3 p, double play) {
@@ -589,8 +578,6 @@ TEST(Frustum, FoldsWhatIsBehindTheEye) {
     EXPECT_TRUE(seen_of(tree, {.eye = {0, 0, 5}})[VertexTree::root()]);
 }
 
-// ---- windows off centre, orthographic views, pairs
-
 // Whether the sphere shows in the window, from the definition: sides by the half space, conservatively.
 bool may_show(const View& view, glm::dvec3 point) {
     const CameraFrame frame = camera_frame(view);
@@ -663,12 +650,8 @@ TEST(Orthographic, FoldsBySizesThatDoNotFallWithTheDistance) {
                 const bool unfolded = (*bits)[node / 64] >> (node % 64) & 1;
                 // Depth and spread: two diameters and two radii of 2000 windows, which the nearest may gain.
                 const double gain = 1 + 8 * radius / (2000 * *view.orthographic_height);
-                if (length * pixels_a_unit > tolerance * (1 + 1e-5)) {
-                    EXPECT_TRUE(unfolded) << node;
-                }
-                if (gain < 1.1 && length * pixels_a_unit * gain * 1.001 < tolerance) {
-                    EXPECT_FALSE(unfolded) << node;
-                }
+                if (length * pixels_a_unit > tolerance * (1 + 1e-5)) EXPECT_TRUE(unfolded) << node;
+                if (gain < 1.1 && length * pixels_a_unit * gain * 1.001 < tolerance) EXPECT_FALSE(unfolded) << node;
             }
         }
     }
@@ -706,9 +689,7 @@ TEST(Orthographic, TakesAllOutlinesForOutlines) {
             const bool unfolded = (*bits)[node / 64] >> (node % 64) & 1;
             outlines += sides[node] == 3;
             all_kept += unfolded;
-            if (sides[node] == 3) {
-                EXPECT_TRUE(unfolded) << node;
-            }
+            if (sides[node] == 3) EXPECT_TRUE(unfolded) << node;
         }
     }
     EXPECT_GT(outlines, 100u);
@@ -734,5 +715,4 @@ TEST(ViewpointOfPair, HoldsWhatEitherWindowShowsAndRefusesWhatIsNone) {
     EXPECT_FALSE(viewpoint_of_pair(tree, left, left));
 }
 
-} // namespace
 } // namespace unseen::vdtree::criteria_test

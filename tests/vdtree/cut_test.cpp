@@ -9,7 +9,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::cut_test {
-namespace {
 
 using shapes::random_unit;
 using support::fault_in_cut;
@@ -90,8 +89,6 @@ auto look_up(const std::vector<float>& costs) {
     };
 }
 
-// ---- operations
-
 TEST(Cut, StartsWhollyFolded) {
     const VertexTree tree = built(shapes::torus(12, 6));
     const Cut cut(tree);
@@ -171,8 +168,6 @@ TEST(Cut, UnfoldAncestorsUnfoldsNothingElse) {
         for (NodeId n = 0; n < tree.interior_count(); ++n) ASSERT_EQ(cut.is_unfolded(n), above[n]);
     }
 }
-
-// ---- thresholds
 
 TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {
     std::mt19937_64 random(4);
@@ -267,8 +262,6 @@ TEST(Adjust, DoesNotDependOnTheStateBefore) {
         EXPECT_EQ(incremental.unfolds, unfolds);
     }
 }
-
-// ---- budgets
 
 TEST(Budget, NeverExceedsAndNeverWastes) {
     std::mt19937_64 random(6);
@@ -402,8 +395,6 @@ TEST(Budget, OrdersUnboundedCostsAmongThemselves) {
     EXPECT_GT(cut.triangle_count(), 0u);
 }
 
-// ---- visibility
-
 TEST(Visibility, FoldsWhatIsOutAtNoCost) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     const std::vector<float> costs(tree.interior_count(), 7.0f);
@@ -460,8 +451,6 @@ TEST(Visibility, AsksInBatchesOfLevels) {
     EXPECT_GT(largest, 100u); // many nodes a call
     EXPECT_LT(calls, tree.interior_count() / 4);
 }
-
-// ---- several cuts, extraction
 
 TEST(Cuts, ShareOneTreeBetweenThreads) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
@@ -568,5 +557,4 @@ TEST(ExtractMesh, IsEmptyForAFoldedCut) {
     EXPECT_TRUE(nothing.positions.empty() && nothing.triangles.empty() && nothing.ranges.empty());
 }
 
-} // namespace
 } // namespace unseen::vdtree::cut_test

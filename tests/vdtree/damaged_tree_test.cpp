@@ -16,7 +16,6 @@
 #include "tree_use.h"
 
 namespace unseen::vdtree::damaged_tree_test {
-namespace {
 
 using support::built;
 using support::TreeFile;
@@ -136,5 +135,4 @@ INSTANTIATE_TEST_SUITE_P(All, DamagedTrees,
                                            Kind{"marked", marked}, Kind{"large", open_and_large}),
                          [](const auto& kind) { return kind.param.name; });
 
-} // namespace
 } // namespace unseen::vdtree::damaged_tree_test

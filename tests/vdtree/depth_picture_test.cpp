@@ -8,7 +8,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::depth_picture_test {
-namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -98,9 +97,8 @@ TEST(DepthPicture, WhatHoldsWhatIsSeenIsSeen) {
     const DepthPicture picture = *DepthPicture::create(view, blocks(view, random));
     for (int trial = 0; trial < 20000; ++trial) {
         const auto places = random_places(random, 4);
-        if (picture.hides(footprint_of(picture, places))) {
+        if (picture.hides(footprint_of(picture, places)))
             ASSERT_TRUE(picture.hides(footprint_of(picture, std::span(places).first(2)))) << trial;
-        }
     }
 }
 
@@ -127,9 +125,7 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     EXPECT_GT(half.triangle_count(), 0.45 * whole.triangle_count());
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const NodeId vertex = tree.interior_count() + leaf;
-        if (tree.positions()[vertex].x + tree.origin().x > 0.05) {
-            ASSERT_TRUE(half.is_active(vertex)) << leaf;
-        }
+        if (tree.positions()[vertex].x + tree.origin().x > 0.05) ASSERT_TRUE(half.is_active(vertex)) << leaf;
     }
 }
 
@@ -150,5 +146,4 @@ TEST(DepthPicture, RefusesWhatIsNone) {
     EXPECT_FALSE(folding_hidden(tree, extent, {}));
 }
 
-} // namespace
 } // namespace unseen::vdtree::depth_picture_test

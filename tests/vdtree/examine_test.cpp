@@ -5,7 +5,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::examine_test {
-namespace {
 
 using meshio::Examination;
 
@@ -163,5 +162,4 @@ TEST(Examine, TakesAnyMeshThatIsValid) {
     EXPECT_EQ(examined(none).components, 0u);
 }
 
-} // namespace
 } // namespace unseen::vdtree::examine_test

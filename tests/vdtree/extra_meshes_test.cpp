@@ -17,7 +17,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::extra_meshes_test {
-namespace {
 
 class ExtraMesh : public testing::TestWithParam<std::filesystem::path> {};
 
@@ -111,5 +110,4 @@ TEST(ExtraMeshes, AreThereWhereTheFolderIs) {
     EXPECT_FALSE(support::extra_meshes().empty()) << support::extra_mesh_folder();
 }
 
-} // namespace
 } // namespace unseen::vdtree::extra_meshes_test

@@ -12,7 +12,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::flawed_mesh_test {
-namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -320,13 +319,11 @@ TEST(FlawedMesh, WhatDecidesTheShapeSaysTheWayOut) {
                          mesh_files::gltf_triangle_data()),
          "accessor 7 is used, but there are 2"},
     };
-    for (const auto& c : wrong) {
+    for (const auto& c : wrong)
         EXPECT_THAT(error_in(meshio::read_mesh_bytes(c.bytes, c.name)), HasSubstr(c.error)) << c.error;
-    }
     const auto read =
         require(meshio::read_mesh_bytes(mesh_files::glb(plain.dump(), mesh_files::gltf_triangle_data()), "a.glb"));
     EXPECT_TRUE(read->warnings.empty()) << in_lines(read->warnings);
 }
 
-} // namespace
 } // namespace unseen::vdtree::flawed_mesh_test

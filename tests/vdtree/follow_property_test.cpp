@@ -4,7 +4,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::follow_property_test {
-namespace {
 
 // Runs; more with the environment variable UNSEEN_RUNS.
 unsigned run_count() {
@@ -30,5 +29,4 @@ TEST(FollowProperty, HoldsWhenTheBytesEndAnywhere) {
         ASSERT_EQ(support::FollowDrive(random_bytes(seed, 3 * seed)).run(), "") << "seed " << seed;
 }
 
-} // namespace
 } // namespace unseen::vdtree::follow_property_test

@@ -12,7 +12,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::follow_test {
-namespace {
 
 using shapes::random_unit;
 using support::from_scratch;
@@ -256,9 +255,7 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
         }
     }
     EXPECT_LT(incremental_tests, 4 * all_tests);
-    if (GetParam().has_small_rings) {
-        EXPECT_GT(hiding_frames, frame_count() / 20);
-    }
+    if (GetParam().has_small_rings) EXPECT_GT(hiding_frames, frame_count() / 20);
 }
 
 // Straight at the model, past it and away from it, by steps of all sizes, with a gaze that goes its own way.
@@ -338,9 +335,7 @@ TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
             eye += step;
         }
     }
-    if (GetParam().has_small_rings) {
-        EXPECT_GT(cut_frames, all_frames / 2);
-    }
+    if (GetParam().has_small_rings) EXPECT_GT(cut_frames, all_frames / 2);
 }
 
 // What one cut for several eyes keeps: all that the cut of any of them has, whatever the criterion, gazes, back faces and
@@ -448,10 +443,9 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
                 ASSERT_EQ(bit(unfolded, i), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
                 expect_cost_by_definition(*criterion, candidates[i], viewpoint, cost[i], seen_cost[i]);
                 // A cost that is not just the threshold tells the verdict.
-                if (std::abs(seen_cost[i] - options.threshold) > 1e-4f * options.threshold) {
+                if (std::abs(seen_cost[i] - options.threshold) > 1e-4f * options.threshold)
                     ASSERT_EQ(seen_cost[i] > options.threshold, verdicts[i].unfolded)
                         << "variant " << variant << ", node " << shuffled[i];
-                }
             }
             if (HasFatalFailure()) return;
         }
@@ -788,9 +782,8 @@ TEST(FollowInTime, TestsDoNotKeepAMovingCutFromUnfolding) {
         const Viewpoint viewpoint{.eye = 4.0 * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
         const auto followed = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
         ASSERT_TRUE(followed && whole.follow(criterion, viewpoint));
-        if (frame > 0 && hurried.triangle_count() < whole.triangle_count() / 2) {
+        if (frame > 0 && hurried.triangle_count() < whole.triangle_count() / 2)
             EXPECT_GT(followed->unfolds, 0u) << "frame " << frame;
-        }
     }
     EXPECT_GT(hurried.triangle_count(), whole.triangle_count() / 2);
 }
@@ -1085,5 +1078,4 @@ TEST(FollowThreads, SeveralCutsShareATree) {
     for (const auto& result : results) EXPECT_EQ(result, results[0]);
 }
 
-} // namespace
 } // namespace unseen::vdtree::follow_test

@@ -11,7 +11,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::geomorph_test {
-namespace {
 
 using shapes::random_unit;
 
@@ -272,8 +271,6 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
     EXPECT_GT(changes, 40u);
 }
 
-// ---- one node
-
 class OneNode : public testing::Test {
 protected:
     OneNode() { // a node whose children are all leaves, apart from its own place
@@ -374,8 +371,6 @@ TEST_F(OneNode, WhatUnfoldsUnderAGlidingVertexBeginsWhereThatIs) {
     pass(0.5);
     EXPECT_FALSE(geomorph_.is_gliding());
 }
-
-// ---- rules
 
 TEST(Geomorph, JumpsAreCutShort) {
     const VertexTree tree = tree_classes[1].make();
@@ -508,5 +503,4 @@ TEST(Geomorph, RefusesWhatIsNoTime) {
     EXPECT_TRUE(geomorph.is_gliding());
 }
 
-} // namespace
 } // namespace unseen::vdtree::geomorph_test

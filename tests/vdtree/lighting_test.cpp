@@ -14,7 +14,6 @@
 #include "tree_checks.h"
 
 namespace unseen::vdtree::lighting_test {
-namespace {
 
 using Kind = LightSource::Kind;
 using shapes::random_between;
@@ -166,8 +165,6 @@ TEST(Lights, AtAVertexOrInsideAreRefused) {
     const VertexTree open = std::move(*build_tree(shapes::grid(8).view(), {.threads = 1}));
     EXPECT_TRUE(check_lights(open, lit_by(point({0.5, 0.5, 0.01}, 1, 1))));
 }
-
-// ---- bounds
 
 Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree, bool shines) {
     const Sphere around = tree.bounds()[0].ring;
@@ -422,8 +419,6 @@ TEST(Lights, OfWhichTooManyCastShadowsAreRefused) {
     EXPECT_TRUE(validate(lighting));
 }
 
-// ---- cuts
-
 TEST(Keeping, NodesNeverFoldFromWhereverTheyAreSeen) {
     const VertexTree tree = std::move(*build_tree(shapes::icosphere(4).view()));
     View view;
@@ -550,9 +545,7 @@ void expect_cuts_without_history(const Subject& s, bool with_gaze, bool eye_move
         for (NodeId node = 0; node < s.tree.interior_count(); ++node)
             ASSERT_EQ(cut.is_unfolded(node), fresh.is_unfolded(node))
                 << s.name << ", seed " << seed << ", frame " << frame << ", node " << node;
-        if (frame % 10 == 9) {
-            ASSERT_EQ(support::fault_in_cut(cut), "");
-        }
+        if (frame % 10 == 9) ASSERT_EQ(support::fault_in_cut(cut), "");
         const bool do_rest = seed % 4 < 2 && frame / 10 % 2 == 0; // they begin to move, and stand still again
         if (!do_rest)
             move_lights(random, viewpoint.lighting, radius, frame % 13 == 12 ? 1 : 0.02 * random_unit(random));
@@ -599,5 +592,4 @@ TEST(FollowLights, RefusesASceneWithoutThem) {
     EXPECT_NE(stats.error().message.find("The scene is black"), std::string::npos);
 }
 
-} // namespace
 } // namespace unseen::vdtree::lighting_test

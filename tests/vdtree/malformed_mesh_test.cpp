@@ -70,8 +70,6 @@ std::vector<std::pair<std::string, std::string>> all_samples() {
     return samples;
 }
 
-// ---- cut short ----
-
 // How many bytes a sample can lose and still be whole: its last newline, an OFF's colour, an OBJ's optional indices,
 // what stands behind the data of a VTP.
 std::size_t dispensable_bytes(const std::string& name) {
@@ -101,8 +99,6 @@ TEST(MalformedMesh, CutShortAtTheFrontIsNoCrash) {
         for (std::size_t start = 1; start < bytes.size(); ++start) is_read_or_refused(bytes.substr(start), name);
     }
 }
-
-// ---- damaged ----
 
 TEST(MalformedMesh, DamagedAnywhereIsNoCrash) {
     constexpr int rounds = 4000;
@@ -142,8 +138,6 @@ TEST(MalformedMesh, WordsInWrongPlacesAreNoCrash) {
         }
     }
 }
-
-// ---- PLY that lies ----
 
 const std::string huge_counts[] = {"2147483648",
                                    "4294967295",
@@ -256,8 +250,6 @@ TEST(MalformedMesh, CoordinatesMustBeFinite) {
                 HasSubstr("vertex 1 of accessor 0 has"));
 }
 
-// ---- bad vertices and faces, left out ----
-
 // Three triangles, the second with a vertex that is NaN, the third with one that is not there: in every format that has
 // indices.
 const std::string three_ply = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
@@ -340,8 +332,6 @@ TEST(MalformedMesh, AMeshWithoutTrianglesIsAnError) {
     }
 }
 
-// ---- OBJ, OFF, STL that lie ----
-
 TEST(MalformedMesh, ObjIndicesAreChecked) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
     for (const std::string corner :
@@ -379,8 +369,6 @@ TEST(MalformedMesh, StlCountsAreCheckedAgainstTheBytes) {
                     HasSubstr("claims " + std::to_string(count) + " facets"));
     }
 }
-
-// ---- glTF that lies ----
 
 std::string glb_with(const std::string& from, const std::string& to) {
     return mesh_files::glb(replaced(mesh_files::gltf_triangle_json(), from, to), mesh_files::gltf_triangle_data());
@@ -614,8 +602,6 @@ TEST(MalformedMesh, CompressedGltfIsChecked) {
     }
 }
 
-// ---- further meshes ----
-
 enum class Expected { loads, error, either };
 
 // What is known about files of these names in a folder named malformed; others may load or not.
@@ -706,9 +692,7 @@ void check_further_mesh(const fs::path& file, const fs::path& temporary) {
         const auto found = expectations.find(name.string());
         expected = found == expectations.end() ? Expected::either : found->second;
     }
-    if (expected != Expected::either) {
-        EXPECT_EQ(is_read, expected == Expected::loads);
-    }
+    if (expected != Expected::either) EXPECT_EQ(is_read, expected == Expected::loads);
 }
 
 TEST(MalformedMesh, FurtherMeshesLoadOrFailAsExpected) {

@@ -7,7 +7,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::materials_test {
-namespace {
 
 class Materials : public testing::Test {
 protected:
@@ -134,5 +133,4 @@ TEST_F(Materials, OfGltfShareTheirImage) {
     EXPECT_EQ(one->materials[7].name, "same (material 7)");
 }
 
-} // namespace
 } // namespace unseen::vdtree::materials_test

@@ -11,7 +11,6 @@
 #include <stop_token>
 
 namespace unseen::vdtree::mesh_file_test {
-namespace {
 
 namespace fs = std::filesystem;
 using namespace std::string_literals;
@@ -52,8 +51,6 @@ void expect_unit_quad(const Mesh& mesh) {
     EXPECT_EQ(mesh.positions[3], glm::dvec3(0, 1, 0));
     EXPECT_THAT(mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}));
 }
-
-// ---- PLY ----
 
 TEST(Ply, ReadsAsciiAndBothByteOrders) {
     expect_unit_quad(read(mesh_files::ascii_ply_quad(), "a.ply").mesh);
@@ -219,8 +216,6 @@ TEST(Ply, SaysHowManyFacesHadTooFewCorners) {
     EXPECT_THAT(result.warnings, ElementsAre("2 faces were left out for having fewer than 3 corners."));
 }
 
-// ---- OBJ ----
-
 TEST(Obj, KeepsTheNumberingOfPositionsOnly) {
     const Mesh mesh = read("v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nf 2 3 4\n", "a.obj").mesh;
     EXPECT_EQ(mesh.positions.size(), 5u); // unreferenced ones too
@@ -239,12 +234,8 @@ TEST(Obj, ReadsEveryFormOfCorner) {
         if (face.find("/1") != std::string::npos || face.find("/-1") != std::string::npos) {
             const bool has_uv = face.find("//") == std::string::npos;
             EXPECT_EQ(mesh.uvs.empty(), !has_uv) << face;
-            if (has_uv) {
-                EXPECT_EQ(mesh.uvs[2], glm::vec2(0.5f, 0.25f));
-            }
-            if (!mesh.normals.empty()) {
-                EXPECT_EQ(mesh.normals[1], glm::vec3(0.0f, 0.0f, 2.0f));
-            }
+            if (has_uv) EXPECT_EQ(mesh.uvs[2], glm::vec2(0.5f, 0.25f));
+            if (!mesh.normals.empty()) EXPECT_EQ(mesh.normals[1], glm::vec3(0.0f, 0.0f, 2.0f));
         }
     }
 }
@@ -330,8 +321,6 @@ TEST(Obj, SaysWhichKeywordItDidNotKnow) {
 TEST(Obj, ReadsAFaceThatStandsBeforeItsVertices) {
     EXPECT_EQ(read("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 1 1 0\n", "a.obj").mesh.triangles.size(), 1u);
 }
-
-// ---- polygons ----
 
 double cut_area(const std::vector<glm::dvec3>& polygon) {
     meshio::PolygonTriangulator polygons;
@@ -455,8 +444,6 @@ TEST(Polygons, AreFannedWhereCuttingThemWouldTakeForEver) {
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
 }
 
-// ---- OFF ----
-
 TEST(Off, ReadsCountsOnEitherLineAndComments) {
     expect_unit_quad(read(mesh_files::off_quad(), "a.off").mesh);
     expect_unit_quad(read("OFF 4 1 0 # counts\n0 0 0\n1 0 0\n\n# more\n1 1 0\n0 1 0\n4 0 1 2 3\n", "a.off").mesh);
@@ -482,8 +469,6 @@ TEST(Off, ReadsItsVariants) {
     EXPECT_EQ(all.uvs[0], glm::vec2(0.5f, 0.75f));
     EXPECT_THAT(error_of(file("NOFF", "0 0"), "a.off"), HasSubstr("line 3: vertex 0 has 2 numbers"));
 }
-
-// ---- STL ----
 
 TEST(Stl, KeepsThreeVerticesAFacet) {
     for (const std::string& file : {mesh_files::binary_stl_facet(), mesh_files::ascii_stl_facet(),
@@ -611,8 +596,6 @@ TEST(Stl, SaysWhenBytesAreLeft) {
     EXPECT_THAT(read(mesh_files::binary_stl_facet() + "more", "a.stl").warnings,
                 ElementsAre("data behind the last facet were ignored."));
 }
-
-// ---- glTF ----
 
 using mesh_files::glb;
 using mesh_files::gltf_triangle_data;
@@ -768,8 +751,6 @@ TEST(Gltf, ReadsOnlyTheSceneThatIsShown) {
     EXPECT_THAT(result.warnings, ElementsAre("1 node was not in the scene that is shown and left out."));
 }
 
-// ---- finding the format, options ----
-
 TEST(MeshIo, TrustsTheContentMoreThanTheEnding) {
     EXPECT_EQ(read(mesh_files::ascii_ply_quad(), "a.obj").mesh.triangles.size(), 2u);
     EXPECT_EQ(read(mesh_files::off_quad(), "a.stl").mesh.triangles.size(), 2u);
@@ -806,8 +787,6 @@ TEST_F(MeshFiles, SayWhyAFileCannotBeOpened) {
     EXPECT_FALSE(meshio::read_mesh(folder_));
     EXPECT_FALSE(meshio::read_mesh("/dev/zero"));
 }
-
-// ---- writing ----
 
 Mesh random_mesh(bool has_float_positions, bool has_attributes) {
     std::mt19937 random(23);
@@ -849,9 +828,8 @@ TEST_F(MeshFiles, ComeBackAsTheyWereWritten) {
             constexpr float normal_tolerance = 1e-6f, colour_tolerance = 2.3f / 510.0f;
             for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
                 EXPECT_LT(glm::length(again->mesh.normals[i] - mesh.normals[i]), normal_tolerance) << name;
-                for (int c = 0; c < 4; ++c) {
+                for (int c = 0; c < 4; ++c)
                     EXPECT_NEAR(again->mesh.colours[i][c], mesh.colours[i][c], colour_tolerance) << name;
-                }
             }
             EXPECT_TRUE(again->warnings.empty()) << name << ": " << again->warnings[0];
         }
@@ -877,10 +855,9 @@ TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
         const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / "a.glb"));
         // Half an ulp of a float relative to the size, and of the double at the offset.
         const double tolerance = size * 0x1p-23 + offset * 0x1p-52;
-        for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t i = 0; i < 3; ++i)
             EXPECT_LE(glm::length((again->mesh.positions[i] - mesh.positions[i]) / tolerance), 2.0)
                 << offset << " " << size;
-        }
     }
 }
 
@@ -956,8 +933,6 @@ TEST_F(MeshFiles, AreNotTakenForOrphansWhileTheyAreWritten) {
     }
 }
 
-// ---- checks and repairs ----
-
 TEST(Mesh, ValidateNamesTheFirstOffender) {
     Mesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
@@ -983,5 +958,4 @@ TEST(Mesh, ValidateNamesTheFirstOffender) {
     EXPECT_THAT(message(bad), HasSubstr("Range 1 ('s')"));
 }
 
-} // namespace
 } // namespace unseen::vdtree::mesh_file_test

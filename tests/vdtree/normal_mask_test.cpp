@@ -7,7 +7,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::normal_mask_test {
-namespace {
 
 using shapes::random_between;
 using shapes::random_direction;
@@ -319,5 +318,4 @@ TEST(Facing, IsMixedInsideAndNoneForNothing) {
     }
 }
 
-} // namespace
 } // namespace unseen::vdtree::normal_mask_test

@@ -37,8 +37,6 @@ DistanceCriterion extent(const VertexTree& tree, const View& view, double pixels
     return std::move(*require(extent_criterion(tree, view, pixels)));
 }
 
-// ---- geometry
-
 double naive_angle(double radius, double distance) { return 2 * std::asin(radius / distance); }
 
 TEST(Numerics, EyeInsideOnAndAtTheCentreOfASphere) {
@@ -50,9 +48,7 @@ TEST(Numerics, EyeInsideOnAndAtTheCentreOfASphere) {
     for (const double share : {0.0, 1e-30, 0.5, 1 - 1e-12, 1.0}) {
         const double distance = share * radius;
         const bool naive_folds = !(naive_angle(radius, distance) > pixel); // no number is above nothing
-        if (share < 1) {
-            EXPECT_TRUE(naive_folds) << share;
-        }
+        if (share < 1) EXPECT_TRUE(naive_folds) << share;
         const Viewpoint there{.eye = glm::dvec3(root.centre) + glm::dvec3(distance, 0, 0)};
         const float cost = costs_from(tree, criterion, there)[VertexTree::root()];
         // On the sphere the distance is rounded: there the gap may be some units in the last place.
@@ -95,9 +91,8 @@ TEST(Numerics, NodesBehindTheEye) {
         const Projector project(view);
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             const Footprint at = project(tree.origin() + glm::dvec3(tree.positions()[node]));
-            if (at.nearest > 0 && at.left > 0 && at.left < view.width && at.top > 0 && at.top < view.height) {
+            if (at.nearest > 0 && at.left > 0 && at.left < view.width && at.top > 0 && at.top < view.height)
                 ASSERT_GT(costs[node], 0) << node;
-            }
         }
     }
 }
@@ -146,9 +141,7 @@ TEST(Numerics, FieldsOf90And180Degrees) {
             const Footprint at = project(p);
             const bool is_in = at.nearest > 0 && at.left >= 0 && at.left <= view.width;
             const double edge = std::abs(std::abs(angle) - field * pi / 360);
-            if (edge > 1e-12) {
-                ASSERT_EQ(is_in, truth) << field << " " << angle;
-            }
+            if (edge > 1e-12) ASSERT_EQ(is_in, truth) << field << " " << angle;
             naive_wrong += naive_in_window(-p.z, p.x, tangent) != truth;
         }
     }
@@ -227,12 +220,8 @@ TEST(Numerics, CoordinatesTinyHugeFarAndMixed) {
     // Directions: squares leave the range long before the numbers do.
     for (const double scale : {1e-300, 1e-30, 1e-6, 1e7, 1e30, 1e300}) {
         const glm::dvec3 v = scale * glm::dvec3(1, -2, 2);
-        if (scale == 1e-30) {
-            EXPECT_EQ(naive_length(glm::vec3(v)), 0);
-        }
-        if (scale == 1e30) {
-            EXPECT_TRUE(std::isinf(naive_length(glm::vec3(v))));
-        }
+        if (scale == 1e-30) EXPECT_EQ(naive_length(glm::vec3(v)), 0);
+        if (scale == 1e30) EXPECT_TRUE(std::isinf(naive_length(glm::vec3(v))));
         EXPECT_LT(glm::distance(unit(v), glm::dvec3(1, -2, 2) / 3.0), 4e-16) << scale;
     }
     EXPECT_EQ(unit({0, 0, 0}), glm::dvec3(0));
@@ -302,8 +291,6 @@ TEST(Numerics, SliversAndTrianglesWithoutArea) {
     for (const PackedNormal packed : tree.normals()) EXPECT_EQ(packed, PackedNormal{});
     EXPECT_TRUE(tree.mask(VertexTree::root()).empty());
 }
-
-// ---- quadrics
 
 struct Plane3 {
     glm::dvec3 normal, point;
@@ -399,8 +386,6 @@ TEST(Numerics, CancellationInQuadrics) {
     }
     EXPECT_GT(naive_worst, 1e6) << "square metres, of some ten";
 }
-
-// ---- masks
 
 // The face and cell of a direction, from coordinates of 0 to 1 times the number of cells.
 int naive_cell(glm::dvec3 n) {
@@ -524,8 +509,6 @@ TEST(Numerics, DirectionsRoundedToBytes) {
     ends.insert({1, 0, 0});
     EXPECT_EQ(ends.hi[0], 127);
 }
-
-// ---- eccentricity
 
 float naive_eccentricity(glm::vec3 towards, glm::vec3 gaze) { return std::acos(glm::dot(towards, gaze)); }
 

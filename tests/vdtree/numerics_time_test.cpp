@@ -38,8 +38,6 @@ AdjustStats followed(Cut& cut, const DistanceCriterion& criterion, const Viewpoi
     return *stats;
 }
 
-// ---- budgets
-
 // Whether so many triangles more fit, in numbers without a sign.
 bool naive_fits(Index budget, Index used, Index more) { return budget - used - more < no_node; }
 Index naive_budget(std::uint64_t asked) { return static_cast<Index>(asked); }
@@ -60,9 +58,7 @@ TEST(Numerics, BudgetsOf0And1AndMoreThanThereAre) {
             const Index triangles =
                 followed(cut, criterion, viewpoint, {.triangle_budget = budget, .fill_budget = true}).triangles;
             EXPECT_LE(triangles, budget);
-            if (budget >= all) {
-                EXPECT_EQ(triangles, all);
-            }
+            if (budget >= all) EXPECT_EQ(triangles, all);
         }
         Cut adjusted(tree);
         EXPECT_LE(adjusted.adjust(costs, {.triangle_budget = budget}).triangles, budget);
@@ -111,9 +107,7 @@ std::vector<bool> naive_order(const VertexTree& tree, std::uint64_t budget, bool
 
 TEST(Numerics, MillionsOfEqualCosts) {
     const VertexTree tree = built(shapes::grid(is_in_full() ? 1500 : 200), {.clusterer = ClustererKind::octree});
-    if (is_in_full()) {
-        ASSERT_GT(tree.triangle_count(), 4'000'000u);
-    }
+    if (is_in_full()) ASSERT_GT(tree.triangle_count(), 4'000'000u);
     const Index budget = tree.triangle_count() / 3;
     EXPECT_NE(naive_order(tree, budget, false), naive_order(tree, budget, true));
     // By definition: the lowest number of those that can unfold, until one does not fit.
@@ -154,8 +148,6 @@ TEST(Numerics, MillionsOfEqualCosts) {
     followed(follower, *criterion, {.eye = {-40, 0.5, 300}}, {.triangle_budget = budget});
     expect_expected(follower, "from elsewhere");
 }
-
-// ---- sums
 
 // What a copy of the index buffer adds up to, in doubles, of numbers that mix vertices with hashes of them.
 double naive_sum_of(std::uint64_t hash) { return static_cast<double>(hash); }
@@ -211,9 +203,7 @@ TEST(Numerics, PatchesOfTheIndexBufferOverAMillionFrames) {
         std::uint64_t anew = 0;
         for (std::size_t i = 0; i < indices.size(); ++i) anew += hash_of(static_cast<Index>(i), indices[i]);
         ASSERT_EQ(sum, anew) << frame;
-        if (frame % 10'000 == 9'999) {
-            ASSERT_EQ(support::fault_in_cut(cut), "") << frame;
-        }
+        if (frame % 10'000 == 9'999) ASSERT_EQ(support::fault_in_cut(cut), "") << frame;
     }
     EXPECT_GT(patched, frames / 2);
     EXPECT_GT(written, static_cast<std::uint64_t>(frames));
@@ -301,8 +291,6 @@ TEST(Numerics, DeadlinesAfterDaysOfRunning) {
     walked.front.move_to({Watched::distance + 7, 0, 0}, 0);
     EXPECT_TRUE(walked.is_due());
 }
-
-// ---- time
 
 // A child's way to its own place.
 double naive_weight(double weight, double seconds, double glide_seconds) { return weight + seconds / glide_seconds; }

@@ -11,7 +11,6 @@
 #include "triangle_distance.h"
 
 namespace unseen::vdtree::occluders_test {
-namespace {
 
 using support::built;
 
@@ -136,5 +135,4 @@ TEST(Occluders, RefuseWhatHidesNothing) {
     EXPECT_FALSE(cut.follow(*extent, {.eye = {0, 0, 5}, .occluders = {{{0, 0, 0}, 0.5f}}}));
 }
 
-} // namespace
 } // namespace unseen::vdtree::occluders_test

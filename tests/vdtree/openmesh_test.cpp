@@ -63,9 +63,7 @@ TEST(OpenMeshAdapter, MeshesGoThereAndBack) {
         EXPECT_EQ(made->mesh.has_vertex_colors(), !mesh.colours.empty());
         const auto back = require(to_mesh(made->mesh));
         Mesh expected = mesh;
-        if (expected.normals.empty()) {
-            EXPECT_TRUE(back->mesh.normals.empty());
-        }
+        if (expected.normals.empty()) EXPECT_TRUE(back->mesh.normals.empty());
         expect_equal(back->mesh, expected);
         for (std::size_t v = 0; v < back->vertices.size(); ++v) EXPECT_EQ(back->vertices[v].idx(), static_cast<int>(v));
     }
@@ -175,8 +173,6 @@ TEST(OpenMeshAdapter, CornersSplitVerticesAtSeams) {
     for (const Index v : soup->mesh.triangles[1]) EXPECT_EQ(soup->mesh.uvs[v].x, 0.75f);
     EXPECT_EQ(soup->vertices[4].idx() + soup->vertices[5].idx(), b.idx() + c.idx());
 }
-
-// ---- the clusterer
 
 Result<vdtree::VertexTree> decimated_tree(const Mesh& mesh, const vdtree::BuildOptions& options = {}) {
     return vdtree::build_tree(

@@ -8,9 +8,6 @@
 #include "tree/mask_pool.h"
 
 namespace unseen::vdtree::packed_test {
-namespace {
-
-// ---- shares
 
 TEST(Unorm16, RoundsToTheNearest) {
     for (int value = 0; value <= 65535; ++value) {
@@ -18,9 +15,8 @@ TEST(Unorm16, RoundsToTheNearest) {
         ASSERT_EQ(Unorm16::nearest(y), y);
         ASSERT_EQ(Unorm16::nearest((value + 0.49) / 65535), y);
         ASSERT_EQ(Unorm16::nearest((value - 0.49) / 65535), y);
-        if (value > 0) {
+        if (value > 0)
             ASSERT_GT(static_cast<float>(y), static_cast<float>(Unorm16{static_cast<std::uint16_t>(value - 1)}));
-        }
     }
     EXPECT_EQ(static_cast<float>(Unorm16{0}), 0.0f);
     EXPECT_EQ(static_cast<float>(Unorm16{65535}), 1.0f);
@@ -34,8 +30,6 @@ TEST(Unorm16, TakesAnyNumber) {
     EXPECT_EQ(Unorm16::nearest(inf).value, 65535);
     EXPECT_EQ(Unorm16::nearest(1.1).value, 65535);
 }
-
-// ---- directions
 
 TEST(PackedNormal, StaysNearTheDirection) {
     std::mt19937_64 random(1);
@@ -82,8 +76,6 @@ TEST(PackedNormal, UnpacksAnyBits) {
     }
 }
 
-// ---- masks
-
 NormalMask random_mask(std::mt19937_64& random) {
     NormalMask mask;
     const std::uint64_t cells = random() % 5 ? random() % 12 : random() % 600;
@@ -119,11 +111,8 @@ TEST(MaskPool, ReadsAnyBytes) {
         for (std::uint8_t& b : bytes) b = static_cast<std::uint8_t>(random() % 4 ? 255 : random());
         const std::size_t at = random() % 8 ? random() % 256 : ~std::size_t{0} - random() % 3;
         const NormalMask mask = unpack_mask(bytes, at);
-        if (bytes.size() < most_mask_bytes || at > bytes.size() - most_mask_bytes) {
-            ASSERT_EQ(mask, all);
-        }
+        if (bytes.size() < most_mask_bytes || at > bytes.size() - most_mask_bytes) ASSERT_EQ(mask, all);
     }
 }
 
-} // namespace
 } // namespace unseen::vdtree::packed_test

@@ -10,7 +10,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::source_document_test {
-namespace {
 
 using meshio::SourceDocument;
 using support::GltfScene;
@@ -125,9 +124,7 @@ TEST(SourceDocuments, OfDamagedBytesLeadNobodyAstray) {
             const support::TempFolder own;
             const auto out = meshio::write_cut(own / name, full_cut(tree));
             written += out.has_value();
-            if (!out) {
-                EXPECT_FALSE(out.error().message.empty());
-            }
+            if (!out) EXPECT_FALSE(out.error().message.empty());
         }
     }
     EXPECT_GT(refused, 100);
@@ -168,5 +165,4 @@ TEST(SourceDocuments, MustBeThatOfTheirTree) {
     EXPECT_FALSE(std::filesystem::exists(folder / "a/b/run.sh"));
 }
 
-} // namespace
 } // namespace unseen::vdtree::source_document_test

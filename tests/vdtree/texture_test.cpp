@@ -16,7 +16,6 @@
 #include "tree_file.h"
 
 namespace unseen::vdtree::texture_test {
-namespace {
 
 using support::built;
 
@@ -269,5 +268,4 @@ TEST(Textures, SendOutLightThatIsNotConserved) {
     EXPECT_TRUE(conserve_light(*tree.untextured()));
 }
 
-} // namespace
 } // namespace unseen::vdtree::texture_test

@@ -21,7 +21,6 @@
 #include "tree_use.h"
 
 namespace unseen::vdtree::tree_io_test {
-namespace {
 
 using support::built;
 
@@ -64,8 +63,6 @@ protected:
     TempFolder folder_;
     std::filesystem::path file_ = folder_ / "tree.vdt";
 };
-
-// ---- round trips
 
 TEST_F(TreeIo, ReadsWhatWasWritten) {
     for (const shapes::Named& named : shapes::all()) {
@@ -129,8 +126,6 @@ TEST_F(TreeIo, IgnoresSectionsThatItDoesNotKnow) {
     const auto again = require(read_bytes(file.bytes()));
     EXPECT_EQ(support::difference(tree, *again), "");
 }
-
-// ---- damage
 
 TEST_F(TreeIo, RefusesEveryTruncation) {
     const std::string bytes = bytes_of(built(shapes::single_triangle()));
@@ -229,8 +224,6 @@ TEST_F(TreeIo, RefusesTablesThatDoNotFit) {
     }
 }
 
-// ---- attributes
-
 // Names that nobody here knows come back from files that were read and from files that were mapped, and go into the
 // next.
 TEST_F(TreeIo, KeepsAttributesOfAnyName) {
@@ -283,8 +276,6 @@ TEST_F(TreeIo, GivesAttributesOfOneTypeOnly) {
     ASSERT_TRUE(write_tree(file_, full));
     EXPECT_TRUE(read_tree(file_));
 }
-
-// ---- files that lie: every checksum is right, the values are not
 
 struct Lie {
     const char* what;
@@ -429,9 +420,7 @@ TEST_F(TreeIo, RefusesLies) {
         }
         // Mapped, it may be found when a cut comes there, or do no harm.
         const auto mapped = map_tree(file_);
-        if (mapped) {
-            EXPECT_TRUE(support::use_everything(*mapped)) << lie.what;
-        }
+        if (mapped) EXPECT_TRUE(support::use_everything(*mapped)) << lie.what;
     }
 }
 
@@ -474,8 +463,6 @@ TEST_F(TreeIo, SurvivesRandomLies) {
     EXPECT_GT(found_later, 100); // by the checks of nodes
     EXPECT_GT(accepted, 100);    // normals, masks, slabs and small changes of values
 }
-
-// ---- mapped files
 
 // The node at which the triangles of a tree are the most.
 NodeId node_with_triangles(const VertexTree& tree) {
@@ -563,8 +550,6 @@ TEST_F(TreeIo, MapsNoSectionAcrossAnElement) {
     EXPECT_THAT(error_in(map_tree(file_)), HasSubstr("multiple of 64"));
 }
 
-// ---- the file system
-
 TEST_F(TreeIo, ReportsMissingFilesAndFolders) {
     const auto missing = read_tree(folder_ / "nothing.vdt");
     ASSERT_FALSE(missing);
@@ -645,5 +630,4 @@ TEST_F(TreeIo, CanBeCancelledAtAnyTime) {
     }
 }
 
-} // namespace
 } // namespace unseen::vdtree::tree_io_test

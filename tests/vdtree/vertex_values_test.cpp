@@ -14,7 +14,6 @@
 #include "value_types.h"
 
 namespace unseen::vdtree::vertex_values_test {
-namespace {
 
 using namespace std::string_literals;
 using meshio::SourceDocument;
@@ -62,8 +61,6 @@ Cut part_cut(const VertexTree& tree, unsigned seed) {
     for (int i = 0; i < 40; ++i) cut.unfold_ancestors(static_cast<NodeId>(random() % tree.node_count()));
     return cut;
 }
-
-// ---- PLY
 
 const std::string ply_types[] = {"char", "uchar", "short", "ushort", "int", "uint", "float", "double"};
 
@@ -187,8 +184,6 @@ TEST(PlyValues, ArraysBecomeProperties) {
     EXPECT_THAT(ply_properties(folder / "b.ply"), ElementsAre("float x", "float y", "float z", "float u_", "float t_"));
 }
 
-// ---- bytes
-
 std::vector<VertexArray> some_arrays(std::size_t vertices) {
     std::mt19937 random(7);
     std::vector<double> reals(vertices);
@@ -263,8 +258,6 @@ TEST(VertexValues, OfDamagedBytesLeadNobodyAstray) {
                 HasSubstr("not that of the tree's mesh"));
 }
 
-// ---- cuts
-
 // By the definition, one vertex after the other.
 TEST(VertexValues, OfCutsAreThoseOfTheirVertices) {
     const Mesh mesh = shapes::bumpy_sphere(2);
@@ -332,8 +325,6 @@ TEST(VertexValues, MeansStayWithinTheValues) {
     for (const float value : values_of<float>((*found)[2])) EXPECT_TRUE(std::isinf(value));
     for (const double value : values_of<double>((*found)[3])) EXPECT_EQ(value, huge[0]);
 }
-
-// ---- there and back
 
 // By place, what a vertex has: bytes of all arrays but those of names that are not asked for.
 std::map<std::array<double, 3>, std::string> by_place(const meshio::ReadResult& read,
@@ -420,5 +411,4 @@ TEST(VertexValues, HaveARange) {
     EXPECT_GT(none.low, none.high);
 }
 
-} // namespace
 } // namespace unseen::vdtree::vertex_values_test

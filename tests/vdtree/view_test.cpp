@@ -9,7 +9,6 @@
 #include "testing.h"
 
 namespace unseen::vdtree::view_test {
-namespace {
 
 using shapes::random_between;
 using shapes::random_direction;
@@ -171,8 +170,6 @@ TEST(Similarity, GoesToTheWorldAndBack) {
     }
 }
 
-// ---- from matrices
-
 glm::dmat4 frustum_matrix(double left, double right, double bottom, double top, double near_distance,
                           double far_distance) {
     return glm::frustum(left, right, bottom, top, near_distance, far_distance);
@@ -302,5 +299,4 @@ TEST(View, RefusesShiftsAndHeightsThatAreNone) {
     EXPECT_FALSE(validate_centred({.shift = {1, 0}}, "This"));
 }
 
-} // namespace
 } // namespace unseen::vdtree::view_test

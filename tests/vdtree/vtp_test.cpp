@@ -13,7 +13,6 @@
 #include "vtp_files.h"
 
 namespace unseen::vdtree::vtp_test {
-namespace {
 
 namespace fs = std::filesystem;
 using namespace std::string_literals;
@@ -63,8 +62,6 @@ void expect_unit_quad(const Mesh& mesh) {
                 ElementsAre(glm::dvec3(0, 0, 0), glm::dvec3(1, 0, 0), glm::dvec3(1, 1, 0), glm::dvec3(0, 1, 0)));
     EXPECT_THAT(mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}));
 }
-
-// ---- reading
 
 TEST(Vtp, EveryEncodingSaysTheSame) {
     for (const Format format : {Format::ascii, Format::binary, Format::raw, Format::base64}) {
@@ -214,8 +211,6 @@ TEST(Vtp, RolesGoByMarksThenNames) {
     EXPECT_THAT(result.notes, ElementsAre(HasSubstr("'height'")));
 }
 
-// ---- what is wrong is said, with its place
-
 TEST(Vtp, SaysWhatIsWrongAndWhere) {
     const std::string text = vtp_files::vtp_quad({Format::ascii});
     const std::tuple<std::string, std::string, std::string> changes[] = {
@@ -323,8 +318,6 @@ TEST(Vtp, ReadingStopsWhenTheCallerSaysSo) {
     }
 }
 
-// ---- writing
-
 template <class T>
 VertexArray array_of(const std::string& name, ValueType type, std::uint32_t components, std::size_t vertices) {
     VertexArray array{.name = name, .type = type, .components = components};
@@ -421,5 +414,4 @@ TEST(Vtp, OtherFormatsSayWhatTheyLeaveOut) {
     EXPECT_THAT(meshio::write_mesh(folder / "a.vtk", mesh.view()).error().message, HasSubstr(".ply, .obj, .glb"));
 }
 
-} // namespace
 } // namespace unseen::vdtree::vtp_test
