@@ -49,8 +49,8 @@ std::optional<VisualField> field_of(const std::string& name) {
     return std::nullopt;
 }
 
-CsfConditions conditions_of(const StimulusOptions& s, bool is_pursued) {
-    CsfConditions c;
+Stimulus conditions_of(const StimulusOptions& s, bool is_pursued) {
+    Stimulus c;
     if (s.temporal) c.temporal = Hertz(*s.temporal);
     if (s.velocity) c.velocity = DegreesPerSecond(*s.velocity);
     if (s.velocity && is_pursued) c.velocity = retinal_velocity_of_target(c.velocity);

@@ -121,7 +121,7 @@ Result<void> write_display(const std::filesystem::path& file, const Display& dis
     if (display.transfer == TransferFunction::table) json.add("transfer_table", to_json(display.table));
     if (!display.lens.empty()) {
         std::string rows;
-        for (const perception::PixelsPerDegreeAt& at : display.lens)
+        for (const perception::Display::PixelsPerDegreeAt& at : display.lens)
             rows += (rows.empty() ? "[" : ", ") + to_json(std::array{at.angle_deg, at.pixels_per_degree});
         json.add("pixels_per_degree_at", rows + "]");
     }

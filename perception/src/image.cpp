@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <csetjmp>
 #include <cstring>
 #include <exception>
 #include <limits>
 #include <optional>
-#include <utility>
 
 #include <Iex.h>
 #include <ImfArray.h>

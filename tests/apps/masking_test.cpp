@@ -17,7 +17,7 @@
 
 namespace unseen::session::masking_test {
 
-using perception::Elevations;
+using Elevations = perception::MaskingPicture::Elevations;
 using perception::Image;
 using perception::MaskingPicture;
 using vdtree::Mesh;

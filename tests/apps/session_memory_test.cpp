@@ -83,7 +83,7 @@ session::Request with_pictures(const Question& q, const Session& session) {
         if (shown) request.shown = *shown;
     }
     if (q.is_masked) {
-        perception::Elevations e{32, (q.view.width + 31) / 32, (q.view.height + 31) / 32, {}, {}};
+        perception::MaskingPicture::Elevations e{32, (q.view.width + 31) / 32, (q.view.height + 31) / 32, {}, {}};
         e.bands.emplace_back(8);
         e.elevation.assign(static_cast<std::size_t>(e.columns) * static_cast<std::size_t>(e.rows), 4);
         const auto masking = perception::MaskingPicture::create(q.view, {&e, 1});

@@ -175,7 +175,7 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
     const VertexTree measured = support::measured(tree());
     const View view = window(display_, {0, 0, 20});
     // By node, the distances from which it is seen where it is no outline, and where it is.
-    const auto seen_from = [&](std::vector<PixelsPerDegreeAt> lens) {
+    const auto seen_from = [&](std::vector<Display::PixelsPerDegreeAt> lens) {
         FoldTestOptions options;
         options.display = display_;
         set_pixels_per_degree(options.display, PixelsPerDegree(8)); // the picture's: coarse

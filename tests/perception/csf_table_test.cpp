@@ -84,7 +84,7 @@ CsfTable noisy_table(unsigned seed) {
 }
 
 TEST(CsfTable, IsWithinHalfAPercentOfTheClosedForm) {
-    const CsfConditions all_conditions[] = {
+    const Stimulus all_conditions[] = {
         {},
         {.temporal = Hertz(2)},
         {.temporal = Hertz(8)},
@@ -92,11 +92,11 @@ TEST(CsfTable, IsWithinHalfAPercentOfTheClosedForm) {
         {.velocity = DegreesPerSecond(0.5)},
         {.velocity = DegreesPerSecond(20)},
         {.field = VisualField::nasal},
-        {.velocity = DegreesPerSecond(3), .field = VisualField::temporal},
+        {.field = VisualField::temporal, .velocity = DegreesPerSecond(3)},
         {.temporal = Hertz(5), .distance = Metres(3)},
     };
     for (const CsfModel model : csf_models) {
-        for (const CsfConditions& conditions : all_conditions) {
+        for (const Stimulus& conditions : all_conditions) {
             const bool knows_fields = name(model).starts_with("castle") || model == CsfModel::stela;
             if (!knows_fields && conditions.field != VisualField::worst) continue;
             const auto table = require(CsfTable::from_model(model, conditions));
@@ -123,7 +123,7 @@ TEST(CsfTable, IsWithinHalfAPercentWhereTheFormsHaveKinks) {
     // 0.0182 cd/m2; and the crossing of daly's branches, at any eccentricity.
     RandomPlaces random(5);
     for (const double hertz : {0.0, 2.0, 8.0}) {
-        const CsfConditions conditions{.temporal = Hertz(hertz)};
+        const Stimulus conditions{.temporal = Hertz(hertz)};
         const auto castle = CsfTable::from_model(CsfModel::castle, conditions);
         const auto daly = CsfTable::from_model(CsfModel::daly, conditions);
         ASSERT_TRUE(castle && daly);
@@ -149,7 +149,7 @@ TEST(CsfTable, IsWithinHalfAPercentWhereTheFormsHaveKinks) {
 }
 
 TEST(CsfTable, RefusesConditionsOutsideOfTheDomain) {
-    const CsfConditions bad[] = {
+    const Stimulus bad[] = {
         {.temporal = Hertz(-1)},
         {.temporal = Hertz(infinity)},
         {.temporal = Hertz(not_a_number)},
@@ -158,7 +158,7 @@ TEST(CsfTable, RefusesConditionsOutsideOfTheDomain) {
         {.temporal = Hertz(8), .velocity = DegreesPerSecond(1)},
         {.distance = Metres(0)},
     };
-    for (const CsfConditions& conditions : bad)
+    for (const Stimulus& conditions : bad)
         EXPECT_THAT(error_in(CsfTable::from_model(CsfModel::castle, conditions)),
                     testing::AllOf(HasSubstr("velocity"), HasSubstr("Hz")));
 }
@@ -598,12 +598,6 @@ TEST(CsfTable, ConservativeFormHoldsWhatMoves) {
 
 TEST(CsfTable, SaysHowFarItsSamplesReach) {
     const CsfTable table = create(small_samples());
-    const CsfReach reach = table.reach();
-    EXPECT_EQ(reach.coarsest, CyclesPerDegree(1));
-    EXPECT_EQ(reach.finest, CyclesPerDegree(16));
-    EXPECT_EQ(reach.eccentricity, Degrees(10));
-    EXPECT_EQ(reach.darkest, Luminance(1));
-    EXPECT_EQ(reach.brightest, Luminance(100));
     const auto beyond = [&](double degrees, double darkest, double brightest) {
         return beyond_reach(table, Degrees(degrees), Luminance(darkest), Luminance(brightest));
     };

@@ -194,7 +194,7 @@ TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(10)).value(), 19);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(35)).value(), 15);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(80)).value(), 12);
-    const std::vector<PixelsPerDegreeAt> bad[] = {
+    const std::vector<Display::PixelsPerDegreeAt> bad[] = {
         {{0, 20}},           {{1, 20}, {2, 20}},           {{0, 20}, {0, 20}},           {{0, 20}, {10, 0}},
         {{0, 20}, {10, -1}}, {{0, not_a_number}, {10, 1}}, {{0, 20}, {not_a_number, 1}}, {{0, 20}, {200, 1}},
         {{0, 1e9}, {1, 1}}};

@@ -1,6 +1,6 @@
 // Stages in which a whole mesh folds, and their pictures: the pyramid against gratings and sums that are known, stages
 // against surfaces that show nothing, and against the background alone.
-#include "measure/fold_stages.h"
+#include "measure/fold_record.h"
 
 #include <unseen/vdtree/tree_io.h>
 

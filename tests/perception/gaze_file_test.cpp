@@ -19,7 +19,7 @@ protected:
         return read_gaze_recording(file_);
     }
     // The samples in a window of 1000x500 pixels; the notes go to `notes`.
-    std::vector<GazeSample> samples(const std::string& text, std::vector<std::string>* notes = nullptr) const {
+    std::vector<GazeTrace::Sample> samples(const std::string& text, std::vector<std::string>* notes = nullptr) const {
         const auto recording = read(text);
         if (!recording) {
             ADD_FAILURE() << recording.error().message << "\n" << text;
@@ -28,7 +28,7 @@ protected:
         if (notes) *notes = recording->notes;
         const auto trace = recording->in_window(1000, 500);
         EXPECT_TRUE(trace);
-        return trace ? trace->samples() : std::vector<GazeSample>();
+        return trace ? trace->samples() : std::vector<GazeTrace::Sample>();
     }
     const std::filesystem::path file_;
 };
@@ -36,7 +36,8 @@ protected:
 TEST_F(GazeFileTest, ReadsItsOwnFormat) {
     std::vector<std::string> notes;
     EXPECT_THAT(samples("# a tracker\ntime_s,x_px,y_px\n0,100,200\r\n\n0.5,200, 100\n1.25,0.5,-50.5\n", &notes),
-                ElementsAre(GazeSample{0, {100, 200}}, GazeSample{0.5, {200, 100}}, GazeSample{1.25, {0.5, -50.5}}));
+                ElementsAre(GazeTrace::Sample{0, {100, 200}}, GazeTrace::Sample{0.5, {200, 100}},
+                            GazeTrace::Sample{1.25, {0.5, -50.5}}));
     EXPECT_THAT(notes, IsEmpty());
 }
 
@@ -53,7 +54,7 @@ TEST_F(GazeFileTest, ReadsTobiiProLab) {
                 "2000\tMouse\t\t\t\t\t\t\t\tMouse \"left\"\r\n"
                 "18667\tEye Tracker\t962\t538\t\t\t\t\t\t\r\n",
                 &notes),
-        ElementsAre(GazeSample{0.002, {960, 540}}, GazeSample{0.018667, {962, 538}}));
+        ElementsAre(GazeTrace::Sample{0.002, {960, 540}}, GazeTrace::Sample{0.018667, {962, 538}}));
     EXPECT_THAT(notes, IsEmpty());
     // Two eyes: the mean of the valid ones.
     EXPECT_THAT(
@@ -64,11 +65,11 @@ TEST_F(GazeFileTest, ReadsTobiiProLab) {
             "16\t100\t200\t110\t220\tInvalid\tValid\n"
             "33\t90\t80\t\t\tValid\tInvalid\n"
             "50\t\t\t\t\tInvalid\tInvalid\n"),
-        ElementsAre(GazeSample{0, {105, 210}}, GazeSample{0.016, {110, 220}}, GazeSample{0.033, {90, 80}},
-                    GazeSample{0.05, {90, 80}}));
+        ElementsAre(GazeTrace::Sample{0, {105, 210}}, GazeTrace::Sample{0.016, {110, 220}},
+                    GazeTrace::Sample{0.033, {90, 80}}, GazeTrace::Sample{0.05, {90, 80}}));
     // Of the media alone; decimal commas.
     EXPECT_THAT(samples("Recording timestamp [ms]\tGaze point X [MCS norm]\tGaze point Y [MCS norm]\n8,5\t0,25\t0,5\n"),
-                ElementsAre(GazeSample{0.0085, {250, 250}}));
+                ElementsAre(GazeTrace::Sample{0.0085, {250, 250}}));
 }
 
 TEST_F(GazeFileTest, ReadsTobiiStudioAndSdk) {
@@ -78,14 +79,14 @@ TEST_F(GazeFileTest, ReadsTobiiStudioAndSdk) {
                 "ValidityRight\t\n"
                 "P01\t3\t640\t512\t170\t130\t660\t500\t0\t0\t\n"
                 "P01\t7\t641\t513\t170\t130\t660\t500\t1\t4\t\n"),
-        ElementsAre(GazeSample{0.003, {650, 506}}, GazeSample{0.007, {641, 513}}));
+        ElementsAre(GazeTrace::Sample{0.003, {650, 506}}, GazeTrace::Sample{0.007, {641, 513}}));
     std::vector<std::string> notes;
     EXPECT_THAT(samples("device_time_stamp,left_gaze_point_on_display_area_x,left_gaze_point_on_display_area_y,"
                         "left_gaze_point_validity,right_gaze_point_on_display_area_x,"
                         "right_gaze_point_on_display_area_y,right_gaze_point_validity\n"
                         "1000000,0.5,0.5,1,0.75,0.25,0\n1016000,nan,nan,0,0.75,0.25,1\n",
                         &notes),
-                ElementsAre(GazeSample{0, {500, 250}}, GazeSample{0.016, {750, 125}}));
+                ElementsAre(GazeTrace::Sample{0, {500, 250}}, GazeTrace::Sample{0.016, {750, 125}}));
     EXPECT_THAT(notes, ElementsAre(HasSubstr("times count from its first row, not by 'device_time_stamp'")));
 }
 
@@ -96,13 +97,14 @@ TEST_F(GazeFileTest, ReadsPupilCoreWhoseYPointsUp) {
                         "282726.5,0,0.59,0.9,0.9,282726.5-0\n"
                         "282726.75,1,0.6,0.25,1,282726.75-0\n",
                         &notes),
-                ElementsAre(GazeSample{0, {500, 125}}, GazeSample{0.25, {500, 125}}, GazeSample{0.5, {250, 0}}));
+                ElementsAre(GazeTrace::Sample{0, {500, 125}}, GazeTrace::Sample{0.25, {500, 125}},
+                            GazeTrace::Sample{0.5, {250, 0}}));
     EXPECT_THAT(notes, ElementsAre(HasSubstr("times count from its first row"), HasSubstr("the head's camera"),
                                    HasSubstr("1 gap is longer than a blink (0.4 s), the longest 0.5 s")));
     EXPECT_THAT(
         samples("world_timestamp,world_index,gaze_timestamp,x_norm,y_norm,x_scaled,y_scaled,on_surf,confidence\n"
                 "5,0,5.5,0.25,0.25,400,300,True,1.0\n"),
-        ElementsAre(GazeSample{0, {250, 375}}));
+        ElementsAre(GazeTrace::Sample{0, {250, 375}}));
 }
 
 TEST_F(GazeFileTest, ReadsPupilNeon) {
@@ -129,9 +131,10 @@ TEST_F(GazeFileTest, ReadsEyeLink) {
     EXPECT_THAT(samples(header + "s1\t1\t771060.00\t512.0\t384.0\t0\t516.0\t380.0\t0\n"
                                  "s1\t1\t771061.00\t.\t.\t1\t520.0\t380.0\t0\n"
                                  "s1\t1\t771062.00\t9.0\t9.0\t1\t.\t.\t1\n"),
-                ElementsAre(GazeSample{0, {514, 382}}, GazeSample{0.001, {520, 380}}, GazeSample{0.002, {520, 380}}));
+                ElementsAre(GazeTrace::Sample{0, {514, 382}}, GazeTrace::Sample{0.001, {520, 380}},
+                            GazeTrace::Sample{0.002, {520, 380}}));
     EXPECT_THAT(samples("Time;Left X;Left Y;Right X;Right Y\n0;300;200;310;210\n0,01;300;200;;\n"),
-                ElementsAre(GazeSample{0, {305, 205}}, GazeSample{0.01, {300, 200}}));
+                ElementsAre(GazeTrace::Sample{0, {305, 205}}, GazeTrace::Sample{0.01, {300, 200}}));
 }
 
 TEST_F(GazeFileTest, UnitsComeFromNames) {
@@ -140,33 +143,34 @@ TEST_F(GazeFileTest, UnitsComeFromNames) {
           std::pair("time_ms", "250"), std::pair("t_us", "250000"), std::pair("time [\xc2\xb5s]", "250000"),
           std::pair("time_ns", "250000000"), std::pair("time", "0.25")})
         EXPECT_THAT(samples(std::string(name) + ",x_px,y_px\n" + text + ",1,2\n"),
-                    ElementsAre(GazeSample{0.25, {1, 2}}))
+                    ElementsAre(GazeTrace::Sample{0.25, {1, 2}}))
             << name;
     // The order of columns, names in quotes, and separators in quotes.
     EXPECT_THAT(samples("\"y_px\",\"note, or \"\"remark\"\"\",\"x_px\",\"time_s\"\n2,\"a, \"\"b, c\"\"\",\"1\",0.25\n"),
-                ElementsAre(GazeSample{0.25, {1, 2}}));
-    EXPECT_THAT(samples("time_s,x_norm,y_norm\n0,0.25,1\n"), ElementsAre(GazeSample{0, {250, 500}}));
+                ElementsAre(GazeTrace::Sample{0.25, {1, 2}}));
+    EXPECT_THAT(samples("time_s,x_norm,y_norm\n0,0.25,1\n"), ElementsAre(GazeTrace::Sample{0, {250, 500}}));
 
     std::vector<std::string> notes;
     EXPECT_THAT(samples("time_s,x,y\n0,-0.5,1.5\n0.1,nan,\n", &notes),
-                ElementsAre(GazeSample{0, {-500, 750}}, GazeSample{0.1, {-500, 750}}));
+                ElementsAre(GazeTrace::Sample{0, {-500, 750}}, GazeTrace::Sample{0.1, {-500, 750}}));
     EXPECT_THAT(notes, ElementsAre(HasSubstr("'x' and 'y' name no unit, and all are within -0.5..1.5")));
     EXPECT_THAT(samples("time_s,x,y\n0,0.5,0.5\n0.1,0.5,1.51\n", &notes),
-                ElementsAre(GazeSample{0, {0.5, 0.5}}, GazeSample{0.1, {0.5, 1.51}}));
+                ElementsAre(GazeTrace::Sample{0, {0.5, 0.5}}, GazeTrace::Sample{0.1, {0.5, 1.51}}));
     EXPECT_THAT(notes, IsEmpty());
 }
 
 TEST_F(GazeFileTest, GapsHoldTheLastPosition) {
     std::vector<std::string> notes;
     EXPECT_THAT(samples("time_s,x_px,y_px\n0,,\n0.1,10,20\n0.2,NaN,nan\n0.3,NA,7\n0.4,.,-\n0.5,30,40\n0.6,,\n", &notes),
-                ElementsAre(GazeSample{0, {10, 20}}, GazeSample{0.1, {10, 20}}, GazeSample{0.2, {10, 20}},
-                            GazeSample{0.3, {10, 20}}, GazeSample{0.4, {10, 20}}, GazeSample{0.5, {30, 40}},
-                            GazeSample{0.6, {30, 40}}));
+                ElementsAre(GazeTrace::Sample{0, {10, 20}}, GazeTrace::Sample{0.1, {10, 20}},
+                            GazeTrace::Sample{0.2, {10, 20}}, GazeTrace::Sample{0.3, {10, 20}},
+                            GazeTrace::Sample{0.4, {10, 20}}, GazeTrace::Sample{0.5, {30, 40}},
+                            GazeTrace::Sample{0.6, {30, 40}}));
     EXPECT_THAT(notes, IsEmpty()) << "a blink is no news";
     samples("time_ms,x_px,y_px\n0,,\n500,1,2\n1000,,\n1700,1,2\n1800,,\n1900,1,2\n2900,,\n", &notes);
     EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("3 gaps are longer than a blink"), HasSubstr("the longest 1.2 s"))));
     // Of one time the last that is seen counts.
-    EXPECT_THAT(samples("time_s,x_px,y_px\n0,1,2\n0,3,4\n0,,\n"), ElementsAre(GazeSample{0, {3, 4}}));
+    EXPECT_THAT(samples("time_s,x_px,y_px\n0,1,2\n0,3,4\n0,,\n"), ElementsAre(GazeTrace::Sample{0, {3, 4}}));
 }
 
 TEST_F(GazeFileTest, BadFilesNameTheLineAndTheColumn) {
@@ -229,7 +233,7 @@ TEST_F(GazeFileTest, AnyBytesGiveATraceOrAnError) {
             continue;
         }
         ++traces;
-        for (const GazeSample& s : recording->trace.samples())
+        for (const GazeTrace::Sample& s : recording->trace.samples())
             ASSERT_TRUE(std::isfinite(s.time_s + s.px.x + s.px.y)) << text;
     }
     EXPECT_GT(traces, 5); // both happen
@@ -239,7 +243,7 @@ TEST_F(GazeFileTest, AnyBytesGiveATraceOrAnError) {
 TEST_F(GazeFileTest, SimulatedRecordingsAreMadeByTheirRule) {
     const auto truth = require(simulate_gaze(
         {.seed = 1, .duration_s = 5, .samples_per_s = 60, .width_px = 1600, .height_px = 1200}, Display()));
-    std::vector<GazeSample> expected = truth->samples();
+    std::vector<GazeTrace::Sample> expected = truth->samples();
     for (std::size_t i = 1; i < expected.size(); ++i)
         for (const auto& [from_s, to_s] : {std::pair(1.0, 1.15), std::pair(2.5, 2.7), std::pair(4.0, 4.25)})
             if (expected[i].time_s >= from_s && expected[i].time_s < to_s) expected[i].px = expected[i - 1].px;

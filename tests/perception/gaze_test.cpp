@@ -5,7 +5,7 @@
 
 namespace unseen::perception::gaze_test {
 
-GazeTrace trace_of(std::vector<GazeSample> samples) {
+GazeTrace trace_of(std::vector<GazeTrace::Sample> samples) {
     auto trace = GazeTrace::create(std::move(samples));
     EXPECT_TRUE(trace) << trace.error().message;
     return *std::move(trace);
@@ -21,7 +21,7 @@ TEST(GazeTest, InterpolatesBetweenSamples) {
 
 TEST(GazeTest, BadTracesNameTheSample) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    const std::pair<std::vector<GazeSample>, const char*> cases[] = {
+    const std::pair<std::vector<GazeTrace::Sample>, const char*> cases[] = {
         {{}, "at least one sample"},
         {{{nan, {1, 2}}}, "sample 0 has a time_s that is not finite"},
         {{{0, {1, 2}}, {0.1, {1, nan}}}, "sample 1 has an y_px that is not finite"},
@@ -99,7 +99,7 @@ TEST(GazeTest, SimulatedGazesHaveThePublishedStatistics) {
 TEST(GazeTest, SimulatedGazesStayInTheWindow) {
     for (const int side : {1, 40, 1024}) {
         const auto trace = require(simulate_gaze({.duration_s = 20, .width_px = side, .height_px = side}, Display()));
-        for (const GazeSample& s : trace->samples()) {
+        for (const GazeTrace::Sample& s : trace->samples()) {
             EXPECT_GE(std::min(s.px.x, s.px.y), -1e-9);
             EXPECT_LE(std::max(s.px.x, s.px.y), side + 1e-9);
         }
@@ -117,13 +117,13 @@ GazeTrace one_saccade() {
 }
 
 TEST(GazeTest, ErrorAndLatencyWidenTheFovea) {
-    TrackerOptions options;
+    GazeTracker::Options options;
     options.error_deg = 0.5;
     options.latency_s = 0.06;
     const GazeTracker tracker(one_saccade(), options, Display(), 1600, 1200);
     EXPECT_EQ(tracker.at(0.4).margin_deg, 0.5);
     EXPECT_EQ(tracker.at(0.52).px, glm::dvec2(800, 600)) << "what the eye did 60 ms ago";
-    const TrackedGaze amid = tracker.at(0.585);
+    const GazeTracker::Gaze amid = tracker.at(0.585);
     EXPECT_NEAR(amid.speed_deg_s, 200, 1e-6);
     EXPECT_NEAR(amid.margin_deg, 0.5 + 200 * 0.06, 1e-6);
     EXPECT_EQ(tracker.at(0.9).margin_deg, 0.5);
@@ -131,7 +131,7 @@ TEST(GazeTest, ErrorAndLatencyWidenTheFovea) {
 }
 
 TEST(GazeTest, SuppressionHoldsTheGazeDuringSaccades) {
-    TrackerOptions options;
+    GazeTracker::Options options;
     options.latency_s = 0.02;
     options.suppression = true;
     options.suppressed_s = 0.1;
@@ -148,18 +148,18 @@ TEST(GazeTest, SuppressionHoldsTheGazeDuringSaccades) {
 
 TEST(GazeTest, TrackersThatAreNoneAreRefused) {
     const double nan = std::nan("");
-    EXPECT_FALSE(validate(TrackerOptions{.error_deg = -1}));
-    EXPECT_FALSE(validate(TrackerOptions{.error_deg = nan}));
-    EXPECT_FALSE(validate(TrackerOptions{.latency_s = nan}));
-    EXPECT_FALSE(validate(TrackerOptions{.latency_s = 100}));
-    EXPECT_FALSE(validate(TrackerOptions{.suppressed_s = -1}));
-    EXPECT_TRUE(validate(TrackerOptions()));
+    EXPECT_FALSE(validate(GazeTracker::Options{.error_deg = -1}));
+    EXPECT_FALSE(validate(GazeTracker::Options{.error_deg = nan}));
+    EXPECT_FALSE(validate(GazeTracker::Options{.latency_s = nan}));
+    EXPECT_FALSE(validate(GazeTracker::Options{.latency_s = 100}));
+    EXPECT_FALSE(validate(GazeTracker::Options{.suppressed_s = -1}));
+    EXPECT_TRUE(validate(GazeTracker::Options()));
 }
 
 // S'(e) = S(max(0, e - margin)), everywhere.
 TEST(GazeTest, WidenedTablesSeeAsTheGazeMightBe) {
     const CsfTable& table = CsfTable::standard();
-    const CsfTable wide = widened(table, Degrees(4));
+    const CsfTable wide = table.widened(Degrees(4));
     for (const double f : {0.5, 2.0, 8.0, 20.0})
         for (const double e : {0.0, 1.0, 3.9, 4.0, 5.0, 9.0, 24.0, 60.0})
             for (const double l : {0.1, 50.0}) {
@@ -193,30 +193,30 @@ double seen(const CsfTable& table, double eccentricity) {
 
 TEST(GazeTest, WidenedTablesEndWhereNothingIsFartherAside) {
     const CsfTable falling = table_over({0, 20, 60, 170}, {200, 100, 10, 1});
-    const CsfTable wide = widened(falling, head_only_margin); // 170 + 15 degrees are none
+    const CsfTable wide = falling.widened(head_only_margin); // 170 + 15 degrees are none
     EXPECT_EQ(wide.samples().eccentricity_deg, (std::vector<double>{0, 15, 35, 75}));
     for (const double e : {0.0, 15.0, 35.0, 75.0})
         EXPECT_NEAR(seen(wide, e), seen(falling, std::max(0.0, e - 15)), 1e-9) << e;
     EXPECT_NEAR(seen(wide, 180), 10, 1e-9) << "sees more than it would at 165 degrees";
     // A viewer who sees better far aside must not lose that.
-    EXPECT_NEAR(seen(widened(table_over({0, 20, 60, 170}, {200, 100, 10, 20}), Degrees(15)), 180), 20, 1e-9);
+    EXPECT_NEAR(seen(table_over({0, 20, 60, 170}, {200, 100, 10, 20}).widened(Degrees(15)), 180), 20, 1e-9);
     // As far as a margin goes, and beyond.
     for (const double margin : {120.0, 179.99, 180.0, 1e300, std::numeric_limits<double>::infinity(), std::nan("")})
-        EXPECT_NEAR(seen(widened(falling, Degrees(margin)), 100), 200, 1e-9) << margin;
+        EXPECT_NEAR(seen(falling.widened(Degrees(margin)), 100), 200, 1e-9) << margin;
 }
 
 TEST(GazeTest, MarginsAreAtLeastAsLargeAsATablesSteps) {
     const CsfTable table = table_over({0, 20}, {200, 100});
     for (const double margin : {1e-300, 5e-5, 1e-4}) {
-        const CsfTable wide = widened(table, Degrees(margin));
+        const CsfTable wide = table.widened(Degrees(margin));
         EXPECT_NEAR(wide.samples().eccentricity_deg[1], 1e-4, 1e-12);
         EXPECT_GE(seen(wide, 10), seen(table, 10));
     }
-    EXPECT_EQ(widened(table, Degrees(0)).samples().eccentricity_deg, table.samples().eccentricity_deg);
+    EXPECT_EQ(table.widened(Degrees(0)).samples().eccentricity_deg, table.samples().eccentricity_deg);
     // Steps that are just large enough lose that to the sum's rounding.
     const CsfTable fine = table_over({0, 1e-4, 20}, {200, 300, 100});
     ASSERT_LT((15 + 1e-4) - 15, 1e-4);
-    EXPECT_GE(seen(widened(fine, Degrees(15)), 15), 300 * (1 - 1e-9));
+    EXPECT_GE(seen(fine.widened(Degrees(15)), 15), 300 * (1 - 1e-9));
 }
 
 } // namespace unseen::perception::gaze_test

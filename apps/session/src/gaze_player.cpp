@@ -58,7 +58,7 @@ std::optional<Gaze> GazePlayer::around(std::optional<glm::dvec2> px) const {
 
 std::optional<Gaze> GazePlayer::at(double time_s, const vdtree::View& view, std::optional<glm::dvec2> own_px) const {
     if (tracker_) {
-        const perception::TrackedGaze gaze = tracker_->at(time_s);
+        const perception::GazeTracker::Gaze gaze = tracker_->at(time_s);
         return Gaze{gaze.px, gaze.margin_deg};
     }
     if (options_.source != GazeSource::head) return around(own_px);

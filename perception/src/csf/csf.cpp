@@ -3,10 +3,8 @@
 #include <unseen/perception/csf.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include <unseen/perception/internal/motion.h>
 #include <unseen/vdtree/internal/errors.h>
@@ -17,19 +15,9 @@ namespace unseen::perception {
 
 namespace {
 
-constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> names = {{
-    {CsfModel::castle, "castle"},
-    {CsfModel::stela, "stela"},
-    {CsfModel::daly, "daly"},
-    {CsfModel::barten_1989, "barten-1989"},
-    {CsfModel::barten_1999, "barten-1999"},
-    {CsfModel::barten_fitted, "barten-fitted"},
-    {CsfModel::barten_2004, "barten-2004"},
-    {CsfModel::mannos_sakrison, "mannos-sakrison"},
-    {CsfModel::rushmeier, "rushmeier"},
-    {CsfModel::castle_red_green, "castle-red-green"},
-    {CsfModel::castle_yellow_violet, "castle-yellow-violet"},
-}};
+constexpr std::array<std::string_view, csf_models.size()> names = {
+    "castle",      "stela",           "daly",      "barten-1989",      "barten-1999",         "barten-fitted",
+    "barten-2004", "mannos-sakrison", "rushmeier", "castle-red-green", "castle-yellow-violet"};
 
 // W. Geisler, J. Perry, "A real-time foveated multiresolution system for low-bandwidth video communication", SPIE 3299,
 // 1998: threshold contrast grows as exp(0.106 rho (e + 2.3) / 2.3), relative to the fovea as exp(0.106 rho e / 2.3).
@@ -50,15 +38,13 @@ double static_at_fovea(CsfModel model, const Stimulus& s) {
 
 } // namespace
 
-std::string_view name(CsfModel model) {
-    return std::ranges::find(names, model, &decltype(names)::value_type::first)->second;
-}
+std::string_view name(CsfModel model) { return names[static_cast<std::size_t>(model)]; }
 
 Result<CsfModel> csf_model(std::string_view text) {
     std::string known;
-    for (const auto& [model, name] : names) {
-        if (text == name) return model;
-        known.append(known.empty() ? "" : model == names.back().first ? " or " : ", ").append(name);
+    for (const CsfModel model : csf_models) {
+        if (text == name(model)) return model;
+        known.append(known.empty() ? "" : model == csf_models.back() ? " or " : ", ").append(name(model));
     }
     return invalid_argument("there is no contrast sensitivity model \"" + std::string(text) + "\": use " + known);
 }
@@ -79,7 +65,7 @@ double motion_factor(CsfModel model, const Stimulus& s) {
     return velocity_factor(s.frequency, DegreesPerSecond(s.temporal.value() / s.frequency.value()));
 }
 
-std::vector<CyclesPerDegree> kinks(CsfModel model, const CsfConditions& conditions) {
+std::vector<CyclesPerDegree> kinks(CsfModel model, const Stimulus& conditions) {
     if (is_castle_family(model)) {
         if (conditions.field != VisualField::worst) return {};
         return {equal_decay_frequency(model)};
@@ -124,16 +110,10 @@ double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own)
     return std::sqrt(castle_area_gain(frequency, area)) * std::pow(own, summation_share(frequency, area));
 }
 
-Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
-                     Luminance luminance) {
-    return {.frequency = frequency,
-            .luminance = luminance,
-            .eccentricity = eccentricity,
-            .temporal = conditions.temporal,
-            .area = patch_area(frequency),
-            .field = conditions.field,
-            .velocity = conditions.velocity,
-            .distance = conditions.distance};
+Stimulus stimulus_of(const Stimulus& conditions, CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) {
+    Stimulus s = conditions;
+    s.frequency = frequency, s.eccentricity = eccentricity, s.luminance = luminance, s.area = patch_area(frequency);
+    return s;
 }
 
 namespace {
@@ -167,12 +147,9 @@ double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity) {
     return std::exp(rise - 2 * wave * speed * (deg_s - least) / 45.9);
 }
 
-DegreesPerSecond pursuit_velocity(DegreesPerSecond target) {
-    return DegreesPerSecond(std::min(pursuit_gain * target.value() + drift_deg_s, greatest_pursuit_deg_s));
-}
-
 DegreesPerSecond retinal_velocity_of_target(DegreesPerSecond image) {
-    return DegreesPerSecond(std::abs(image.value() - pursuit_velocity(image).value()));
+    const double pursuit_deg_s = std::min(pursuit_gain * image.value() + drift_deg_s, greatest_pursuit_deg_s);
+    return DegreesPerSecond(std::abs(image.value() - pursuit_deg_s));
 }
 
 Result<Person> person(std::string_view wanted) {

@@ -44,6 +44,6 @@ double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField f
 // What motion multiplies static sensitivity by; 1 where the model has temporal channels of its own and nothing moves.
 double motion_factor(CsfModel model, const Stimulus& stimulus);
 // Frequencies at which log S has kinks under these conditions, whatever the luminance and eccentricity.
-std::vector<CyclesPerDegree> kinks(CsfModel model, const CsfConditions& conditions);
+std::vector<CyclesPerDegree> kinks(CsfModel model, const Stimulus& conditions);
 
 } // namespace unseen::perception

@@ -1,10 +1,8 @@
 // The contrast sensitivity table: filled from a model or from samples, interpolated in log space, made monotone for
 // the fold test, and inverted.
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstdint>
-#include <initializer_list>
 #include <limits>
 
 #include <unseen/perception/internal/motion.h>
@@ -125,7 +123,7 @@ void append_ladder(std::vector<double>& values, double first, double last, doubl
 
 bool has_plateau(CsfModel model) { return model == CsfModel::castle || model == CsfModel::stela; }
 
-std::vector<double> model_frequencies(CsfModel model, const CsfConditions& conditions) {
+std::vector<double> model_frequencies(CsfModel model, const Stimulus& conditions) {
     std::vector<double> cpd;
     if (has_plateau(model)) {
         append_ladder(cpd, lowest_frequency_cpd, plateau_cpd, 2, below_plateau.per_octave);
@@ -159,7 +157,7 @@ std::vector<double> model_eccentricities(CsfModel model) {
     return degrees;
 }
 
-std::vector<double> model_luminances(CsfModel model, const CsfConditions& conditions) {
+std::vector<double> model_luminances(CsfModel model, const Stimulus& conditions) {
     std::vector<double> cdm2;
     if (model == CsfModel::castle && conditions.temporal.value() > 0) {
         const double kink = castle_transient_kink().value(), calm = kink * std::pow(10.0, transient_decades);
@@ -179,7 +177,7 @@ std::vector<double> model_luminances(CsfModel model, const CsfConditions& condit
     return cdm2;
 }
 
-std::string model_source(CsfModel model, const CsfConditions& c) {
+std::string model_source(CsfModel model, const Stimulus& c) {
     std::string text = std::string(name(model)) + ", closed form; " + number_text(c.temporal.value()) + " Hz, " +
                        number_text(c.velocity.value()) + " degrees/s, area pi (1.5 / frequency)^2";
     if (model == CsfModel::daly) return text + ", from " + number_text(c.distance.value()) + " m";
@@ -364,8 +362,6 @@ Result<CsfTable> CsfTable::create(CsfSamples samples) {
     return table;
 }
 
-Result<CsfTable> CsfTable::derived(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
-
 Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branches) {
     const CsfSamples& s = samples;
     if (s.frequency_cpd.size() < 2) return bad("frequency_cpd needs two samples or more");
@@ -410,7 +406,7 @@ Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branch
     return CsfTable(table);
 }
 
-Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& conditions) {
+Result<CsfTable> CsfTable::from_model(CsfModel model, const Stimulus& conditions) {
     const auto stimulus = [&](double cpd, double degrees, double cdm2) {
         return stimulus_of(conditions, CyclesPerDegree(cpd), Degrees(degrees), Luminance(cdm2));
     };
@@ -510,6 +506,31 @@ Result<CsfTable> CsfTable::moving(DegreesPerSecond velocity) const {
     return State::make_table(std::move(samples), std::move(branches));
 }
 
+CsfTable CsfTable::widened(Degrees margin) const {
+    assert(!(margin.value() < 0));
+    if (margin.value() == 0) return *this;
+    const CsfSamples& samples = state_->samples;
+    const auto plane = static_cast<std::ptrdiff_t>(samples.luminance_cdm2.size() * samples.frequency_cpd.size());
+    const double shift = std::max(margin.value(), smallest_spacing); // NaN stays
+    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}, samples.summation};
+    wide.sensitivity.assign(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
+    for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
+        const double degrees = e + shift;
+        // The sum's rounding can bring columns too near to each other.
+        if (degrees <= highest_eccentricity.value() && degrees - wide.eccentricity_deg.back() >= smallest_spacing) {
+            wide.eccentricity_deg.push_back(degrees);
+            wide.sensitivity.insert(wide.sensitivity.end(), column, column + plane);
+        } else {
+            std::transform(column, column + plane, wide.sensitivity.end() - plane, wide.sensitivity.end() - plane,
+                           [](double left_out, double last) { return std::max(left_out, last); });
+        }
+        column += plane;
+    }
+    auto made = State::make_table(std::move(wide), {}); // of a growing table, too
+    assert(made); // the columns of a table, at eccentricities that a table can have
+    return std::move(*made);
+}
+
 const CsfTable& CsfTable::standard() {
     static const CsfTable table = from_model(CsfModel::castle);
     return table;
@@ -571,24 +592,19 @@ void CsfTable::State::prepare_extrapolation() {
 
 const CsfSamples& CsfTable::samples() const noexcept { return state_->samples; }
 
-CsfReach CsfTable::reach() const noexcept {
-    const CsfSamples& s = state_->samples;
-    return {CyclesPerDegree(s.frequency_cpd.front()), CyclesPerDegree(s.frequency_cpd.back()),
-            Degrees(s.eccentricity_deg.back()), Luminance(s.luminance_cdm2.front()),
-            Luminance(s.luminance_cdm2.back())};
-}
-
 std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest) {
-    const CsfReach reach = table.reach();
+    const CsfSamples& samples = table.samples();
+    const double last_degrees = samples.eccentricity_deg.back(), lowest_cdm2 = samples.luminance_cdm2.front(),
+                 highest_cdm2 = samples.luminance_cdm2.back();
     std::string text;
     const auto add = [&](bool is_inside, const char* beyond, double end, const char* unit, const char* and_so) {
         if (is_inside) return; // NaN is not
         text += (text.empty() ? "" : "; ") + std::string(beyond) + " the table's " + number_text(end) + " " + unit +
                 " sensitivity is taken as there" + and_so;
     };
-    add(farthest <= reach.eccentricity, "beyond", reach.eccentricity.value(), "degrees", "");
-    add(darkest >= reach.darkest, "below", reach.darkest.value(), "cd/m2", "");
-    add(brightest <= reach.brightest, "above", reach.brightest.value(), "cd/m2", ", though eyes may see more");
+    add(farthest.value() <= last_degrees, "beyond", last_degrees, "degrees", "");
+    add(darkest.value() >= lowest_cdm2, "below", lowest_cdm2, "cd/m2", "");
+    add(brightest.value() <= highest_cdm2, "above", highest_cdm2, "cd/m2", ", though eyes may see more");
     return text;
 }
 

@@ -1,8 +1,6 @@
 // What a fold can be taken for at the worst, in classes, and the rows of the table that the classes in use get.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <limits>
 #include <unordered_map>
 

@@ -1,14 +1,136 @@
 // The fold tests after Luebke and Hallen in distance form: a table of switch distances by class and eccentricity.
 
+#include <unseen/perception/internal/cut_rings.h>
+#include <unseen/vdtree/internal/light_bounds.h>
+
 #include "fold/fold_classes.h"
-#include "fold/largest_extents.h"
+#include "fold/fold_screen.h"
 
 namespace unseen::perception {
 
 namespace {
 
+using vdtree::ContrastClasses;
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
+
+// ---- extents and distances
+
+// In degrees on the screen; infinite where the row shows nothing at any extent. Smaller is what comes first: bins in
+// ascending eccentricity. `Visibility`: of a grating, by its frequency in cpd and its eccentricity in degrees; 1 is
+// just visible. It must not grow with either.
+template <class Visibility>
+class LargestExtents {
+public:
+    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach
+    // nearer to the gaze, by half of their width at most.
+    LargestExtents(Visibility visibility, const Screen& screen, bool is_around_spheres)
+        : visibility_(visibility), is_around_spheres_(is_around_spheres),
+          step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
+
+    double at(double eccentricity_deg) {
+        // Of a fixed series of extents, so that more contrast never makes them larger.
+        if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
+            step_ = last_step;
+            return std::numeric_limits<double>::infinity();
+        }
+        int above = step_ + 1;
+        for (int stride = 1; above < last_step && is_unseen(above, eccentricity_deg); stride *= 2) {
+            step_ = above;
+            above = std::min(above + stride, last_step);
+        }
+        while (above - step_ > 1) {
+            const int middle = step_ + (above - step_) / 2;
+            (is_unseen(middle, eccentricity_deg) ? step_ : above) = middle;
+        }
+        return extent(step_);
+    }
+
+private:
+    static constexpr double steps_per_octave = 128;
+    static constexpr int last_step = 9 * 128;           // 512 degrees: all that is seen
+    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
+
+    static double extent(int step) { return std::exp2(step / steps_per_octave); }
+    static int step_of(double extent_deg) {
+        return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg)));
+    }
+    bool is_unseen(int step, double eccentricity_deg) const {
+        const double nearest =
+            is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
+        return visibility_(1 / (2 * extent(step)), nearest) <= 1;
+    }
+
+    Visibility visibility_;
+    bool is_around_spheres_;
+    int step_; // not seen, or smaller than anything that matters
+};
+
+// The extents, by bins so many degrees apart, of what has this contrast and luminance alone and is no larger than its
+// sphere, all at once. Infinite where not even the peak is seen.
+void find_grey_extents(double contrast, double luminance_cdm2, const CsfTable& csf, double bin_degrees,
+                       std::span<double> extents) {
+    std::array<float, 2 * bin_count> contrasts, eccentricity, luminance, log2_frequency;
+    const auto used = [&](auto& all) { return std::span(all).first(extents.size()); };
+    for (std::size_t bin = 0; bin < extents.size(); ++bin)
+        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * bin_degrees);
+    contrasts.fill(static_cast<float>(contrast));
+    luminance.fill(static_cast<float>(luminance_cdm2));
+    csf.highest_visible_log2_frequency(used(contrasts), used(eccentricity), used(luminance), used(log2_frequency));
+    for (std::size_t bin = 0; bin < extents.size(); ++bin)
+        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
+}
+
+// The distance, in lengths, from which an extent is no larger than this on the screen.
+float switch_distance_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
+    if (std::isinf(extent_deg)) return 0; // only from inside
+    const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
+    const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
+    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + distance_rounding));
+}
+
+constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
+
+// Fills a row of a table by its extents. `visibility`: by bin, of what shows from whatever distance.
+template <class Visibility>
+void set_row(vdtree::DistanceCriterion::Parts& parts, std::size_t row, std::span<const double> extents,
+             const Screen& screen, const Visibility& visibility) {
+    const std::size_t bins = parts.eccentricity_bins;
+    float *const switch_distance = &parts.switch_distance[row * bins], *const least_cost =
+                                                                           &parts.least_cost[row * bins];
+    for (std::size_t bin = 0; bin < bins; ++bin) {
+        switch_distance[bin] = switch_distance_of(extents[bin], screen, !parts.lengths.empty());
+        // No fold is drawn smaller than a pixel.
+        least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], visibility(bin)));
+        // The table's own rounding must not make anything grow with the eccentricity.
+        if (bin == 0) continue;
+        switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
+        least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
+    }
+}
+
+// Half the extents of folds, mesh units: the change is largest within the support and fades to nothing at the ring's
+// border. No less than the children's.
+std::vector<float> safe_lengths(const vdtree::SoundTree& tree, const CutRings& rings) {
+    std::vector<float> lengths(tree.interior_count(), 0.0f);
+    for (vdtree::NodeId node = tree.interior_count(); node-- > 0;) {
+        const float around = 0.5f * (tree.support_spheres()[node].radius + rings.radius[node]) * (1 + length_rounding);
+        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
+        if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
+    }
+    return lengths;
+}
+
+// The directions that make nodes outlines; empty: the tree's. Where another part is near, any.
+std::vector<vdtree::NormalSlabs> safe_facing(const vdtree::VertexTree& tree, const CutRings& rings) {
+    std::vector<vdtree::NormalSlabs> facing;
+    if (!rings.meets_another.empty())
+        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+            facing.push_back(rings.meets_another[node] ? vdtree::NormalSlabs::everything() : tree.bounds()[node].slabs);
+    return facing;
+}
+
+// ---- under the tree's own light
 
 // Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
 struct Bins {
@@ -332,6 +454,102 @@ vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::Vie
         viewpoint.gaze = glm::normalize(placement.direction_to_mesh(x * frame.right + y * frame.up - frame.back));
     }
     return viewpoint;
+}
+
+// ---- under lights that may move
+
+namespace {
+
+void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& classes, const Screen& screen,
+                const CsfTable& csf) {
+    const std::size_t bins = parts.eccentricity_bins;
+    parts.switch_distance.assign(ContrastClasses::class_count * bins, DistanceCriterion::never_visible);
+    parts.least_cost.assign(ContrastClasses::class_count * bins, 0);
+    std::vector<double> extents(bins);
+    for (std::size_t number = 1; number < ContrastClasses::class_count; ++number) {
+        const double contrast = ContrastClasses::contrast(number), luminance_cdm2 = classes.level(number);
+        if (parts.lengths.empty()) {
+            find_grey_extents(contrast, luminance_cdm2, csf, degrees_per_bin, extents);
+        } else {
+            const auto visibility = [&](double frequency, double eccentricity) {
+                return contrast * csf.monotone_sensitivity(CyclesPerDegree(frequency), Degrees(eccentricity),
+                                                           Luminance(luminance_cdm2));
+            };
+            LargestExtents largest(visibility, screen, true);
+            for (std::size_t bin = 0; bin < bins; ++bin)
+                extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
+        }
+        set_row(parts, number, extents, screen, [](std::size_t) { return 0.0; });
+    }
+}
+
+// Nothing falls with the contrast or the luminance; the table's own rounding must not make it.
+void make_growing(DistanceCriterion::Parts& parts) {
+    const std::size_t bins = parts.eccentricity_bins;
+    const auto raise = [&](std::size_t number, std::size_t to) {
+        for (std::vector<float>* values : {&parts.switch_distance, &parts.least_cost})
+            for (std::size_t bin = 0; bin < bins; ++bin) {
+                float& value = (*values)[number * bins + bin];
+                value = std::max(value, (*values)[to * bins + bin]);
+            }
+    };
+    for (std::size_t l = 0; l < ContrastClasses::level_count; ++l)
+        for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c) {
+            if (c > 0) raise(ContrastClasses::class_at(l, c), ContrastClasses::class_at(l, c - 1));
+            if (l > 0) raise(ContrastClasses::class_at(l, c), ContrastClasses::class_at(l - 1, c));
+        }
+}
+
+Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, DistanceCriterion::Parts parts,
+                                         std::shared_ptr<const vdtree::LightBounds> bounds, const CsfTable& csf,
+                                         const vdtree::View& view, const FoldTestOptions& options) {
+    const Screen screen(view, options);
+    const vdtree::AbsoluteScale scale = LuminanceClasses(options.display).scale();
+    const ContrastClasses classes(scale);
+    const SceneLuminance scene = options.scene;
+    parts.spheres = DistanceCriterion::Spheres::ring;
+    parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
+    parts.bin_degrees = degrees_per_bin / screen.least_magnification;
+    parts.lit =
+        vdtree::LitClasses{std::move(bounds), scale,
+                           classes.class_of({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
+    fill_table(parts, classes, screen, csf);
+    make_growing(parts);
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace
+
+Result<DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
+                                        std::shared_ptr<const vdtree::LightBounds> bounds, const vdtree::View& view,
+                                        const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    return make_criterion(tree, {}, std::move(bounds), csf_of(options), view, options);
+}
+
+Result<DistanceCriterion> lit_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
+                                             std::shared_ptr<const vdtree::LightBounds> bounds,
+                                             const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    if (rings.radius.size() != tree.interior_count() || !bounds || bounds->radii().size() != tree.interior_count())
+        return invalid_argument(
+            "The rings, or what lights make of them (bound_lit_cut_rings()), are not those of the tree.");
+    DistanceCriterion::Parts parts;
+    parts.lengths = safe_lengths(*sound, rings);
+    parts.facing = safe_facing(tree, rings);
+    return make_criterion(tree, std::move(parts), std::move(bounds), csf_of(options).of_half_waves(), view, options);
+}
+
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,
+                         const vdtree::Lighting& lighting, glm::dvec3 eye, float background) {
+    const vdtree::NodeId root = vdtree::VertexTree::root();
+    const vdtree::LuminanceRange range =
+        vdtree::lit_range(lighting, bounds.cones()[root], bounds.sphere(tree, root), eye);
+    constexpr float steps = 32;
+    return {std::floor(steps * std::min(range.lo, background)) / steps,
+            std::ceil(steps * std::max(range.hi, background)) / steps};
 }
 
 } // namespace unseen::perception

@@ -1,7 +1,5 @@
 #include "fold/fold_errors.h"
 
-#include <limits>
-
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/errors.h>

@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/criterion.h>
 #include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 

@@ -1,8 +1,6 @@
 // What a fold shows, in classes, and from how far such patterns are invisible to an eye at one luminance and eccentricity.
 #pragma once
 
-#include <limits>
-
 #include "fold/fold_factors.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"

@@ -3,8 +3,6 @@
 // sensitivities serves all stages.
 #include "fold/error_distances.h"
 
-#include <limits>
-
 #include "fold/fold_factors.h"
 #include "judge/modern_masking.h"
 

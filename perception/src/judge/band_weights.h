@@ -11,9 +11,7 @@
 //   pooling and the CSF, by luminance and eccentricity.
 #pragma once
 
-#include <unseen/perception/internal/judge_tables.h>
-
-#include "judge/plane.h"
+#include "judge/summation.h"
 
 namespace unseen::perception {
 

@@ -23,26 +23,23 @@ std::vector<double> luma_codes(const Image& image) {
     return luma;
 }
 
+std::string shape_of(const Image& i) {
+    return std::to_string(i.width) + "x" + std::to_string(i.height) + "x" + std::to_string(i.channels);
+}
+
 Result<void> check(const Image& a, const Image& b) {
-    if (a.width != b.width || a.height != b.height || a.channels != b.channels || a.values.size() != b.values.size()) {
+    if (a.width != b.width || a.height != b.height || a.channels != b.channels || a.values.size() != b.values.size())
         return invalid_argument("SSIM needs two images of one size and one channel count: the reference is " +
-                                std::to_string(a.width) + "x" + std::to_string(a.height) + "x" +
-                                std::to_string(a.channels) + ", the test " + std::to_string(b.width) + "x" +
-                                std::to_string(b.height) + "x" + std::to_string(b.channels));
-    }
+                                shape_of(a) + ", the test " + shape_of(b));
     if (a.width < ssim_window::size || a.height < ssim_window::size || (a.channels != 1 && a.channels != 3))
-        return invalid_argument("SSIM needs grey or RGB images of at least 11 x 11 pixels, not " +
-                                std::to_string(a.width) + "x" + std::to_string(a.height) + "x" +
-                                std::to_string(a.channels));
-    const auto values =
-        static_cast<std::size_t>(a.width) * static_cast<std::size_t>(a.height) * static_cast<std::size_t>(a.channels);
+        return invalid_argument("SSIM needs grey or RGB images of at least 11 x 11 pixels, not " + shape_of(a));
+    const std::size_t values = a.index(0, a.height, 0);
     if (a.values.size() != values)
         return invalid_argument("SSIM: an image of " + std::to_string(values) + " values holds " +
                                 std::to_string(a.values.size()));
-    for (std::size_t i = 0; i < values; ++i) {
+    for (std::size_t i = 0; i < values; ++i)
         if (!std::isfinite(a.values[i]) || !std::isfinite(b.values[i]))
             return invalid_argument("SSIM: value " + std::to_string(i) + " of an image is not finite");
-    }
     return {};
 }
 

@@ -1,12 +1,10 @@
 #include "measure/contacts.h"
 
-#include <array>
 #include <cmath>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "measure/leaf_triangles.h"
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/scaled_geometry.h>
 

@@ -3,8 +3,6 @@
 #include <unseen/perception/internal/cut_rings.h>
 
 #include <cmath>
-#include <functional>
-#include <type_traits>
 
 #include <glm/geometric.hpp>
 

@@ -1,4 +1,4 @@
-#include "measure/whole_mesh.h"
+#include "measure/measure_folds.h"
 
 #include <numeric>
 

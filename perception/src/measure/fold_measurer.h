@@ -1,14 +1,9 @@
 // Compares every fold with the surface before it, by points and by small pictures, from the leaves up.
 #pragma once
 
-#include <optional>
-#include <utility>
-
 #include <unseen/vdtree/internal/parallel.h>
 
 #include "fold/fold_factors.h"
-#include "measure/contacts.h"
-#include "measure/fold_neighbours.h"
 #include "measure/measure_folds.h"
 #include "measure/open_border.h"
 #include "measure/texture_change.h"

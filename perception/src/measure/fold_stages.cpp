@@ -1,4 +1,4 @@
-#include "measure/fold_stages.h"
+#include "measure/fold_record.h"
 
 namespace unseen::perception {
 

@@ -2,10 +2,6 @@
 #include <unseen/perception/internal/lit_folds.h>
 
 #include <cstring>
-#include <limits>
-#include <numbers>
-#include <string>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

@@ -2,9 +2,7 @@
 // takes is noted. Of a patch of surface that faces the eye, light is the sum over its triangles of their luminance
 // times their vector area, times the direction to the eye: a sum that holds for every direction, and over which folds
 // add up.
-#include "measure/whole_mesh.h"
-
-#include <limits>
+#include "measure/measure_folds.h"
 
 #include <glm/geometric.hpp>
 

@@ -1,7 +1,5 @@
 #include "measure/measure_folds.h"
 
-#include <cassert>
-
 #include <tbb/task_arena.h>
 
 #include <unseen/perception/fold_measurement.h>
@@ -10,7 +8,6 @@
 #include <unseen/vdtree/internal/scaled_geometry.h>
 
 #include "measure/fold_measurer.h"
-#include "measure/whole_mesh.h"
 
 namespace unseen::perception {
 

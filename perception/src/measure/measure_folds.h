@@ -1,12 +1,8 @@
-// The measurement of folds without what follows from it for the whole mesh.
+// The measurement of folds in parts.
 #pragma once
 
-#include <memory>
-
-#include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/result.h>
-
-#include "measure/fold_record.h"
+#include "fold/fold_errors.h"
+#include "measure/measuring_progress.h"
 #include "measure/texture_detail.h"
 
 namespace unseen::perception {
@@ -53,5 +49,29 @@ void add_attribute(Result<vdtree::VertexTree>& tree, std::string_view name, vdtr
 // The tree with these as measure_folds() keeps them.
 Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, MeasuredFolds measured,
                                         std::vector<std::uint8_t> stage_of, std::vector<FoldStage> stages);
+
+// Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no
+// extent. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that. Cost: some
+// hundred pictures of up to half of the triangles; in parallel. Goes on to all of what is to be done; where that says
+// to stop, the answer is of no use.
+std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, const TexturedLight& light,
+                                   std::span<const FoldTexture> textures, std::span<FoldError> errors,
+                                   MeasuringProgress& progress);
+
+// The same under any lights. `errors`: of folds under light from everywhere. `texture`: dark where the texture is.
+// Cost: three to four times as many pictures.
+LitStages find_lit_stages(const vdtree::SoundTree& tree, const TexturedLight& texture,
+                          std::span<const FoldTexture> textures, std::span<FoldError> errors,
+                          MeasuringProgress& progress);
+
+// Reads the luminance errors and extents, and adds the bias. Cost: as of folding the mesh once, one node after the
+// other. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that.
+void find_luminance_bias(const vdtree::SoundTree& tree, const TexturedLight& light,
+                         std::span<const FoldTexture> textures, std::span<FoldError> errors);
+
+// The radius of what a fold of the node changes, in mesh units.
+inline float changed_radius(const vdtree::VertexTree& tree, std::span<const FoldError> errors, vdtree::NodeId node) {
+    return std::max(tree.support_spheres()[node].radius, errors[node].extent);
+}
 
 } // namespace unseen::perception

@@ -1,16 +1,9 @@
 // Where the surface ends, and by how far folds move that.
 #pragma once
 
-#include <algorithm>
-#include <cstdint>
-#include <limits>
-
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
-#include <unseen/vdtree/function_ref.h>
-
-#include "measure/leaf_triangles.h"
+#include "measure/contacts.h"
 
 namespace unseen::perception {
 

@@ -1,7 +1,6 @@
 #include <unseen/perception/internal/chroma.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include <glm/geometric.hpp>
 

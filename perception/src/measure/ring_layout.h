@@ -1,14 +1,248 @@
-// The triangles around a node before and after its fold.
+// The triangles around a node before and after its fold, how far its neighbours are folded by then, and the nearest
+// points of such surfaces to given points.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <iterator>
+
+#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/slab_axes.h>
 #include <unseen/vdtree/vertex_tree.h>
 
-#include "measure/nearest_points.h"
+#include "measure/fold_picture.h"
+#include "measure/registers.h"
 
 namespace unseen::perception {
+
+// A triangle of a ring before or after the fold, with this many luminances at each corner.
+template <std::size_t count>
+struct RingTriangle {
+    LitPointOf<count> corner[3];
+    unsigned inside = 0; // a bit for each corner in the support
+};
+
+// Points by columns, so that a surface is compared with eight at once, and the nearest points of that surface.
+template <std::size_t count>
+class ComparedPoints {
+public:
+    using Point = LitPointOf<count>;
+    static constexpr std::size_t lanes = 8;
+
+    void clear() { points_.clear(); }
+    void add(const Point& p) { points_.push_back(p); }
+    std::size_t size() const { return points_.size(); }
+
+    // Columns of the points from `first` on; after the last point it is repeated.
+    struct alignas(32) Block {
+        float x[lanes], y[lanes], z[lanes];
+        float squared[lanes], luminance[count][lanes]; // the distance to the nearest point, and its luminances
+    };
+    std::span<Block> blocks() {
+        blocks_.resize((size() + lanes - 1) / lanes);
+        for (std::size_t i = 0; i < blocks_.size() * lanes; ++i) {
+            const glm::vec3& p = points_[std::min(i, size() - 1)].position;
+            Block& to = blocks_[i / lanes];
+            to.x[i % lanes] = p.x, to.y[i % lanes] = p.y, to.z[i % lanes] = p.z;
+        }
+        return blocks_;
+    }
+    // Once the blocks are compared: the distance to the nearest point, and what is here and there.
+    float distance(std::size_t i) const { return std::sqrt(blocks_[i / lanes].squared[i % lanes]); }
+    std::array<float, count> here(std::size_t i) const {
+        std::array<float, count> all;
+        for (std::size_t k = 0; k < count; ++k) all[k] = points_[i].luminance[k];
+        return all;
+    }
+    std::array<float, count> there(std::size_t i) const {
+        std::array<float, count> all;
+        for (std::size_t k = 0; k < count; ++k) all[k] = blocks_[i / lanes].luminance[k][i % lanes];
+        return all;
+    }
+
+private:
+    std::vector<Point> points_;
+    std::vector<Block> blocks_;
+};
+
+template <std::size_t count>
+class Surface {
+public:
+    using Block = typename ComparedPoints<count>::Block;
+
+    void assign(std::span<const RingTriangle<count>> ring) {
+        triangles_.clear();
+        for (const auto& [corner, inside] : ring) {
+            const auto& [a, b, c] = corner;
+            const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
+            const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
+            const float determinant = bb * cc - bc * bc;
+            PreparedTriangle& t = triangles_.emplace_back();
+            t.a = a.position, t.b = ab, t.c = ac;
+            t.bb = bb, t.bc = bc, t.cc = cc;
+            t.along_b = divisor(bb), t.along_c = divisor(cc), t.along_bc = divisor(bb - 2 * bc + cc);
+            t.inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
+            for (std::size_t i = 0; i < count; ++i) {
+                t.luminance[i] = a.luminance[i];
+                t.luminance_b[i] = b.luminance[i] - a.luminance[i], t.luminance_c[i] = c.luminance[i] - a.luminance[i];
+            }
+        }
+    }
+    bool empty() const { return triangles_.empty(); }
+
+    // How the points differ from the nearest ones of the surface; of equally near ones, those of the first triangle.
+    void compare(ComparedPoints<count>& points) const {
+        for (Block& block : points.blocks())
+            on_widest([&]<class Floats>() UNSEEN_INLINE_LAMBDA {
+                for (std::size_t first = 0; first < ComparedPoints<count>::lanes; first += width_of<Floats>)
+                    find<Floats>(triangles_, block, first);
+            });
+    }
+
+private:
+    static constexpr float infinitely_far = std::numeric_limits<float>::infinity();
+    // Triangles whose area is less than a thousandth of their edges' squares count by their edges.
+    static constexpr float least_determinant = 1e-6f;
+
+    struct PreparedTriangle {
+        glm::vec3 a, b, c;                                            // b and c from a
+        std::array<float, count> luminance, luminance_b, luminance_c; // a's; the others' less that
+        float bb, bc, cc;                                             // products
+        float along_b, along_c, along_bc;                             // what lengths along the edges are divided by
+        float inverse;                                                // of the determinant; 0: only its edges count
+    };
+    // Of edges without a length, the first end is as near as any.
+    static float divisor(float squared) { return squared > 0 ? squared : infinitely_far; }
+
+    // The nearest point a + v b + w c of each triangle: of its inside, where the foot of the perpendicular lies there,
+    // or of an edge. `Floats`: a register's.
+    template <class Floats>
+    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Block& points, std::size_t first) {
+        const auto share = [](const Floats& part, float whole) UNSEEN_INLINE_LAMBDA {
+            const Floats s = part / whole, above = s > 0 ? s : Floats{};
+            return above < 1 ? above : Floats{} + 1;
+        };
+        const Floats x = floats_at<Floats>(points.x + first), y = floats_at<Floats>(points.y + first),
+                     z = floats_at<Floats>(points.z + first);
+        Floats nearest = Floats{} + infinitely_far, nearest_luminance[count] = {};
+        for (const PreparedTriangle& t : triangles) {
+            const Floats px = x - t.a.x, py = y - t.a.y, pz = z - t.a.z;
+            const Floats pb = px * t.b.x + py * t.b.y + pz * t.b.z, pc = px * t.c.x + py * t.c.y + pz * t.c.z;
+            const Floats v0 = (t.cc * pb - t.bc * pc) * t.inverse, w0 = (t.bb * pc - t.bc * pb) * t.inverse;
+            const Floats on_ab = share(pb, t.along_b), on_ac = share(pc, t.along_c),
+                         on_bc = share(pc - pb - t.bc + t.bb, t.along_bc), off_bc = 1 - on_bc;
+            const Floats cost_ab = on_ab * (on_ab * t.bb - 2 * pb), cost_ac = on_ac * (on_ac * t.cc - 2 * pc),
+                         cost_bc =
+                             off_bc * (off_bc * t.bb + 2 * on_bc * t.bc - 2 * pb) + on_bc * (on_bc * t.cc - 2 * pc);
+            const auto is_ab = cost_ab < cost_ac;
+            const auto is_bc = cost_bc < (is_ab ? cost_ab : cost_ac);
+            const auto is_inside = (Floats{} + t.inverse > 0) & (v0 >= 0) & (w0 >= 0) & (v0 + w0 <= 1);
+            Floats v = is_ab ? on_ab : Floats{}, w = is_ab ? Floats{} : on_ac;
+            v = is_bc ? off_bc : v;
+            w = is_bc ? on_bc : w;
+            v = is_inside ? v0 : v;
+            w = is_inside ? w0 : w;
+            const Floats dx = px - v * t.b.x - w * t.c.x, dy = py - v * t.b.y - w * t.c.y,
+                         dz = pz - v * t.b.z - w * t.c.z;
+            const Floats squared = dx * dx + dy * dy + dz * dz;
+            const auto is_nearer = squared < nearest;
+            nearest = is_nearer ? squared : nearest;
+            for (std::size_t i = 0; i < count; ++i) {
+                const Floats luminance = t.luminance[i] + v * t.luminance_b[i] + w * t.luminance_c[i];
+                nearest_luminance[i] = is_nearer ? luminance : nearest_luminance[i];
+            }
+        }
+        store(nearest, points.squared + first);
+        for (std::size_t i = 0; i < count; ++i) store(nearest_luminance[i], points.luminance[i] + first);
+    }
+    std::vector<PreparedTriangle> triangles_;
+};
+
+// Neighbours are folded where any of the luminances says so, or where all of them do.
+enum class Says { any, all };
+
+template <std::size_t luminances>
+class FoldNeighbours {
+    using Index = vdtree::Index;
+    using NodeId = vdtree::NodeId;
+
+public:
+    // `trees`: the same except for their luminances.
+    explicit FoldNeighbours(std::span<const vdtree::SoundTree> trees)
+        : tree_(trees.front()), interior_(tree_.interior_count()), first_leaf_(tree_.first_leaf()),
+          leaf_end_(tree_.leaf_end()), parents_(tree_.parents()), support_(tree_.support_spheres()),
+          luminance_span_(interior_), most_changed_(interior_) {
+        for (NodeId node = 0; node < interior_; ++node) {
+            for (std::size_t i = 0; i < luminances; ++i) {
+                const vdtree::PackedRange support = trees[i].support_luminance()[node];
+                luminance_span_[node][i] = support.hi.value - support.lo.value;
+            }
+            most_changed_[node] = most_changed(node, trees);
+        }
+    }
+
+    // The node that stands for a leaf outside of `node`. Nodes up to its size are folded unless they have more to hide,
+    // and so are nodes of any size that hardly anybody sees fold, such as the faces beside an edge.
+    NodeId stand_in(Index leaf, NodeId node, Says says) const {
+        NodeId at = interior_ + leaf;
+        const auto folds_earlier = [&](NodeId up) {
+            const bool is_smaller = is_larger(node, up);
+            for (std::size_t i = 0; i < luminances; ++i) {
+                const bool so =
+                    (is_smaller && luminance_span_[up][i] <= measurement::much_more * luminance_span_[node][i]) ||
+                    (changes_much_less(up, node, i) && !supports(up, node));
+                if (so == (says == Says::any)) return so;
+            }
+            return says == Says::all;
+        };
+        int steps = 0;
+        for (NodeId up = parents_[at]; up != vdtree::no_node && folds_earlier(up) && ++steps <= measurement::most_steps;
+             up = parents_[at])
+            at = up;
+        return at;
+    }
+
+private:
+    bool is_larger(NodeId a, NodeId b) const { // ancestors are larger than their descendants
+        return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
+    }
+
+    // The most that a fold inside the surface can change, up to a factor: luminance times area, and heights. Neither
+    // falls from a node to its parent.
+    struct Change {
+        std::array<float, luminances> light = {};
+        float height = 0;
+    };
+    Change most_changed(NodeId node, std::span<const vdtree::SoundTree> trees) const {
+        const vdtree::NormalSlabs& normals = tree_.bounds()[node].slabs;
+        int turn = 0; // by which the normals differ
+        for (std::size_t i = 0; i < vdtree::NormalSlabs::axis_count; ++i)
+            turn = std::max(turn, normals.hi[i] - normals.lo[i]);
+        const float radius = support_[node].radius;
+        Change change{{}, static_cast<float>(turn) * radius};
+        for (std::size_t i = 0; i < luminances; ++i) {
+            const vdtree::PackedRange luminance = trees[i].ring_luminance()[node];
+            change.light[i] = static_cast<float>(luminance.hi.value - luminance.lo.value) * radius * radius;
+        }
+        return change;
+    }
+    bool changes_much_less(NodeId a, NodeId node, std::size_t luminance) const {
+        const Change &less = most_changed_[a], &more = most_changed_[node];
+        return measurement::much_less * less.light[luminance] <= more.light[luminance] &&
+               measurement::much_less * less.height <= more.height &&
+               !(tree_.bounds()[a].flags & vdtree::irregular_ring); // whose border may move as far as it likes
+    }
+    bool supports(NodeId a, NodeId b) const { return first_leaf_[a] <= first_leaf_[b] && leaf_end_[b] <= leaf_end_[a]; }
+
+    const vdtree::SoundTree& tree_;
+    NodeId interior_;
+    std::span<const Index> first_leaf_, leaf_end_;
+    std::span<const NodeId> parents_;
+    std::span<const vdtree::Sphere> support_;
+    std::vector<std::array<int, luminances>> luminance_span_; // of the support, by interior node
+    std::vector<Change> most_changed_;                        // likewise
+};
 
 // The directions that triangles face.
 class NormalReach {

@@ -5,10 +5,7 @@
 #include <optional>
 #include <unordered_set>
 
-#include <unseen/vdtree/function_ref.h>
-
-#include "measure/fold_stages.h"
-#include "measure/measurement.h"
+#include "measure/fold_record.h"
 #include "measure/pyramid.h"
 #include "measure/texture_detail.h"
 
@@ -72,15 +69,8 @@ private:
         vdtree::Float4 height; // at the tile's corners
         std::size_t number;    // of the triangle
     };
-    using Place = std::array<vdtree::Float4, 3>;
-    struct PlaceHash {
-        std::size_t operator()(const Place& place) const;
-    };
-    struct PlaceEqual {
-        bool operator()(const Place& a, const Place& b) const;
-    };
-    std::vector<Cover> covers_; // by row and column
-    std::unordered_set<Place, PlaceHash, PlaceEqual> places_;
+    std::vector<Cover> covers_;              // by row and column
+    std::unordered_set<std::string> places_; // bytes of corners
 };
 
 // Draws into memory that is used again for other pictures.

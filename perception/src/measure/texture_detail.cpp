@@ -6,7 +6,7 @@
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
 
-#include "measure/fold_stages.h"
+#include "measure/fold_record.h"
 
 namespace unseen::perception {
 

@@ -2,18 +2,8 @@
 // which level around a place, what it makes of vertices, and how densely it lies on the surface.
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
-#include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {

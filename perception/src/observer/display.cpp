@@ -2,7 +2,6 @@
 #include <unseen/perception/display.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/errors.h>
@@ -12,6 +11,7 @@ namespace unseen::perception {
 namespace {
 
 Error bad(std::string message) { return invalid_argument("display: " + std::move(message)); }
+Error bad(std::string rule, double value) { return bad(std::move(rule) + ", but is " + number_text(value)); }
 
 // !(value > 0) is true for NaN as well.
 bool positive(double value) { return value > 0 && std::isfinite(value); }
@@ -56,10 +56,9 @@ std::string in_brackets(const char* name, std::size_t i) {
 
 Result<void> check_transfer(const Display& d) {
     if (d.transfer == TransferFunction::gamma && !(d.gamma >= least_gamma && d.gamma <= largest_gamma))
-        return bad("transfer must be a gamma from 0.1 to 10, but is " + number_text(d.gamma));
+        return bad("transfer must be a gamma from 0.1 to 10", d.gamma);
     if (d.transfer == TransferFunction::pq && !(d.peak.value() <= pq_peak_cdm2))
-        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " +
-                   number_text(d.peak.value()));
+        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq", d.peak.value());
     if (d.transfer != TransferFunction::table) return {};
     constexpr std::size_t least_size = 3, largest_size = 65536;
     if (d.table.size() < least_size || d.table.size() > largest_size)
@@ -76,14 +75,14 @@ Result<void> check_transfer(const Display& d) {
 
 Result<void> check_lens(const Display& d) {
     if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360))
-        return bad("field_deg must be from 0.1 to 360, but is " + number_text(d.field_deg));
+        return bad("field_deg must be from 0.1 to 360", d.field_deg);
     if (d.lens.empty()) return {};
     if (d.lens.size() == 1 || d.lens.size() > 10'000)
         return bad("pixels_per_degree_at must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
     if (d.lens.front().angle_deg != 0)
         return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number_text(d.lens.front().angle_deg));
     for (std::size_t i = 0; i < d.lens.size(); ++i) {
-        const PixelsPerDegreeAt& at = d.lens[i];
+        const Display::PixelsPerDegreeAt& at = d.lens[i];
         if (i > 0 && !(at.angle_deg > d.lens[i - 1].angle_deg && at.angle_deg <= 180))
             return bad(in_brackets("pixels_per_degree_at", i) +
                        " must be at a larger angle than the one before it, up to 180 degrees, but is at " +
@@ -99,32 +98,30 @@ Result<void> check_lens(const Display& d) {
 } // namespace
 
 Result<void> validate(const Display& d) {
-    if (d.width_px <= 0) return bad("width_px must be above 0, but is " + std::to_string(d.width_px));
-    if (d.height_px <= 0) return bad("height_px must be above 0, but is " + std::to_string(d.height_px));
     constexpr int most_pixels = 1'000'000; // a side
-    if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
-    if (d.height_px > most_pixels)
-        return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
+    for (const auto& [name, pixels] : {std::pair("width_px", d.width_px), std::pair("height_px", d.height_px)}) {
+        const std::string but = ", but is " + std::to_string(pixels);
+        if (pixels <= 0) return bad(name + (" must be above 0" + but));
+        if (pixels > most_pixels) return bad(name + (" must be at most 1000000" + but));
+    }
     if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m))
-        return bad(
-            "pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " +
-            number_text(d.pixel_pitch.value()));
+        return bad("pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre",
+                   d.pixel_pitch.value());
     if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m))
-        return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number_text(d.distance.value()));
+        return bad("viewing_distance_m must be a length from 1 mm to 10 km", d.distance.value());
     if (!positive(pixels_per_degree(d).value()))
         return bad("pixel_pitch_m " + number_text(d.pixel_pitch.value()) + " m at viewing_distance_m " +
                    number_text(d.distance.value()) + " m gives no finite number of pixels per degree");
     if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
-        return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number_text(d.peak.value()));
+        return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2", d.peak.value());
     if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak))
         return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number_text(d.peak.value()) +
                    " cd/m2, but is " + number_text(d.black.value()));
     if (auto ok = check_transfer(d); !ok) return ok;
     if (auto ok = check_lens(d); !ok) return ok;
     if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux))
-        return bad("ambient_lux must be 0 to 1e6 lux, but is " + number_text(d.ambient.value()));
-    if (!(d.reflectivity >= 0 && d.reflectivity <= 1))
-        return bad("reflectivity must lie in 0..1, but is " + number_text(d.reflectivity));
+        return bad("ambient_lux must be 0 to 1e6 lux", d.ambient.value());
+    if (!(d.reflectivity >= 0 && d.reflectivity <= 1)) return bad("reflectivity must lie in 0..1", d.reflectivity);
     return {};
 }
 
@@ -134,21 +131,21 @@ PixelsPerDegree pixels_per_degree(const Display& display) {
 
 PixelsPerDegree coarsest_pixels_per_degree(const Display& display) {
     double least = pixels_per_degree(display).value();
-    for (const PixelsPerDegreeAt& at : display.lens) least = std::min(least, at.pixels_per_degree);
+    for (const Display::PixelsPerDegreeAt& at : display.lens) least = std::min(least, at.pixels_per_degree);
     return PixelsPerDegree(least);
 }
 
 PixelsPerDegree finest_pixels_per_degree(const Display& display) {
     if (display.lens.empty()) return pixels_per_degree(display);
     double most = 0;
-    for (const PixelsPerDegreeAt& at : display.lens) most = std::max(most, at.pixels_per_degree);
+    for (const Display::PixelsPerDegreeAt& at : display.lens) most = std::max(most, at.pixels_per_degree);
     return PixelsPerDegree(most);
 }
 
 PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre) {
     const double angle_deg = std::abs(from_centre.value());
     if (std::isnan(angle_deg)) return PixelsPerDegree(angle_deg);
-    const std::vector<PixelsPerDegreeAt>& lens = display.lens;
+    const std::vector<Display::PixelsPerDegreeAt>& lens = display.lens;
     if (lens.empty()) {
         constexpr double nearly_grazing_deg = 89.9;
         const double ppd = pixels_per_degree(display).value(), delta_deg = std::min(0.5 / ppd, nearly_grazing_deg);
@@ -157,10 +154,10 @@ PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre
         // tan(a + d) - tan a = sin d / (cos(a + d) cos a), without cancellation.
         return PixelsPerDegree(ppd * std::cos(delta) / (std::cos(a + delta) * std::cos(a)));
     }
-    const auto above =
-        std::find_if(lens.begin(), lens.end(), [&](const PixelsPerDegreeAt& at) { return at.angle_deg > angle_deg; });
+    const auto above = std::find_if(lens.begin(), lens.end(),
+                                    [&](const Display::PixelsPerDegreeAt& at) { return at.angle_deg > angle_deg; });
     if (above == lens.end()) return PixelsPerDegree(lens.back().pixels_per_degree);
-    const PixelsPerDegreeAt &lo = *(above - 1), &hi = *above;
+    const Display::PixelsPerDegreeAt &lo = *(above - 1), &hi = *above;
     const double t = (angle_deg - lo.angle_deg) / (hi.angle_deg - lo.angle_deg);
     return PixelsPerDegree(lo.pixels_per_degree + t * (hi.pixels_per_degree - lo.pixels_per_degree));
 }

@@ -2,7 +2,6 @@
 #include <unseen/perception/gaze.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 #include <glm/geometric.hpp>
@@ -25,7 +24,7 @@ constexpr double seconds_per_degree = 0.0022, least_saccade_s = 0.021;
 constexpr double margins_deg[] = {0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 15, 20, 30, 45, 60};
 
 // What is wrong with a sample after another, or nothing.
-std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
+std::string complaint_about(const GazeTrace::Sample& sample, const GazeTrace::Sample* before) {
     if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
     for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
         if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
@@ -108,7 +107,7 @@ private:
 
 // ---- traces -------------------------------------------------------------------------------------------------------
 
-Result<GazeTrace> GazeTrace::create(std::vector<GazeSample> samples) {
+Result<GazeTrace> GazeTrace::create(std::vector<GazeTrace::Sample> samples) {
     if (samples.empty()) return invalid_argument("A gaze trace needs at least one sample.");
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const std::string problem = complaint_about(samples[i], i > 0 ? &samples[i - 1] : nullptr);
@@ -119,10 +118,10 @@ Result<GazeTrace> GazeTrace::create(std::vector<GazeSample> samples) {
 
 glm::dvec2 GazeTrace::at(double time_s) const {
     const auto after = std::upper_bound(samples_.begin(), samples_.end(), time_s,
-                                        [](double t, const GazeSample& s) { return t < s.time_s; });
+                                        [](double t, const GazeTrace::Sample& s) { return t < s.time_s; });
     if (after == samples_.begin()) return samples_.front().px;
     if (after == samples_.end()) return samples_.back().px;
-    const GazeSample &a = *(after - 1), &b = *after;
+    const GazeTrace::Sample &a = *(after - 1), &b = *after;
     return a.px + (b.px - a.px) * ((time_s - a.time_s) / (b.time_s - a.time_s));
 }
 
@@ -137,7 +136,7 @@ Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) 
         return invalid_argument("A simulated gaze needs a sample a second at least.");
     if (auto valid = validate(display); !valid) return valid.error();
     EyeModel eye(o, display);
-    std::vector<GazeSample> samples;
+    std::vector<GazeTrace::Sample> samples;
     Movement movement = eye.next();
     double begun_s = 0;
     const auto count = static_cast<std::size_t>(std::floor(o.duration_s * o.samples_per_s)) + 1;
@@ -156,7 +155,7 @@ Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) 
 
 // ---- trackers -----------------------------------------------------------------------------------------------------
 
-Result<void> validate(const TrackerOptions& o) {
+Result<void> validate(const GazeTracker::Options& o) {
     constexpr double widest_deg = 180, slowest_s = 10;
     if (!(o.error_deg >= 0 && o.error_deg <= widest_deg))
         return invalid_argument("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
@@ -167,11 +166,11 @@ Result<void> validate(const TrackerOptions& o) {
     return {};
 }
 
-GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px,
+GazeTracker::GazeTracker(GazeTrace trace, const GazeTracker::Options& options, const Display& display, int width_px,
                          int height_px)
     : trace_(std::move(trace)), options_(options), tangent_per_pixel_(display.pixel_pitch / display.distance),
       centre_px_(glm::dvec2(width_px, height_px) * 0.5) {
-    const std::vector<GazeSample>& s = trace_.samples();
+    const std::vector<GazeTrace::Sample>& s = trace_.samples();
     for (std::size_t i = 1; i < s.size(); ++i) {
         if (!(speed_at((s[i - 1].time_s + s[i].time_s) / 2) >= saccade_speed_deg_s)) continue;
         if (!saccades_.empty() && saccades_.back().second == s[i - 1].time_s) saccades_.back().second = s[i].time_s;
@@ -181,9 +180,9 @@ GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const D
 }
 
 double GazeTracker::speed_at(double time_s) const {
-    const std::vector<GazeSample>& s = trace_.samples();
+    const std::vector<GazeTrace::Sample>& s = trace_.samples();
     const auto after = std::upper_bound(s.begin(), s.end(), time_s,
-                                        [](double t, const GazeSample& sample) { return t < sample.time_s; });
+                                        [](double t, const GazeTrace::Sample& sample) { return t < sample.time_s; });
     if (after == s.begin() || after == s.end()) return 0;
     const auto direction = [&](glm::dvec2 px) {
         return glm::normalize(glm::dvec3((px - centre_px_) * tangent_per_pixel_, 1));
@@ -193,9 +192,9 @@ double GazeTracker::speed_at(double time_s) const {
            (after->time_s - (after - 1)->time_s);
 }
 
-TrackedGaze GazeTracker::at(double time_s) const {
+GazeTracker::Gaze GazeTracker::at(double time_s) const {
     double seen_s = time_s - options_.latency_s; // when the eye was where the tracker says
-    TrackedGaze tracked;
+    GazeTracker::Gaze tracked;
     if (options_.suppression) {
         const auto next = std::upper_bound(saccades_.begin(), saccades_.end(), seen_s,
                                            [](double t, const auto& s) { return t < s.first; });
@@ -215,38 +214,12 @@ TrackedGaze GazeTracker::at(double time_s) const {
 
 // ---- tables -------------------------------------------------------------------------------------------------------
 
-CsfTable widened(const CsfTable& table, Degrees margin) {
-    assert(!(margin.value() < 0));
-    if (margin.value() == 0) return table;
-    const CsfSamples& samples = table.samples();
-    const auto plane = static_cast<std::ptrdiff_t>(samples.luminance_cdm2.size() * samples.frequency_cpd.size());
-    const double shift = std::max(margin.value(), CsfTable::smallest_spacing); // NaN stays
-    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}, samples.summation};
-    wide.sensitivity.assign(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
-    for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
-        const double degrees = e + shift;
-        // The sum's rounding can bring columns too near to each other.
-        if (degrees <= CsfTable::highest_eccentricity.value() &&
-            degrees - wide.eccentricity_deg.back() >= CsfTable::smallest_spacing) {
-            wide.eccentricity_deg.push_back(degrees);
-            wide.sensitivity.insert(wide.sensitivity.end(), column, column + plane);
-        } else {
-            std::transform(column, column + plane, wide.sensitivity.end() - plane, wide.sensitivity.end() - plane,
-                           [](double left_out, double last) { return std::max(left_out, last); });
-        }
-        column += plane;
-    }
-    auto made = CsfTable::derived(std::move(wide));
-    assert(made); // the columns of a table, at eccentricities that a table can have
-    return std::move(*made);
-}
-
 std::shared_ptr<const CsfTable> WidenedTables::at(Degrees margin) {
     const auto rounded =
         std::find_if(std::begin(margins_deg), std::end(margins_deg), [&](double m) { return m >= margin.value(); });
     if (rounded == std::end(margins_deg)) return nullptr;
     std::shared_ptr<const CsfTable>& kept = widened_[*rounded];
-    if (!kept) kept = std::make_shared<const CsfTable>(widened(table_, Degrees(*rounded)));
+    if (!kept) kept = std::make_shared<const CsfTable>(table_.widened(Degrees(*rounded)));
     return kept;
 }
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 #include <unseen/perception/gaze.h>
 #include <unseen/vdtree/internal/input_file.h>
@@ -403,7 +402,7 @@ private:
         if (!*time) return malformed(*time_, "has no time");
         if (samples_.empty()) first_time_ = **time;
         const Column& clock = columns_[*time_];
-        GazeSample sample;
+        GazeTrace::Sample sample;
         sample.time_s = (**time - (clock.is_clock ? first_time_ : 0)) / units_per_second(clock.unit);
 
         glm::dvec2 sum(0);
@@ -419,10 +418,10 @@ private:
         return append(sample);
     }
 
-    Result<void> append(const GazeSample& sample) {
+    Result<void> append(const GazeTrace::Sample& sample) {
         if (samples_.size() == GazeTrace::most_samples) return malformed("there are more than ten million samples");
         if (!samples_.empty()) {
-            GazeSample& before = samples_.back();
+            GazeTrace::Sample& before = samples_.back();
             const double step_s = sample.time_s - before.time_s;
             if (step_s == 0) {
                 if (is_seen(sample)) before = sample;
@@ -446,7 +445,7 @@ private:
                "time_s";
     }
 
-    static bool is_seen(const GazeSample& sample) { return !std::isnan(sample.px.x); }
+    static bool is_seen(const GazeTrace::Sample& sample) { return !std::isnan(sample.px.x); }
     bool is_normalised() const { return unit_ == Unit::share || unit_ == Unit::share_up || unit_ == Unit::media_share; }
 
     // The last position holds in gaps, the first before it. Precondition: one is seen.
@@ -460,7 +459,7 @@ private:
         };
         glm::dvec2 held = std::find_if(samples_.begin(), samples_.end(), is_seen)->px;
         bool is_gap = false;
-        for (GazeSample& sample : samples_) {
+        for (GazeTrace::Sample& sample : samples_) {
             if (is_seen(sample)) {
                 if (is_gap) measure_gap(sample.time_s);
                 held = sample.px;
@@ -483,7 +482,7 @@ private:
         const Column &time = columns_[*time_], &x = columns_[eyes_.front().x], &y = columns_[eyes_.front().y];
         if (time.is_clock && first_time_ != 0)
             notes_.push_back("times count from its first row, not by '" + time.name + "'.");
-        if (unit_ == Unit::none && std::all_of(samples_.begin(), samples_.end(), [](const GazeSample& s) {
+        if (unit_ == Unit::none && std::all_of(samples_.begin(), samples_.end(), [](const GazeTrace::Sample& s) {
                 return !is_seen(s) ||
                        (std::min(s.px.x, s.px.y) >= least_share && std::max(s.px.x, s.px.y) <= largest_share);
             })) {
@@ -510,7 +509,7 @@ private:
         note_what_was_assumed();
         bridge_gaps();
         if (unit_ == Unit::share_up)
-            for (GazeSample& sample : samples_) sample.px.y = 1 - sample.px.y;
+            for (GazeTrace::Sample& sample : samples_) sample.px.y = 1 - sample.px.y;
         auto trace = GazeTrace::create(std::move(samples_));
         if (!trace) return trace.error();
         return GazeRecording{std::move(*trace), is_normalised(), std::move(notes_)};
@@ -523,9 +522,9 @@ private:
     std::vector<std::string_view> cells_; // of the line that is being read
     std::optional<std::size_t> time_;
     std::vector<EyeColumns> eyes_;
-    Unit unit_ = Unit::none;          // of the positions
-    double first_time_ = 0;           // in the column's unit
-    std::vector<GazeSample> samples_; // positions are NaN where the eye is not seen
+    Unit unit_ = Unit::none;                 // of the positions
+    double first_time_ = 0;                  // in the column's unit
+    std::vector<GazeTrace::Sample> samples_; // positions are NaN where the eye is not seen
     std::vector<std::string> notes_;
 };
 
@@ -533,8 +532,8 @@ private:
 
 Result<GazeTrace> GazeRecording::in_window(int width_px, int height_px) const {
     if (!is_normalised) return trace;
-    std::vector<GazeSample> samples = trace.samples();
-    for (GazeSample& sample : samples) sample.px *= glm::dvec2(width_px, height_px);
+    std::vector<GazeTrace::Sample> samples = trace.samples();
+    for (GazeTrace::Sample& sample : samples) sample.px *= glm::dvec2(width_px, height_px);
     return GazeTrace::create(std::move(samples));
 }
 

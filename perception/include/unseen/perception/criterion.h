@@ -1,18 +1,9 @@
 // The perceptual fold tests: from how far an observer cannot see that nodes are folded.
 #pragma once
 
-#include <array>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string_view>
-
-#include <glm/vec2.hpp>
-
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/vdtree/criteria.h>
-#include <unseen/vdtree/lighting.h>
 
 namespace unseen::vdtree {
 class LightBounds;
@@ -32,28 +23,26 @@ struct SceneLuminance {
 };
 
 // The factors of the fold test by errors that are set by what is seen: with weaker values something shows on the tuning
-// set of `unseen-bench fit`. A criterion applies them to a measurement; files hold none of them.
+// set of `unseen-bench fit`. Files hold none of them.
 struct FoldModel {
-    // Parts of the surface that are nearer to each other than this times the distance by which folds move them may pass
-    // through each other. Both parts move, each with its neighbours. 1.5 shows pixels.
+    // Parts nearer to each other than this times the distance by which folds move them may pass through each other: both
+    // move, each with its neighbours. 1.5 shows pixels.
     double contact_reach = 6;
-    // The sine of the angle at which parts meet: the line where one hides the other moves by 1 / sine. Flatter angles
-    // count as this one. 1 shows pixels.
+    // The least sine of the angle at which parts meet: the line where one hides the other moves by 1 / sine. 1 shows
+    // pixels.
     double least_sine = 0.1;
-    // A patch lies among others like it, and contrast is summed over space, whatever its sign. So a patch is seen as
-    // well as a grating in a disc of this many times its width, by the law of area (summation_gain()). 2 shows pixels.
+    // A patch lies among others like it, so it is seen as well as a grating in a disc of this many times its width
+    // (summation_gain()). 2 shows pixels.
     double neighbourhood = 6;
-    // The share of the observer's sensitivity that the test needs, by eccentricity: linear in between, and beyond as at
-    // the last. Less than all is enough in the periphery. The table takes frequencies below the peak to be seen as well
-    // as the peak, which lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and
-    // nodes are larger, so fewer folds have their chance of being the worst. With 0.2 at 50 degrees changes reach the
-    // threshold.
+    // The share of the observer's sensitivity that the test needs, by eccentricity, linear in between. Less than all is
+    // enough aside: the table takes frequencies below the peak to be seen as well as the peak, a node counts as where
+    // it is nearest to the gaze, and fewer, larger nodes have their chance of being the worst. With 0.2 at 50 degrees
+    // changes reach the threshold.
     static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
     std::array<double, 4> needed = {1, 0.95, 0.6, 0.5}; // must not rise
-    // The same for outlines, at any eccentricity. They count as long straight strips, all of which move by the largest
-    // shift and towards the darkest or brightest background. Along a true outline shifts change their signs from node
-    // to node. If an outline moves by an eighth of the mesh's radius or more, as when a part vanishes, all is needed.
-    // 0.1 shows pixels.
+    // The same for outlines, which count as long straight strips that move by the largest shift and towards the darkest
+    // or brightest background, though true shifts change their signs from node to node. If an outline moves by an
+    // eighth of the mesh's radius or more, as when a part vanishes, all is needed. 0.1 shows pixels.
     double needed_by_outlines = 0.3;
 
     bool operator==(const FoldModel&) const = default;
@@ -80,10 +69,9 @@ struct FoldTestOptions {
 };
 
 // All tests are in distance form. A criterion depends on the field, the window, the options, and on whether there is a
-// gaze, but not on where the eye or the gaze is: one criterion serves all cuts of a view that moves. If the view is
-// shifted, the viewer's eye is assumed to be in front of the point where the line of sight meets the screen. An
-// orthographic view cannot have a gaze. Each test fails if the display or the view is invalid, if the gaze or a
-// luminance of the scene is not finite, or if the tree is from a damaged file.
+// gaze, but not on where the eye or the gaze is: one serves all cuts of a view that moves. In shifted views the viewer's
+// eye is before the point where the line of sight meets the screen; orthographic views cannot have a gaze. Each test
+// fails on an invalid display or view, a gaze or luminance that is not finite, and a tree from a damaged file.
 
 // Luebke and Hallen 2001, section 3.3, in its safe form: extent and luminance range of the ring, facing of the dilated
 // ring. For a node whose ring's sphere has the angular radius asin(r/d) on the screen:
@@ -95,9 +83,9 @@ struct FoldTestOptions {
 // unless the slabs of the dilated ring prove that it faces the eye from one side, and if the ring has an irregular
 // edge.
 //
-// Contrast is rounded up to classes of a 48th of an octave, luminance to sixteenths of the display's range.
-// Eccentricity is rounded down to quarters of a degree. The magnification is the window's largest. So a fold costs no
-// less than above, and a cut keeps at most about one per cent more triangles. With chroma, classes are coarser.
+// Contrast is rounded up to a 48th of an octave, luminance to sixteenths of the display's range, eccentricity down to
+// quarters of a degree; the magnification is the window's largest. So a fold costs no less than above, and a cut keeps at
+// most about one per cent more triangles. With chroma, classes are coarser.
 //
 // Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze. Also
 // fails if chroma is asked for and the tree has a texture, whose colours are not known; so does the next test.
@@ -157,8 +145,7 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // If the mesh was measured in stages, a node also folds where pictures show that nobody can tell the whole mesh from
 // the mesh in the node's stage. This decides most folds far away, and few near by.
 //
-// Measured, not proven: docs/evidence.md says where it fails. Open and irregular rings are silhouettes. Cost: as
-// luebke_hallen_distances().
+// Measured, not proven: docs/evidence.md says where it fails. Open and irregular rings are silhouettes.
 Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                   const FoldTestOptions& options);
 

@@ -2,11 +2,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <unseen/perception/units.h>
 #include <unseen/vdtree/function_ref.h>
@@ -45,17 +40,11 @@ enum class CsfModel {
     castle_red_green, // castleCSF's isoluminant branches. Contrast is |L - 2.3112 M| and |50.9875 S - (L + M)| of the
     castle_yellow_violet, // cones' responses, over the luminance L + M
 };
-inline constexpr std::array csf_models = {CsfModel::castle,
-                                          CsfModel::stela,
-                                          CsfModel::daly,
-                                          CsfModel::barten_1989,
-                                          CsfModel::barten_1999,
-                                          CsfModel::barten_fitted,
-                                          CsfModel::barten_2004,
-                                          CsfModel::mannos_sakrison,
-                                          CsfModel::rushmeier,
-                                          CsfModel::castle_red_green,
-                                          CsfModel::castle_yellow_violet};
+inline constexpr auto csf_models = [] { // all, in this order
+    std::array<CsfModel, static_cast<std::size_t>(CsfModel::castle_yellow_violet) + 1> all{};
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<CsfModel>(i);
+    return all;
+}();
 
 std::string_view name(CsfModel model);
 Result<CsfModel> csf_model(std::string_view name);
@@ -98,24 +87,15 @@ inline constexpr SquareDegrees barten_fitted_field{100}; // that barten_fitted a
 
 // How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
 //   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 if A is less than A15
-// With `own` = 1 this is castle's law. People sum more or less: `own` is how many times as well as by castle's law
-// somebody sees an unlimited grating, relative to a patch of A15 (calibration's ObserverProfile::summation). NaN if the
-// frequency, area or own is not above 0; the area may be infinite.
+// `own`: how many times as well as by castle's law somebody sees an unlimited grating, relative to a patch of A15. NaN
+// if the frequency, area or own is not above 0; the area may be infinite.
 double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own = 1);
 double summation_share(CyclesPerDegree frequency, SquareDegrees area); // t
 
 // ---- tables
 
-// What a table holds constant; as in Stimulus.
-struct CsfConditions {
-    Hertz temporal{0};
-    DegreesPerSecond velocity{0};
-    VisualField field = VisualField::worst;
-    Metres distance{0.5};
-};
-// A patch of patch_area(frequency).
-Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
-                     Luminance luminance);
+// A patch of patch_area(frequency); the rest is that of `conditions`.
+Stimulus stimulus_of(const Stimulus& conditions, CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance);
 
 // Sensitivity over frequency, eccentricity and luminance; linear in between in log S over log frequency, eccentricity
 // and log luminance.
@@ -128,20 +108,13 @@ struct CsfSamples {
     double summation = 1;                 // for larger patches: `own` of summation_gain(), 0.01 to 100
 };
 
-// Where a table has samples. Beyond them:
+// An observer's table. Copies are cheap and share their data. Threads may look up at the same time. Beyond its samples:
 // - at larger eccentricities sensitivity is as at the last one, and in dimmer light as at the lowest luminance. Eyes
 //   are less sensitive there, so this is safe;
 // - in brighter light it is as at the highest luminance. Eyes may be more sensitive: up to some 100 cd/m2 sensitivity
 //   grows with the light, so use a table that reaches as far as the display does;
 // - the conservative form sees coarser gratings as well as the best of all finer ones, and finer gratings fall on with
 //   the shallowest slope at which any column ends.
-struct CsfReach {
-    CyclesPerDegree coarsest, finest;
-    Degrees eccentricity;
-    Luminance darkest, brightest;
-};
-
-// An observer's table. Copies are cheap and share their data. Threads may look up at the same time.
 class CsfTable {
 public:
     CsfTable(const CsfTable&) = default; // and no move: there is no empty table
@@ -151,9 +124,8 @@ public:
     // grows with eccentricity by more than `noise_db`. The error names the field, the index and the values.
     static Result<CsfTable> create(CsfSamples samples);
     // The standard deviation of the difference of two measurements in different studies, 20 log10: root 2 times 4.4 dB.
-    // A table that grows by more has its rows or columns out of order, or a slip. Two thresholds of `unseen calibrate`
-    // differ by this much in one case of twenty at the worst. Sensitivities below 1 count as 1, because nothing that
-    // can be shown is seen there.
+    // A table that grows by more has its rows or columns out of order, or a slip. Sensitivities below 1 count as 1,
+    // because nothing that can be shown is seen there.
     static constexpr double noise_db = 6.2;
     // Below this luminance only rods see, and the fovea has none, so sensitivity may grow with eccentricity. (CIE
     // 191:2010: where mesopic vision begins.)
@@ -162,9 +134,9 @@ public:
     static constexpr double smallest_spacing = 1e-4;
     static constexpr Degrees highest_eccentricity{180};
     // Samples a model for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 degrees, 1e-3 to 1e4 cd/m2, within
-    // 0.5% of the closed form wherever S > 1. Fails on conditions outside of the model's domain. Cost: 20 to 400 ms, 1
-    // to 30 MB; daly's is the largest.
-    static Result<CsfTable> from_model(CsfModel model, const CsfConditions& conditions);
+    // 0.5% of the closed form wherever S > 1. Of the conditions, what moves, the field and the distance count. Fails on
+    // those outside of the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.
+    static Result<CsfTable> from_model(CsfModel model, const Stimulus& conditions);
     static CsfTable from_model(CsfModel model); // static gratings, the worst field
     static const CsfTable& standard();          // castle's; made once
 
@@ -172,20 +144,23 @@ public:
     Result<CsfTable> scaled(double gain) const;
 
     // The conservative form for patches that hold half a wave of a frequency. Such a patch also holds lower
-    // frequencies, with a contrast that goes with the square of the frequency, the share of their own patches that it
-    // fills. So sensitivity at a frequency is at least that at any lower one times the square of their ratio. Where
-    // sensitivity falls fast, at large eccentricities, this is much more than at the patch's own frequency.
-    // sensitivity() is not changed. Cost: some milliseconds.
+    // frequencies, with a contrast that goes with the square of the frequency: the share of their own patches that it
+    // fills. So sensitivity is at least that at any lower frequency times the square of their ratio. sensitivity() is
+    // not changed. Cost: some milliseconds.
     CsfTable of_half_waves() const;
 
-    // The table for gratings that move over the retina. Coarse gratings are seen better then, so a table that begins at
-    // a higher frequency is extended down to 1/16 cpd at the value of its first one. Fails on velocities below 0 or
-    // above 80 degrees per second, and if sensitivities leave the bounds above. Up to 0.1 degrees per second nothing
-    // changes.
+    // The table for gratings that move over the retina, extended down to 1/16 cpd at the value of its first frequency:
+    // coarse gratings are seen better then. Fails on velocities below 0 or above 80 degrees per second, and if
+    // sensitivities leave the bounds above. Up to 0.1 degrees per second nothing changes.
     Result<CsfTable> moving(DegreesPerSecond velocity) const;
 
+    // The table for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180 degrees
+    // that a table can have; beyond the last column that stays below them, what it sees or one that is left out,
+    // whichever is more. Margins below `smallest_spacing` count as it, but for 0. Where the margin is 180 degrees or
+    // more, infinite or NaN, everything is seen as it is best seen anywhere. Precondition: not below 0.
+    CsfTable widened(Degrees margin) const;
+
     const CsfSamples& samples() const noexcept;
-    CsfReach reach() const noexcept;
 
     // The samples, interpolated.
     double sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
@@ -207,10 +182,6 @@ public:
                                         std::span<const float> luminance_cdm2, std::span<float> log2_frequency) const;
 
 private:
-    friend CsfTable widened(const CsfTable& table, Degrees margin);
-    // Made from another table's columns: all checks of create() except for growth.
-    static Result<CsfTable> derived(CsfSamples samples);
-
     struct State;
     explicit CsfTable(std::shared_ptr<const State> state);
 
@@ -223,10 +194,9 @@ std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance dark
 
 // ---- people
 
-// How much more sensitive somebody is than castleCSF. With its law of area castleCSF is right for the median person:
-// 65% of 253 sensitivities from eight studies lie above it, the median by 1.2 dB. People differ, and one person differs
-// from study to study, with a standard deviation of 4.4 dB. So a person is castleCSF times a gain. The data are in
-// data/people; <unseen/calibration/people.h> compares them with any model.
+// How much more sensitive somebody is than castleCSF, which is right for the median person: 65% of 253 sensitivities from
+// eight studies lie above it, the median by 1.2 dB. People differ, and one person differs from study to study, with a
+// standard deviation of 4.4 dB. The data are in data/people.
 struct Person {
     std::string_view name;
     double gain;        // of sensitivity over castleCSF's

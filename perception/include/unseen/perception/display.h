@@ -1,9 +1,6 @@
 // The display: from relative luminance and code values to cd/m2, from pixels to visual angle.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include <unseen/perception/units.h>
 #include <unseen/vdtree/result.h>
 
@@ -17,17 +14,17 @@ enum class TransferFunction {
     table, // measured, see Display::table
 };
 
-// How many pixels a degree has at an angle from the centre of the view.
-struct PixelsPerDegreeAt {
-    double angle_deg = 0;
-    double pixels_per_degree = 0;
-};
-
 // A flat screen, seen from straight in front of its centre (which is also the centre of the window). Or, with `lens`, a
 // headset: then pitch and distance are those of the flat picture that is drawn for it, whose directions the viewer sees
 // where they are; the lens says how fine the panel's pixels are there. Default: the 20-inch monitor of the 2001 paper's
 // field, 34.357 pixels per degree at its centre.
 struct Display {
+    // How many pixels a degree has at an angle from the centre of the view.
+    struct PixelsPerDegreeAt {
+        double angle_deg = 0;
+        double pixels_per_degree = 0;
+    };
+
     std::string name = "20-inch 1600x1200 at 0.5 m";
     int width_px = 1600;
     int height_px = 1200;

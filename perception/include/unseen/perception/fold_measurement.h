@@ -1,18 +1,12 @@
 // Measures what folding each node of a tree changes, for error_distances() in <unseen/perception/criterion.h>.
 #pragma once
 
-#include <span>
-
-#include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 
-// Returns the tree with the measurement as attributes (fold_errors, fold_facing, fold_stage, fold_stages and
-// fold_measurement; docs/file-format.md), which files keep. It holds for the tree's light and luminances. Everything
-// else is shared with the given tree. Folds change less if the proxies' luminances conserve light: call
-// vdtree::conserve_light() before.
+// Returns the tree with the measurement as attributes (docs/file-format.md), which files keep. It holds for the tree's
+// light and luminances. Folds change less if the proxies' luminances conserve light: call vdtree::conserve_light() before.
 //
 // Three things are compared before and after a fold:
 // - small pictures of the surface, seen along the node's normal;
@@ -22,9 +16,8 @@ namespace unseen::perception {
 // Textured surfaces show the texture at their texture coordinates. Detail finer than the pictures' cells counts by how
 // far the fold slides it over the surface (fold_texture).
 //
-// The tree keeps the numbers as measured, with the settings of the measurement; a criterion decides what they mean for
-// an eye. This is a measurement, not a bound over all cuts: neighbours may be folded in other ways, and there are few
-// cells and points.
+// A criterion decides what the numbers mean for an eye. This is a measurement, not a bound over all cuts: neighbours may
+// be folded in other ways, and there are few cells and points.
 //
 // Fails if check() does, and if knows_texture() is false. Cost: a second, and some 25 us a node, two to four times as
 // much with a texture; in parallel. No step is quadratic in the triangles around a vertex or in overlapping triangles.

@@ -5,44 +5,40 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include <glm/vec2.hpp>
 
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
-
-// Pixels of the window from the top left; may lie outside.
-struct GazeSample {
-    double time_s = 0;
-    glm::dvec2 px = glm::dvec2(0);
-    bool operator==(const GazeSample&) const = default;
-};
 
 // Recorded or simulated: linear between samples, which ascend strictly in time; the first before, the last after them.
 // Not empty.
 class GazeTrace {
 public:
+    // Pixels of the window from the top left; may lie outside.
+    struct Sample {
+        double time_s = 0;
+        glm::dvec2 px = glm::dvec2(0);
+        bool operator==(const Sample&) const = default;
+    };
+
     // Fails on no samples, times that do not ascend, gaps longer than `longest_gap_s`, and non-finite numbers, naming
     // the index.
-    static Result<GazeTrace> create(std::vector<GazeSample> samples);
+    static Result<GazeTrace> create(std::vector<Sample> samples);
     static constexpr double longest_gap_s = 1;
     static constexpr double farthest_px = 1e6;              // from the window's corner: a thousand windows away
     static constexpr std::size_t most_samples = 10'000'000; // of files and simulations
 
-    const std::vector<GazeSample>& samples() const noexcept { return samples_; }
+    const std::vector<Sample>& samples() const noexcept { return samples_; }
     double duration_s() const noexcept { return samples_.back().time_s - samples_.front().time_s; }
     glm::dvec2 at(double time_s) const;
 
 private:
-    explicit GazeTrace(std::vector<GazeSample> samples) : samples_(std::move(samples)) {}
-    std::vector<GazeSample> samples_;
+    explicit GazeTrace(std::vector<Sample> samples) : samples_(std::move(samples)) {}
+    std::vector<Sample> samples_;
 };
 
 // A recording as a tracker's program wrote it.
@@ -75,9 +71,8 @@ inline constexpr double longest_blink_s = 0.4;
 //   "LEFT_IN_BLINK" of EyeLink, "worn" and "blink id" of Pupil Labs.
 //
 // Rows without a position (empty, NaN, ".", NA) and with an eye that is not seen are gaps. The last position holds in
-// them, and the first before it: during a blink nothing is seen (Volkmann, Riggs & Moore 1980), so what counts is where
-// the eye lands, and a glide there would be a movement that nobody made. Of rows with the same time the last with a
-// position counts.
+// them, and the first before it: during a blink nothing is seen (Volkmann, Riggs & Moore 1980), and a glide would be a
+// movement that nobody made. Of rows with the same time the last with a position counts.
 //
 // Errors name the file, the line and the column. Times that fall are errors, and rows more than
 // `GazeTrace::longest_gap_s` apart.
@@ -96,57 +91,50 @@ struct SimulatedGaze {
 // Amplitudes are angles on the display's tangent plane. At most ten million samples; larger ones fail.
 Result<GazeTrace> simulate_gaze(const SimulatedGaze& options, const Display& display);
 
-// What a tracker makes of a gaze.
-struct TrackerOptions {
-    double error_deg = 0; // radius within which the true gaze lies
-    double latency_s = 0; // from the eye to the picture
-    // Follow nothing during saccades, when nothing is seen (Volkmann 1986): what was known before one holds from its
-    // onset to `suppressed_s` after it, at least to its end.
-    bool suppression = false;
-    double suppressed_s = 0.05;
-};
-
-// What a renderer knows at an instant.
-struct TrackedGaze {
-    glm::dvec2 px = glm::dvec2(0); // where the eye was `latency` ago
-    // Everything may be so much nearer to the true gaze: eccentricities shrink to max(0, e - margin), margin = error +
-    // speed latency.
-    double margin_deg = 0;
-    double speed_deg_s = 0;
-    bool is_suppressed = false;
-};
-
 inline constexpr double saccade_speed_deg_s =
     50; // faster than any pursuit of a slow object, slower than any saccade of a degree
 
-// The same trace and options give the same run.
+// What a tracker makes of a gaze. The same trace and options give the same run.
 class GazeTracker {
 public:
+    struct Options {
+        double error_deg = 0; // radius within which the true gaze lies
+        double latency_s = 0; // from the eye to the picture
+        // Follow nothing during saccades, when nothing is seen (Volkmann 1986): what was known before one holds from its
+        // onset to `suppressed_s` after it, at least to its end.
+        bool suppression = false;
+        double suppressed_s = 0.05;
+    };
+
+    // What a renderer knows at an instant.
+    struct Gaze {
+        glm::dvec2 px = glm::dvec2(0); // where the eye was `latency` ago
+        // Everything may be so much nearer to the true gaze: eccentricities shrink to max(0, e - margin), margin = error +
+        // speed latency.
+        double margin_deg = 0;
+        double speed_deg_s = 0;
+        bool is_suppressed = false;
+    };
+
     // Preconditions: validate() accepts the options and the display, and the window is at least 1x1 pixels.
-    GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px, int height_px);
-    TrackedGaze at(double time_s) const;
+    GazeTracker(GazeTrace trace, const Options& options, const Display& display, int width_px, int height_px);
+    Gaze at(double time_s) const;
 
 private:
     double speed_at(double time_s) const; // degrees a second
 
     GazeTrace trace_;
-    TrackerOptions options_;
+    Options options_;
     double tangent_per_pixel_;
     glm::dvec2 centre_px_;
     std::vector<std::pair<double, double>> saccades_; // from, to; in seconds, ascending
 };
 
 // Finite; 0 or more. The error names the field.
-Result<void> validate(const TrackerOptions& options);
+Result<void> validate(const GazeTracker::Options& options);
 
 // Without a tracker the head alone says where the viewer looks: the eyes stay within so much of straight ahead.
 inline constexpr Degrees head_only_margin{15};
-
-// The table as it is for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180
-// degrees that a table can have; beyond the last column that stays below them, what it sees or one that is left out,
-// whichever is more. Margins below CsfTable::smallest_spacing count as it, but for 0. Where the margin is 180 degrees
-// or more, infinite or NaN, everything is seen as it is best seen anywhere. Precondition: not below 0.
-CsfTable widened(const CsfTable& table, Degrees margin);
 
 // Keeps widened tables. Margins are rounded up to one of a few, so that not every frame needs a table of its own.
 class WidenedTables {

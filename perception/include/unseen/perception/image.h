@@ -3,13 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
-#include <string_view>
-#include <vector>
 
 #include <unseen/perception/display.h>
 #include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::perception {
 

@@ -1,14 +1,11 @@
-// Judges of image pairs: which pixels show a visible difference. They check the fold test and are not part of its
-// model.
+// Judges of image pairs: which pixels show a visible difference. They check the fold test.
 #pragma once
 
-#include <memory>
 #include <optional>
 
 #include <glm/vec2.hpp>
 
 #include <unseen/perception/csf.h>
-#include <unseen/perception/display.h>
 #include <unseen/perception/image.h>
 
 namespace unseen::perception {
@@ -63,9 +60,8 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
 // band there, with the reference's masking.
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options);
 
-// The second judge: another model of the same observer. It uses CsfModel::barten_fitted, a model of the eye's physics
-// with a law of area of its own, instead of castleCSF, and squares over the bands instead of powers of 3.5. Its gain is
-// Person::barten_gain, from the same people.
+// The second judge: CsfModel::barten_fitted, a model of the eye's physics with a law of area of its own, instead of
+// castleCSF, and squares over the bands instead of powers of 3.5. Its gain is Person::barten_gain.
 JudgeOptions second_judge_options(const Person& person, const Display& display = {},
                                   const std::optional<glm::dvec2>& gaze_px = {});
 

@@ -1,35 +1,27 @@
 // What a scene masks: by how much its patterns raise the thresholds of what folds change, by place and frequency.
 //
-// The sources' pipeline (Drettakis and others 2007) has one threshold a pixel, of a picture without the objects that
-// ask. That is not safe: one frequency's mask would excuse a change at another, and what stands behind an object would
-// mask it. So elevations are kept by band, and a place has the least of several pictures: of everything but the objects
-// that ask, which masks them whatever they look like, and of the scene as it is seen, which what is covered does not
-// mask.
+// Drettakis and others 2007 have one threshold a pixel, of a picture without the objects that ask. That is not safe: one
+// frequency's mask would excuse a change at another, and what stands behind an object would mask it. So elevations are
+// kept by band, and a place has the least of several pictures: of everything but the objects that ask, and of the scene
+// as it is seen.
 #pragma once
 
-#include <memory>
-#include <span>
-#include <vector>
-
 #include <unseen/perception/criterion.h>
-#include <unseen/perception/units.h>
 #include <unseen/vdtree/depth_picture.h>
-#include <unseen/vdtree/vertex_tree.h>
-#include <unseen/vdtree/view.h>
 
 namespace unseen::perception {
-
-// Of one picture, in cells of a grid over it, from its top left: the factor by which thresholds are raised, at least.
-struct Elevations {
-    int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
-    int columns = 0, rows = 0;
-    std::vector<CyclesPerDegree> bands = {}; // nominal frequencies, falling; one: the same at all frequencies
-    std::vector<float> elevation = {};       // [(band * rows + row) * columns + column], 1 or more
-};
 
 // Copies are cheap and share their data; any number of threads may ask at once.
 class MaskingPicture {
 public:
+    // Of one picture, in cells of a grid over it, from its top left: the factor by which thresholds are raised, at least.
+    struct Elevations {
+        int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
+        int columns = 0, rows = 0;
+        std::vector<CyclesPerDegree> bands = {}; // nominal frequencies, falling; one: the same at all frequencies
+        std::vector<float> elevation = {};       // [(band * rows + row) * columns + column], 1 or more
+    };
+
     // The least of the pictures, which have the same cells and bands. Fails on an invalid view, on no picture or more
     // than 16 bands, where cells do not cover the window, and on elevations that are NaN, infinite or below 1.
     static Result<MaskingPicture> create(const vdtree::View& view, std::span<const Elevations> pictures);
@@ -44,6 +36,11 @@ private:
     struct Grid {
         int columns = 0, rows = 0;
         std::vector<float> least; // of 2 x 2 of the grid before
+
+        float at(std::size_t band, int x, int y) const {
+            const auto row = band * static_cast<std::size_t>(rows) + static_cast<std::size_t>(y);
+            return least[row * static_cast<std::size_t>(columns) + static_cast<std::size_t>(x)];
+        }
     };
     struct Grids {
         vdtree::View view;

@@ -40,7 +40,6 @@ using Lux = Quantity<struct LuxUnit>;
 using Luminance = Quantity<struct CandelaPerSquareMetreUnit>;
 using CyclesPerDegree = Quantity<struct CyclesPerDegreeUnit>;
 using PixelsPerDegree = Quantity<struct PixelsPerDegreeUnit>;
-using MichelsonContrast = Quantity<struct MichelsonContrastUnit>; // (Lmax - Lmin) / (Lmax + Lmin), 0..1
 
 inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
 constexpr Radians to_radians(Degrees a) { return Radians(a.value() * (std::numbers::pi / 180)); }

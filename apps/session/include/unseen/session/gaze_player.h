@@ -23,7 +23,7 @@ struct GazeOptions {
     GazeSource source = GazeSource::none;
     std::filesystem::path trace = {}; // of GazeSource::trace, see perception::read_gaze_recording()
     std::uint64_t seed = 1;           // of GazeSource::simulated
-    perception::TrackerOptions tracker = {};
+    perception::GazeTracker::Options tracker = {};
 };
 
 class GazePlayer {

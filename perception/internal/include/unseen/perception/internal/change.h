@@ -11,7 +11,6 @@
 #pragma once
 
 #include <deque>
-#include <vector>
 
 #include <unseen/perception/judge.h>
 

@@ -1,14 +1,8 @@
 // Colour beside luminance, in the two opponent directions in which eyes see it.
 #pragma once
 
-#include <vector>
-
 #include <glm/common.hpp>
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
-#include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {

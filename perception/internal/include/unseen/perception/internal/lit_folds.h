@@ -2,13 +2,7 @@
 // own light is not the scene's.
 #pragma once
 
-#include <memory>
-#include <span>
-
-#include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/lighting.h>
-#include <unseen/vdtree/result.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
 

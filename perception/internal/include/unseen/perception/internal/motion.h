@@ -22,9 +22,8 @@ inline constexpr DegreesPerSecond fastest_velocity{80};
 // coarse ones. NaN if the frequency is not above 0, or the velocity below 0.
 double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity);
 
-// The speed of an eye that follows a target (Daly 1998): min(0.82 v + 0.15, 80) degrees per second.
-DegreesPerSecond pursuit_velocity(DegreesPerSecond target);
-// How fast the target then moves on the retina: |v - pursuit_velocity(v)|.
+// How fast a target moves on the retina of an eye that follows it at min(0.82 v + 0.15, 80) degrees per second (Daly
+// 1998).
 DegreesPerSecond retinal_velocity_of_target(DegreesPerSecond image);
 
 } // namespace unseen::perception

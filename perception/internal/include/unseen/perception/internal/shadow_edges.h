@@ -6,11 +6,6 @@
 // The strip itself is taken for an outline that moves one way, see FoldModel.
 #pragma once
 
-#include <vector>
-
-#include <unseen/vdtree/result.h>
-#include <unseen/vdtree/view.h>
-
 #include <unseen/perception/criterion.h>
 
 namespace unseen::perception {
