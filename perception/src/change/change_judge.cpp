@@ -8,7 +8,6 @@
 #include "judge/judge_input.h"
 
 namespace unseen::perception {
-
 namespace {
 
 // Fitted constants as published with the program (gfxdisp/elaTCSF).

@@ -12,7 +12,6 @@
 #include "csf/csf_model.h"
 
 namespace unseen::perception {
-
 namespace {
 
 constexpr std::array<std::string_view, csf_models.size()> names = {

@@ -6,7 +6,6 @@
 #include "fold/pattern_eye.h"
 
 namespace unseen::perception {
-
 namespace {
 
 using vdtree::DistanceCriterion;

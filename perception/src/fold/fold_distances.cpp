@@ -7,7 +7,6 @@
 #include "fold/fold_screen.h"
 
 namespace unseen::perception {
-
 namespace {
 
 using vdtree::ContrastClasses;

@@ -9,7 +9,6 @@
 #include "fold/error_distances.h"
 
 namespace unseen::perception {
-
 namespace {
 
 constexpr std::size_t most_bands = 16; // as many as judges have

@@ -5,7 +5,6 @@
 #include "fold/pattern_eye.h"
 
 namespace unseen::perception {
-
 namespace {
 
 // Of illuminances from a four-thousandth of white to white; more light than that is cut off.

@@ -7,7 +7,6 @@
 #include "judge/modern_masking.h"
 
 namespace unseen::perception {
-
 namespace {
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.

@@ -11,7 +11,6 @@
 #include "pyramid_kernel.h"
 
 namespace unseen::perception {
-
 namespace {
 
 // ---- images -------------------------------------------------------------------------------------------------------

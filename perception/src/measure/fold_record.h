@@ -40,11 +40,14 @@ struct FoldStage {
     bool operator==(const FoldStage&) const = default;
 };
 // Of each contrast the larger one.
+using ContrastsByBand = float[FoldStage::band_count][FoldStage::masks.size()];
+inline void include(const ContrastsByBand& other, float factor, ContrastsByBand& contrast) {
+    for (std::size_t b = 0; b < FoldStage::band_count; ++b)
+        for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
+            contrast[b][row] = std::max(contrast[b][row], factor * other[b][row]);
+}
 inline void include(const FoldStage& other, FoldStage& stage) {
-    for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
-        for (std::size_t b = 0; b < FoldStage::band_count; ++b)
-            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
-                stage.contrast[k][b][row] = std::max(stage.contrast[k][b][row], other.contrast[k][b][row]);
+    for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k) include(other.contrast[k], 1, stage.contrast[k]);
 }
 // Whether all of it are numbers that a measurement can give.
 inline bool is_sound(const FoldStage& stage) {

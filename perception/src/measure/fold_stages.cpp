@@ -1,7 +1,6 @@
 #include "measure/fold_record.h"
 
 namespace unseen::perception {
-
 namespace {
 
 constexpr auto& backgrounds = FoldStage::backgrounds;
@@ -20,17 +19,9 @@ Numbers around(const std::array<float, count>& sorted, float low, float high) {
     return n;
 }
 
-using ByBand = float[FoldStage::band_count][FoldStage::masks.size()];
-
-void include(const ByBand& other, float factor, ByBand& contrast) {
-    for (std::size_t b = 0; b < FoldStage::band_count; ++b)
-        for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
-            contrast[b][row] = std::max(contrast[b][row], factor * other[b][row]);
-}
-
 // Of a mesh before a background `times` as bright as the brightest of the pictures. With its change l of light and c of
 // cover, |l - times c| <= times |l - c| + (times - 1) |l|; and what that is divided by does not get less.
-void include_brighter(const FoldStage& stage, float times, ByBand& contrast) {
+void include_brighter(const FoldStage& stage, float times, ContrastsByBand& contrast) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b)
         for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
             contrast[b][row] = std::max(contrast[b][row], times * stage.contrast[backgrounds.size() - 1][b][row] +
@@ -50,7 +41,7 @@ std::vector<FoldStage> LitStages::under(const Illumination& light) const {
         for (const std::size_t share : {shares.first, shares.last}) {
             const FoldStage& from = by_share[share * stages.size() + stage];
             for (std::size_t k = 0; k < backgrounds.size(); ++k) {
-                ByBand& to = stages[stage].contrast[k];
+                ContrastsByBand& to = stages[stage].contrast[k];
                 const float low = backgrounds[k] / (brightest * lightest),
                             high = backgrounds[k] / (brightest * darkest);
                 const Numbers behind = around(backgrounds, low, high);

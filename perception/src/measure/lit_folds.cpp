@@ -183,6 +183,16 @@ struct LitFolds::State {
     LitStages stages;
     std::shared_ptr<const TextureDetail> texture; // null: none
     LightBounds bounds;
+
+    // Finds what is not kept in files.
+    Result<void> look_at(const VertexTree& tree) {
+        auto its_bounds = LightBounds::measure(tree);
+        if (!its_bounds) return its_bounds.error();
+        auto its_texture = texture_detail_of(tree);
+        if (!its_texture) return its_texture.error();
+        bounds = std::move(*its_bounds), texture = std::move(*its_texture);
+        return {};
+    }
 };
 
 Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Progress& progress) {
@@ -213,12 +223,7 @@ Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Pr
     state->textures = axes[0].textures;
     state->stage_of = std::move(measured->stage_of);
     state->stages = std::move(measured->stages);
-    auto bounds = LightBounds::measure(tree);
-    if (!bounds) return bounds.error();
-    auto texture = texture_detail_of(tree);
-    if (!texture) return texture.error();
-    state->bounds = std::move(*bounds);
-    state->texture = std::move(*texture);
+    if (auto ok = state->look_at(tree); !ok) return ok.error();
     return LitFolds(std::move(state));
 }
 
@@ -252,10 +257,6 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
             !(albedo.empty() || is_sound(albedo[node])) || !(textures.empty() || is_sound(textures[node])))
             return refused("a number of node " + std::to_string(node) + " is negative or not finite.");
     }
-    auto bounds = LightBounds::measure(tree);
-    if (!bounds) return bounds.error();
-    auto texture = texture_detail_of(tree);
-    if (!texture) return texture.error();
     auto state = std::make_shared<State>();
     state->folds.assign(folds.begin(), folds.end());
     state->facing.assign(facing.begin(), facing.end());
@@ -263,8 +264,7 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     state->textures.assign(textures.begin(), textures.end());
     state->stage_of.assign(stage_of.begin(), stage_of.end());
     state->stages.by_share.assign(stages.begin(), stages.end());
-    state->bounds = std::move(*bounds);
-    state->texture = std::move(*texture);
+    if (auto ok = state->look_at(tree); !ok) return ok.error();
     return LitFolds(std::move(state));
 }
 

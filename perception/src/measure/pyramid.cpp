@@ -5,7 +5,6 @@
 #include "pyramid_kernel.h"
 
 namespace unseen::perception {
-
 namespace {
 
 constexpr auto tap0 = static_cast<float>(kernel_middle), tap1 = static_cast<float>(kernel_near),
