@@ -23,7 +23,7 @@ struct FoldError {
     float bias = 0;             // see FoldRecord
     vdtree::NormalSlabs facing; // see FoldFacing; all where parts of the surface meet; it includes the children's
     std::uint8_t fading = 0;
-    std::uint8_t stage = 0; // in which it folds: see fold_stages.h; no earlier than the children
+    std::uint8_t stage = 0; // in which it folds: see FoldStage; no earlier than the children
 
     bool operator==(const FoldError&) const = default;
 };
