@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include <sample_mesh.h>
+#include <scene_parts.h>
 
 #include "make_scene.h"
 #include "terminal.h"

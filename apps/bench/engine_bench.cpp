@@ -7,7 +7,7 @@
 #include <numbers>
 #include <unordered_map>
 
-#include <sample_mesh.h>
+#include <scene_parts.h>
 #include <subdivide.h>
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/criterion.h>
@@ -17,8 +17,8 @@
 
 #include "bench_tools.h"
 #include "benches.h"
-#include "load_model.h"
 #include "progress_bar.h"
+#include "session_options.h"
 #include "terminal.h"
 
 namespace unseen::app {

@@ -11,8 +11,8 @@
 #include "bench_tools.h"
 #include "benches.h"
 #include "judged_model.h"
-#include "load_model.h"
 #include "progress_bar.h"
+#include "session_options.h"
 #include "terminal.h"
 
 namespace unseen::app {

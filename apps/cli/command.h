@@ -8,7 +8,7 @@
 
 #include <unseen/vdtree/result.h>
 
-#include "rules.h"
+#include "options.h"
 
 namespace unseen::app {
 

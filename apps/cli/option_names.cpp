@@ -37,7 +37,7 @@ constexpr OptionName option_names[] = {
     {"read.skip_bad", "--skip-bad"},
     {"read.weld = false", "--no-weld"},
     {"load.texture", "--texture"},
-    {"load.without_textures", "--no-texture"},
+    {"load.without_textures", "--texture none"},
     {"load.prelit", "--prelit"},
     {"load.as = ", "--as "},
     {"load.unit_metres", "--unit"},

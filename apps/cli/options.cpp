@@ -19,6 +19,8 @@
 namespace unseen::app {
 namespace {
 
+constexpr double largest_seed = 9007199254740992.0; // 2^53, to which doubles count
+
 // A validator that passes numbers which `accepts`, and says `requirement` about others.
 template <class Accepts>
 CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
@@ -31,7 +33,34 @@ CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
         "");
 }
 
+// "--show cost": the option, given with that value. Options of the setup lie in the program, not in the verb.
+bool is_given(const CLI::App& verb, const std::string& words) {
+    const std::size_t blank = words.find(' ');
+    const CLI::Option* option = nullptr;
+    for (const CLI::App* app = &verb; app && !option; app = app->get_parent())
+        option = app->get_option_no_throw(words.substr(0, blank));
+    if (!option || option->empty()) return false;
+    if (blank == words.npos) return true;
+    const std::string value = words.substr(blank + 1);
+    return std::ranges::any_of(option->results(),
+                               [&](const std::string& own) { return own == value || own.starts_with(value + "="); });
+}
+
 } // namespace
+
+void check_rules(const CLI::App& verb, std::span<const Rule> rules) {
+    const auto given = [&](const std::string& option) { return is_given(verb, option); };
+    for (const Rule& rule : rules) {
+        if (!given(rule.option)) continue;
+        const std::string why = rule.why.empty() ? "." : ": " + rule.why + ".";
+        if (rule.kind == Rule::needs_one_of) {
+            if (std::ranges::none_of(rule.others, given)) refuse(rule.option + " needs " + listed(rule.others) + why);
+            continue;
+        }
+        for (const std::string& other : rule.others)
+            if (given(other)) refuse(rule.option + " and " + other + " exclude each other" + why);
+    }
+}
 
 std::string listed(const std::vector<std::string>& names) {
     std::string list;
@@ -151,13 +180,34 @@ void add_seed_option(CLI::App& verb, std::uint64_t& seed, const std::string& of)
     verb.add_option_function<double>(
             "--seed", [&seed](const double& v) { seed = static_cast<std::uint64_t>(v); }, of + " (default: 1)")
         ->type_name("N")
-        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+        ->check(whole(0, largest_seed));
 }
 
-void add_gaze_error_option(CLI::App& verb, GazeOptions& o) {
-    verb.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
-        ->type_name("DEGREES")
-        ->check(within(0, 180));
+void add_tracker_option(CLI::App& verb, GazeOptions& o, bool moves) {
+    const auto take = [&o, moves](const std::string& word) {
+        const std::size_t equals = word.find('=');
+        const std::string key = word.substr(0, equals);
+        const auto value = equals == word.npos ? std::nullopt : finite_from(word.substr(equals + 1));
+        const auto is_within = [&](double most) { return value && *value >= 0 && *value <= most; };
+        if (key == "error" && is_within(180)) o.tracker.error_deg = *value;
+        else if (moves && key == "latency" && is_within(10000)) o.tracker.latency_s = *value / 1000;
+        else if (moves && key == "seed" && is_within(largest_seed) && *value == std::floor(*value))
+            o.seed = static_cast<std::uint64_t>(*value);
+        else if (moves && word == "suppression") o.tracker.suppression = true;
+        else
+            refuse("--tracker: must be error=DEGREES, up to 180" +
+                   std::string(moves ? ", latency=MILLISECONDS, up to 10000, seed=N or suppression" : "") + ", not '" +
+                   word + "'");
+    };
+    verb.add_option_function<std::vector<std::string>>(
+            "--tracker", [take](const std::vector<std::string>& words) { std::ranges::for_each(words, take); },
+            moves ? "How well the gaze is known, with commas between: error=DEGREES widens the fovea; "
+                    "latency=MILLISECONDS, from the eye to the picture, widens it by the gaze's speed; suppression "
+                    "keeps still during saccades, when nothing is seen; seed=N, of simulated gazes (default: 1)"
+                  : "error=DEGREES: how well the gaze is known, which widens the fovea (default: 0)")
+        ->type_name(moves ? "KEY=VALUE,..." : "error=DEGREES")
+        ->delimiter(',')
+        ->allow_extra_args(false);
 }
 
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, std::vector<Rule>& rules) {
@@ -165,32 +215,36 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, 
     std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated},
                                                                {"head", GazeSource::head}};
     if (allows_mouse) sources.push_back({"mouse", GazeSource::mouse});
-    add_choice(group, "--gaze-mode", o.source, std::move(sources),
-               std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
-                           "degrees of the middle") +
-                   (allows_mouse ? "; mouse: at the pointer" : ""));
+    const auto take = [&o, sources](const std::string& given) {
+        o.source = GazeSource::trace;
+        for (const auto& [name, source] : sources)
+            if (name == given) o.source = source;
+        if (o.source != GazeSource::trace) return;
+        std::vector<std::string> names;
+        for (const auto& known : sources) names.push_back(known.first);
+        names.emplace_back("the file of a recording");
+        if (given.find_first_of("./") == given.npos)
+            refuse("--gaze-mode: must be " + listed(names) + ", not '" + given + "'");
+        o.trace = given;
+    };
     group
         .add_option_function<std::string>(
-            "--gaze-trace", [&o](const std::string& file) { o.trace = file, o.source = GazeSource::trace; },
-            "A recording: a table with columns such as time_s, x_px and y_px, or as Tobii, Pupil Labs and EyeLink name "
-            "them; blinks hold the last position")
-        ->type_name("FILE.csv|FILE.tsv");
-    add_seed_option(group, o.seed, "For simulated gazes");
-    add_gaze_error_option(group, o);
-    group
-        .add_option_function<double>(
-            "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
-            "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
-        ->type_name("MILLISECONDS")
-        ->check(within(0, 10000));
-    group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
-    const std::vector<std::string> moving = {"--gaze-mode simulated", "--gaze-trace"};
-    const std::string why = "only these know how the eye moves";
-    rules.insert(rules.end(), {{"--gaze-mode", Rule::excludes, {"--gaze-trace"}},
-                               {"--gaze", Rule::excludes, {"--gaze-mode", "--gaze-trace"}},
-                               {"--seed", Rule::needs_one_of, {"--gaze-mode simulated"}},
-                               {"--gaze-latency", Rule::needs_one_of, moving, why},
-                               {"--suppression", Rule::needs_one_of, moving, why}});
+            "--gaze-mode", take,
+            std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                        "degrees of the middle; ") +
+                (allows_mouse ? "mouse: at the pointer; " : "") +
+                "or a recording: a table with columns such as time_s, x_px and y_px, or as Tobii, Pupil Labs and "
+                "EyeLink name them; blinks hold the last position")
+        ->type_name("NAME|FILE.csv|FILE.tsv");
+    add_tracker_option(group, o, true);
+    const std::vector<std::string> still = {"--gaze-mode head", "--gaze-mode mouse"};
+    const std::string why = "only simulated and recorded gazes tell how the eye moves";
+    rules.push_back({"--gaze", Rule::excludes, {"--gaze-mode"}});
+    rules.push_back({"--tracker seed", Rule::needs_one_of, {"--gaze-mode simulated"}});
+    for (const std::string option : {"--tracker latency", "--tracker suppression"}) {
+        rules.push_back({option, Rule::needs_one_of, {"--gaze-mode"}, why});
+        rules.push_back({option, Rule::excludes, still, why});
+    }
 }
 
 void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, bool only_perceptual) {

@@ -18,9 +18,19 @@
 #include <unseen/session/load.h>
 #include <unseen/session/request.h>
 
-#include "rules.h"
-
 namespace unseen::app {
+
+// Which options of a verb go together: a table for each verb, checked after the parse. Options are named as people give
+// them: "--show", or with a value, "--show cost"; "--tracker error" stands for "--tracker error=0.5", too.
+struct Rule {
+    enum Kind { needs_one_of, excludes };
+    std::string option;
+    Kind kind;
+    std::vector<std::string> others;
+    std::string why = {}; // a clause, where the sentence without it would not be understood
+};
+// Ends the parse with a sentence where a rule is broken.
+void check_rules(const CLI::App& verb, std::span<const Rule> rules);
 
 using session::FoldTest;
 using session::Goal;
@@ -110,7 +120,8 @@ void add_hiding_option(CLI::App& verb, WhatOptions& options);
 void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse, std::vector<Rule>& rules);
-void add_gaze_error_option(CLI::App& verb, GazeOptions& options);
+// How well the gaze is known. `moves`: so that it may be late, too.
+void add_tracker_option(CLI::App& verb, GazeOptions& options, bool moves);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds, std::vector<Rule>& rules);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 void add_velocity_option(CLI::App& verb, std::optional<double>& degrees_a_second);

@@ -76,13 +76,6 @@ Result<void> make_folder(const fs::path& folder) {
 
 } // namespace
 
-Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file) {
-    if (file.empty()) return std::optional<vdtree::AtomicFile>();
-    auto opened = vdtree::AtomicFile::create(file);
-    if (!opened) return opened.error();
-    return std::optional(std::move(*opened));
-}
-
 std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display) {
     return {model, view.setup, view.lights, view.texture.file, display.file, display.observer, display.csf};
 }

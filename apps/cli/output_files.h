@@ -2,11 +2,9 @@
 // written.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
-#include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/result.h>
 
 #include "options.h"
@@ -20,9 +18,6 @@ Result<void> check_outputs(const std::vector<std::string>& inputs, const std::ve
 
 // A sentence about what a file holds, with the first input's name if it names none.
 Message with_file_name(const Error& error);
-
-// One of them, to be written and committed later; nothing if the name is empty.
-Result<std::optional<vdtree::AtomicFile>> open_if_named(const std::string& file);
 
 // What a command that looks at a model reads.
 std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display);

@@ -16,7 +16,6 @@
 #include "interruption.h"
 #include "option_names.h"
 #include "output_files.h"
-#include "suggestion.h"
 #include "terminal.h"
 
 namespace unseen::app {

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include <unseen/vdtree/internal/csv.h>
+
 #include "terminal.h"
 
 namespace unseen::app {
@@ -44,24 +46,41 @@ std::string json_text(const Json& json) {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Result<JsonReport> JsonReport::open(const std::string& name) {
+Result<JsonReport> JsonReport::open(const std::string& name, const std::string& csv) {
     JsonReport report;
     report.on_stdout_ = name == "-";
-    if (name.empty() || report.on_stdout_) return report;
-    auto file = vdtree::AtomicFile::create(name);
-    if (!file) return file.error();
-    report.file_ = std::move(*file);
+    for (const auto& [file, opened] : {std::pair(&name, &report.file_), std::pair(&csv, &report.csv_)}) {
+        if (file->empty() || *file == "-") continue;
+        auto created = vdtree::AtomicFile::create(*file);
+        if (!created) return created.error();
+        *opened = std::move(*created);
+    }
     return report;
 }
 
-Result<void> JsonReport::prepare(const Json& json) {
+Result<void> JsonReport::prepare(const Json& json, const std::string& csv) {
     text_ = json_text(json);
+    if (csv_)
+        if (auto written = csv_->write(csv); !written) return written;
     return file_ ? file_->write(text_) : Result<void>();
 }
 
 Result<void> JsonReport::publish() {
     if (on_stdout_) std::fputs(text_.c_str(), stdout);
+    if (csv_)
+        if (auto done = csv_->commit(); !done) return done;
     return file_ ? file_->commit() : Result<void>();
+}
+
+std::string csv_line(std::initializer_list<Json> cells) {
+    std::string line;
+    for (const Json& cell : cells) {
+        if (&cell != cells.begin()) line += ",";
+        if (cell.is_string()) line += csv_field(cell.get<std::string>());
+        else if (!cell.is_number_float()) line += cell.dump();
+        else if (std::isfinite(cell.get<double>())) line += shortest(cell.get<double>());
+    }
+    return line + "\n";
 }
 
 void print_line(std::string_view text) {
@@ -96,6 +115,24 @@ void print_markdown(const std::vector<std::vector<std::string>>& rows) {
         for (std::size_t column = 0; column < rows[r].size(); ++column) std::printf(column == 0 ? "|---" : "|---:");
         std::printf("|\n");
     }
+}
+
+Fact count_of(const std::string& key, const std::string& label, std::uint64_t count) {
+    return {key, label, count, grouped(count)};
+}
+
+Json to_json(const std::vector<Fact>& facts) {
+    Json json;
+    for (const Fact& fact : facts)
+        if (!fact.key.empty()) json[fact.key] = fact.json;
+    return json;
+}
+
+void print_facts(const std::vector<Fact>& facts) {
+    std::vector<std::vector<std::string>> rows;
+    for (const Fact& fact : facts)
+        if (!fact.label.empty()) rows.push_back({fact.label, fact.text});
+    print_table(std::move(rows));
 }
 
 Json texture_json(const vdtree::VertexTree& tree) {

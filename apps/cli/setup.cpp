@@ -8,7 +8,7 @@
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/number_text.h>
 
-#include "suggestion.h"
+#include "terminal.h"
 
 namespace unseen::app {
 namespace {
@@ -17,6 +17,11 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 constexpr int largest_window_px = 32768; // a side, as vdtree::validate has it
+// The group of options that few need: fields of the file, which the command line takes without a word about them.
+constexpr const char* in_file_alone = "In FILE.json alone";
+
+bool is_field(const CLI::Option& option) { return option.get_group() == in_file_alone; }
+bool is_shown(const CLI::Option& option) { return !option.get_group().empty() && !is_field(option); }
 
 // "1024x768", or "512" for a square.
 std::string parse_size(const std::string& text, int& width, int& height) {
@@ -141,7 +146,7 @@ void Setup::add_display() {
     add_number(group, "--ppd", o.pixels_per_degree, within(0.1, 1e5), "N", "Pixels per degree at the display's centre");
     add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
-    add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
+    add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black")->group(in_file_alone);
     mark(group, display);
     group
         .add_option("--observer", o.observer,
@@ -161,9 +166,11 @@ void Setup::add_light() {
     ViewOptions& o = view_;
     CLI::App& group = add_section("light", "What is around the model");
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6)");
-    add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
+    add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)")
+        ->group(in_file_alone);
     add_number(group, "--fill-light", o.fill_light, within(0, 1), "F",
-               "Share of the light that also comes from the opposite side, 0..1 (default: 0.25)");
+               "Share of the light that also comes from the opposite side, 0..1 (default: 0.25)")
+        ->group(in_file_alone);
     group
         .add_option("--lights", o.lights,
                     "Lights in place of these three: directional, point, spot, headlight, ambient, with highlights; in "
@@ -184,11 +191,16 @@ void Setup::add_files() {
     TextureOptions& o = view_.texture;
     CLI::App& group = add_section("files", "How mesh files are read");
     group
-        .add_option("--texture", o.file,
-                    "The image that lies over a mesh with texture coordinates, in place of its materials' images; or a "
-                    "folder in which these are looked for, too")
-        ->type_name("IMAGE|FOLDER");
-    group.add_flag("--no-texture", o.is_left_out, "Ignore images; simplified meshes keep them");
+        .add_option_function<std::string>(
+            "--texture",
+            [&o](const std::string& name) {
+                if (name == "none") o.is_left_out = true;
+                else o.file = name;
+            },
+            "The image that lies over a mesh with texture coordinates, in place of its materials' images; a folder in "
+            "which these are looked for, too; or none: ignore images, which simplified meshes keep")
+        ->type_name("IMAGE|FOLDER|none");
+    group.add_flag("--no-texture", o.is_left_out)->group(""); // --texture none
     group
         .add_option_function<std::vector<std::string>>(
             "--drop",
@@ -205,9 +217,11 @@ void Setup::add_files() {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(one_of({"skins", "morph-targets", "animations", "extensions"}));
-    group.add_flag("--no-weld", o.is_unwelded,
-                   "In STL files each facet keeps its normal and three vertices of its own (default: those at the same "
-                   "place become one)");
+    group
+        .add_flag("--no-weld", o.is_unwelded,
+                  "In STL files each facet keeps its normal and three vertices of its own (default: those at the same "
+                  "place become one)")
+        ->group(in_file_alone);
     group.add_flag("--prelit", o.is_prelit,
                    "Colours and images have light baked in (default: they are reflectance, and are lit)");
     mark(group, files);
@@ -220,8 +234,7 @@ void Setup::add_files() {
     add_choice<session::LoadAs, session::LoadAs>(
         group, "--as", view_.as, {{"scene", session::LoadAs::scene}, {"model", session::LoadAs::model}},
         "A glTF file is read as a scene (many objects, each simplified by itself, with the file's camera and lights) "
-        "or "
-        "as one model (default: a scene if it has cameras, lights, a mesh under several nodes, or marks of what is "
+        "or as one model (default: a scene if it has cameras, lights, a mesh under several nodes, or marks of what is "
         "background)");
     mark(group, scenes);
 }
@@ -236,47 +249,41 @@ unsigned Setup::parts_of(const CLI::App& verb) const {
     return found == verbs_.end() ? 0 : found->second;
 }
 
-bool Setup::acts_in(const CLI::App& verb, const CLI::Option& option) const {
-    return std::ranges::any_of(
-        options_, [&](const auto& own) { return own.first == &option && (own.second & parts_of(verb)) != 0; });
-}
-
-std::vector<std::string> Setup::names() const {
-    std::vector<std::string> names = {"--setup"};
-    for (const auto& own : options_) names.push_back(own.first->get_name());
-    return names;
-}
-
-std::vector<std::string> Setup::names_in(const CLI::App& verb) const {
+std::vector<std::string> Setup::names_in(unsigned parts) const {
     std::vector<std::string> names;
-    if (parts_of(verb) != 0) names.push_back("--setup");
+    if (parts != 0) names.push_back("--setup");
     for (const auto& [option, part] : options_)
-        if (part & parts_of(verb)) names.push_back(option->get_name());
+        if ((part & parts) && is_shown(*option)) names.push_back(option->get_name());
     return names;
 }
 
 std::string Setup::summary_of(const CLI::App& verb) const {
     if (parts_of(verb) == 0) return {};
     std::string text = "Setup, on the command line or in --setup FILE.json; 'unseen help setup' explains it:\n";
-    for (const Section& section : sections_) {
+    const auto add_line = [&](const std::string& name, const auto& belongs, std::size_t dashes) {
         std::string names;
         for (const auto& [option, part] : options_)
-            if ((part & parts_of(verb)) && section.group->get_option_no_throw(option->get_name()) == option)
-                names += " " + option->get_name();
-        if (!names.empty())
-            text += "  " + section.name + ":" + std::string(9 - section.name.size(), ' ') + names + "\n";
-    }
+            if ((part & parts_of(verb)) && belongs(*option)) names += " " + option->get_name().substr(dashes);
+        if (!names.empty()) text += "  " + name + ":" + std::string(9 - name.size(), ' ') + names + "\n";
+    };
+    for (const Section& section : sections_)
+        add_line(
+            section.name,
+            [&](const CLI::Option& option) {
+                return is_shown(option) && section.group->get_option_no_throw(option.get_name()) == &option;
+            },
+            0);
+    add_line("in file", is_field, 2);
     return text;
 }
 
 std::string Setup::help() const {
     std::string text =
-        "The setup: from where one looks, on what display, under what light, and how files are read. The verbs share "
-        "these\n"
-        "options; the help of each verb names those that act in it.\n\n"
-        "--setup FILE.json reads them from a file: JSON, the keys are the names without dashes. Options on the command "
-        "line\n"
-        "count more. A verb takes from the file what acts in it. Files named in it are looked for in its folder "
+        "The setup: from where one looks, on what display, under what light, and how files are read. The verbs share\n"
+        "these options; the help of each verb names those that act in it.\n\n"
+        "--setup FILE.json reads them from a file: JSON, the keys are the names without dashes. Options on the "
+        "command\n"
+        "line count more. A verb takes from the file what acts in it. Files named in it are looked for in its folder\n"
         "first.\n\n"
         "  {\"display\": \"lab.json\", \"observer\": \"strict\", \"light\": [1, 0, 0], \"shadows\": false, \"size\": "
         "\"512x512\"}\n";
@@ -300,12 +307,6 @@ void Setup::check(const CLI::App& verb) {
     app::check(view_);
 }
 
-CLI::Option* Setup::named(const std::string& key) const {
-    for (const auto& [option, part] : options_)
-        if (option->get_name() == "--" + key) return option;
-    return nullptr;
-}
-
 void Setup::read_file(const std::string& file) {
     view_.setup = file;
     const auto text = read_text_file(file);
@@ -315,14 +316,16 @@ void Setup::read_file(const std::string& file) {
     const CLI::App* verb = &program_;
     while (!verb->get_subcommands().empty()) verb = verb->get_subcommands().front();
     for (const auto& [key, value] : json.items()) {
-        CLI::Option* const option = named(key);
-        if (!option) {
+        const auto own =
+            std::ranges::find(options_, "--" + key, [](const auto& known) { return known.first->get_name(); });
+        if (own == options_.end()) {
             std::vector<std::string> keys;
             for (const auto& known : options_) keys.push_back(known.first->get_name().substr(2));
             const std::string near = suggestion(key, keys);
             refuse("'" + file + "': there is no option '" + key + "' of the setup" + (near.empty() ? "." : near));
         }
-        if (!acts_in(*verb, *option) || !option->empty()) continue;
+        const auto& [option, part] = *own;
+        if (!(part & parts_of(*verb)) || !option->empty()) continue;
         const std::vector<std::string> words = words_of(value);
         if (words.empty()) refuse("'" + file + "', " + key + ": must be a number, a text, true, false, or an array.");
         take(file, key, *option, words);

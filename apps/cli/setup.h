@@ -37,11 +37,9 @@ public:
 
     // The verb takes these parts, a sum of Part.
     void act_in(CLI::App& verb, unsigned parts);
-    bool acts_in(const CLI::App& verb, const CLI::Option& option) const;
-    // All options, by their first names.
-    std::vector<std::string> names() const;
-    // Those that act in the verb.
-    std::vector<std::string> names_in(const CLI::App& verb) const;
+    // The first names of the options that act in the verb, or of all; those of the file alone excepted.
+    std::vector<std::string> names_in(const CLI::App& verb) const { return names_in(parts_of(verb)); }
+    std::vector<std::string> names() const { return names_in(~0U); }
     // A line for each part that acts in the verb, for its help; empty: none does.
     std::string summary_of(const CLI::App& verb) const;
     // All of it, for `help setup`.
@@ -64,8 +62,8 @@ private:
     void read_file(const std::string& file);
     void take(const std::string& file, const std::string& key, CLI::Option& option,
               const std::vector<std::string>& words);
-    CLI::Option* named(const std::string& key) const;
     unsigned parts_of(const CLI::App& verb) const;
+    std::vector<std::string> names_in(unsigned parts) const;
 
     CLI::App& program_;
     ViewOptions view_;

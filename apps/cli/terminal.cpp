@@ -1,9 +1,12 @@
 #include "terminal.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+
+#include <drawing.h>
 
 namespace unseen::app {
 namespace {
@@ -17,21 +20,20 @@ void print_to_stderr(std::string_view kind, std::string_view text) {
     std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
-// Bytes of the printable character that the text begins with; 0: there is none.
-std::size_t printable_bytes(std::string_view text) {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-    const unsigned char first = byte(0);
-    if (first < 0x80) return first >= 0x20 && first != 0x7f;
-    const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-    if (first < 0xc2 || first > 0xf4 || text.size() < length) return 0;
-    char32_t code = first & (0xff >> (length + 1));
-    for (std::size_t i = 1; i < length; ++i) {
-        if ((byte(i) & 0xc0) != 0x80) return 0;
-        code = code << 6 | (byte(i) & 0x3f);
+// Letters to insert, leave out, replace or swap with their neighbour (optimal string alignment).
+std::size_t slips(std::string_view a, std::string_view b) {
+    std::vector<std::vector<std::size_t>> d(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
+    for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = i;
+    for (std::size_t k = 0; k <= b.size(); ++k) d[0][k] = k;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        for (std::size_t k = 1; k <= b.size(); ++k) {
+            const bool is_other = a[i - 1] != b[k - 1];
+            d[i][k] = std::min({d[i - 1][k] + 1, d[i][k - 1] + 1, d[i - 1][k - 1] + is_other});
+            if (i > 1 && k > 1 && a[i - 1] == b[k - 2] && a[i - 2] == b[k - 1])
+                d[i][k] = std::min(d[i][k], d[i - 2][k - 2] + 1);
+        }
     }
-    constexpr std::array<char32_t, 5> least = {0, 0, 0xa0, 0x800, 0x10000}; // by length, less the controls below 0xa0
-    const bool is_surrogate = code >= 0xd800 && code < 0xe000;
-    return code >= least[length] && code <= 0x10ffff && !is_surrogate ? length : 0;
+    return d[a.size()][b.size()];
 }
 
 } // namespace
@@ -85,6 +87,20 @@ std::string file_size(std::uintmax_t bytes) {
     std::size_t unit = 0;
     for (; size >= 999.5 && unit + 1 < units.size(); ++unit) size /= 1000;
     return rounded(size, size < 100 ? 2 : 3) + " " + units[unit];
+}
+
+std::string suggestion(std::string_view typed, const std::vector<std::string>& names) {
+    constexpr std::size_t longest = 40, letters_a_slip = 3; // a third of the letters may be wrong
+    if (typed.size() > longest) return {};
+    std::size_t least = std::max<std::size_t>(1, typed.size() / letters_a_slip) + 1;
+    const std::string* nearest = nullptr;
+    for (const std::string& name : names) {
+        const std::size_t count = slips(typed, name);
+        if (count >= least) continue;
+        least = count;
+        nearest = &name;
+    }
+    return nearest ? ": did you mean '" + *nearest + "'?" : std::string();
 }
 
 } // namespace unseen::app

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <unseen/vdtree/internal/number_format.h> // IWYU pragma: export
 
@@ -25,5 +26,8 @@ std::string shortened(std::string text, std::size_t most_bytes);
 
 std::string duration(double milliseconds);   // "0.05 ms", "620 ms", "61.8 s", "2 min 5 s"
 std::string file_size(std::uintmax_t bytes); // "812 bytes", "1.2 MB"
+
+// The name that a slip of the fingers may have become `typed`: ": did you mean 'simplify'?". Empty where none is near.
+std::string suggestion(std::string_view typed, const std::vector<std::string>& names);
 
 } // namespace unseen::app

@@ -24,4 +24,12 @@ struct ColourBar {
 // too narrow for the text, the rest black.
 Result<perception::Image> with_colour_bar(const perception::Image& map, const ColourBar& bar);
 
+// ---- what a judge saw
+
+// Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more). Code values.
+perception::Image visibility_map(const perception::Image& visibility);
+
+// Of these colours: thresholds of visibility.
+ColourBar visibility_bar();
+
 } // namespace unseen::app

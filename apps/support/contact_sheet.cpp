@@ -188,17 +188,6 @@ Result<void> fill_all(std::vector<Column>& columns, session::Session& session, c
 
 } // namespace
 
-Result<void> judge_cuts(session::Session& session, const vdtree::View& view, render::Context& context,
-                        std::vector<SheetCut>& cuts) {
-    std::vector<Column> columns;
-    for (SheetCut& cut : cuts) columns.emplace_back().cut = std::move(cut);
-    SheetOptions options;
-    options.has_cuts = false;
-    const auto filled = fill_all(columns, session, view, context, options);
-    for (std::size_t i = 0; i < cuts.size(); ++i) cuts[i] = std::move(columns[i].cut);
-    return filled;
-}
-
 Result<ContactSheet> draw_contact_sheet(session::Session& session, const vdtree::View& view, render::Context& context,
                                         const SheetOptions& o) {
     std::vector<Column> columns = wishes(session, view, o);

@@ -51,9 +51,4 @@ struct ContactSheet {
 Result<ContactSheet> draw_contact_sheet(session::Session& session, const vdtree::View& view, render::Context& context,
                                         const SheetOptions& options);
 
-// The same without pictures: fills in reports and judgements of cuts that say name, request and gaze. The first has to be
-// the full model, which the others are judged against.
-Result<void> judge_cuts(session::Session& session, const vdtree::View& view, render::Context& context,
-                        std::vector<SheetCut>& cuts);
-
 } // namespace unseen::app

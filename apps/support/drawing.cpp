@@ -1,16 +1,14 @@
 #include "drawing.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <numbers>
 #include <vector>
 
-#include <cairo-svg.h>
 #include <cairo.h>
-
-#include <unseen/vdtree/internal/atomic_file.h>
 
 namespace unseen::app {
 namespace {
@@ -21,45 +19,17 @@ constexpr double dash_px[] = {7, 7}; // with the round ends of a line two pixels
 
 std::string shown_size(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
-Error failure(cairo_status_t status, const std::string& what) {
+Error failure(cairo_status_t status, int width, int height) {
     return {status == CAIRO_STATUS_NO_MEMORY ? ErrorCode::unsupported : ErrorCode::invalid_argument,
-            "Cannot draw " + what + ": " + cairo_status_to_string(status) + "."};
-}
-
-// Cairo must not be unwound: what does not fit into memory is its own error.
-cairo_status_t append(void* text, const unsigned char* bytes, unsigned int count) {
-    try {
-        static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(bytes), count);
-        return CAIRO_STATUS_SUCCESS;
-    } catch (const std::exception&) {
-        return CAIRO_STATUS_NO_MEMORY;
-    }
-}
-
-// How many bytes of a character begin the text; 0 where they are no UTF-8.
-std::size_t character_length(std::string_view text) {
-    const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U; };
-    const unsigned first = byte(0);
-    const std::size_t length = first < 0x80                    ? 1
-                               : first >= 0xC2 && first < 0xE0 ? 2
-                               : first >= 0xE0 && first < 0xF0 ? 3
-                               : first >= 0xF0 && first < 0xF5 ? 4
-                                                               : 0;
-    for (std::size_t i = 1; i < length; ++i)
-        if ((byte(i) & 0xC0) != 0x80) return 0;
-    const bool is_overlong = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
-    const bool is_surrogate = first == 0xED && byte(1) >= 0xA0, is_beyond = first == 0xF4 && byte(1) >= 0x90;
-    return is_overlong || is_surrogate || is_beyond ? 0 : length;
+            "Cannot draw " + shown_size(width, height) + " pixels: " + cairo_status_to_string(status) + "."};
 }
 
 // Cairo takes nothing else, and draws nothing any more once it was given something else.
 std::string as_utf8(std::string_view text) {
     std::string clean;
     while (!text.empty()) {
-        const std::size_t length = character_length(text);
-        const bool is_printable =
-            length > 1 || (length == 1 && static_cast<unsigned char>(text[0]) >= 0x20 && text[0] != 0x7F);
-        clean += is_printable ? text.substr(0, length) : "?";
+        const std::size_t length = printable_bytes(text);
+        clean += length > 0 ? text.substr(0, length) : "?";
         text.remove_prefix(std::max<std::size_t>(length, 1));
     }
     return clean;
@@ -91,76 +61,56 @@ double advance_of(cairo_t* context, const std::string& text) {
     return std::max(extents.x_advance, extents.x_bearing + extents.width);
 }
 
-// At the origin of the context as it is turned.
-void show(cairo_t* context, const std::string& text, double height_px, Align align) {
-    choose_font(context, height_px);
-    cairo_font_extents_t extents;
-    cairo_font_extents(context, &extents);
-    const double width = advance_of(context, text);
-    const double left = align == Align::left ? 0 : align == Align::centre ? -width / 2 : -width;
-    cairo_move_to(context, left, extents.ascent);
-    cairo_show_text(context, text.c_str());
-}
-
 std::uint32_t code_of(float value) {
     return static_cast<std::uint32_t>(value > 0 ? std::min(value, 1.0f) * 255 + 0.5f : 0);
 } // 0 for NaN
 
 } // namespace
 
+std::size_t printable_bytes(std::string_view text) {
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    const unsigned char first = byte(0);
+    if (first < 0x80) return first >= 0x20 && first != 0x7f;
+    const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
+    if (first < 0xc2 || first > 0xf4 || text.size() < length) return 0;
+    char32_t code = first & (0xff >> (length + 1));
+    for (std::size_t i = 1; i < length; ++i) {
+        if ((byte(i) & 0xc0) != 0x80) return 0;
+        code = code << 6 | (byte(i) & 0x3f);
+    }
+    constexpr std::array<char32_t, 5> least = {0, 0, 0xa0, 0x800, 0x10000}; // by length, less the controls below 0xa0
+    const bool is_surrogate = code >= 0xd800 && code < 0xe000;
+    return code >= least[length] && code <= 0x10ffff && !is_surrogate ? length : 0;
+}
+
 void Drawing::End::operator()(cairo_t* context) const { cairo_destroy(context); }
 void Drawing::End::operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
 
-Result<void> Drawing::check_size(int width, int height) {
-    if (width >= 1 && height >= 1 && width <= largest_side && height <= largest_side) return {};
-    return Error{ErrorCode::invalid_argument, "Cannot draw " + shown_size(width, height) +
-                                                  " pixels: a picture with text has 1 to " +
-                                                  std::to_string(largest_side) + " a side."};
-}
-
-Result<Drawing> Drawing::on(std::unique_ptr<cairo_surface_t, End> surface, int width, int height) {
+Result<Drawing> Drawing::on_image(int width, int height, bool is_transparent) {
+    if (!(width >= 1 && height >= 1 && width <= largest_side && height <= largest_side))
+        return Error{ErrorCode::invalid_argument, "Cannot draw " + shown_size(width, height) +
+                                                      " pixels: a picture with text has 1 to " +
+                                                      std::to_string(largest_side) + " a side."};
     Drawing drawing;
     drawing.width_ = width;
     drawing.height_ = height;
-    drawing.surface_ = std::move(surface);
+    const auto format = is_transparent ? CAIRO_FORMAT_ARGB32 : CAIRO_FORMAT_RGB24;
+    drawing.surface_.reset(cairo_image_surface_create(format, width, height));
     drawing.context_.reset(cairo_create(drawing.surface_.get()));
     if (const auto status = cairo_status(drawing.context_.get()); status != CAIRO_STATUS_SUCCESS)
-        return failure(status, shown_size(width, height) + " pixels");
+        return failure(status, width, height);
     cairo_set_line_cap(drawing.context_.get(), CAIRO_LINE_CAP_ROUND);
     cairo_set_line_join(drawing.context_.get(), CAIRO_LINE_JOIN_ROUND);
     return drawing;
 }
 
-Result<Drawing> Drawing::create(int width, int height, glm::vec3 background, Kind kind) {
-    if (auto valid = check_size(width, height); !valid) return valid.error();
-    std::unique_ptr<std::string> svg;
-    std::unique_ptr<cairo_surface_t, End> surface;
-    if (kind == Kind::svg) {
-        svg = std::make_unique<std::string>();
-        surface.reset(cairo_svg_surface_create_for_stream(append, svg.get(), width, height));
-        cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
-    } else {
-        surface.reset(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
-    }
-    auto drawing = on(std::move(surface), width, height);
-    if (!drawing) return drawing;
-    drawing->svg_ = std::move(svg);
-    drawing->fill({0, 0}, {width, height}, background);
+Result<Drawing> Drawing::create(int width, int height, glm::vec3 background) {
+    auto drawing = on_image(width, height, false);
+    if (drawing) drawing->fill({0, 0}, {width, height}, background);
     return drawing;
 }
 
-Result<Drawing> Drawing::layer(int width, int height) {
-    if (auto valid = check_size(width, height); !valid) return valid.error();
-    return on(std::unique_ptr<cairo_surface_t, End>(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, width, height)),
-              width, height);
-}
-
-Result<Drawing> Drawing::for_file(const std::filesystem::path& file, int width, int height, glm::vec3 background) {
-    std::string ending = file.extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; });
-    return create(width, height, background, ending == ".svg" ? Kind::svg : Kind::image);
-}
+Result<Drawing> Drawing::layer(int width, int height) { return on_image(width, height, true); }
 
 void Drawing::fill(glm::dvec2 corner, glm::dvec2 size, glm::vec3 colour) {
     set_colour(context_.get(), colour);
@@ -198,20 +148,15 @@ void Drawing::line(glm::dvec2 from, glm::dvec2 to, glm::vec3 colour, double widt
 }
 
 void Drawing::text(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px, Align align) {
-    cairo_save(context_.get());
-    cairo_translate(context_.get(), at.x, at.y);
-    set_colour(context_.get(), colour);
-    show(context_.get(), as_utf8(text), height_px, align);
-    cairo_restore(context_.get());
-}
-
-void Drawing::text_upward(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px, Align align) {
-    cairo_save(context_.get());
-    cairo_translate(context_.get(), at.x, at.y);
-    cairo_rotate(context_.get(), -std::numbers::pi / 2);
-    set_colour(context_.get(), colour);
-    show(context_.get(), as_utf8(text), height_px, align);
-    cairo_restore(context_.get());
+    cairo_t* const context = context_.get();
+    const std::string clean = as_utf8(text);
+    set_colour(context, colour);
+    choose_font(context, height_px);
+    cairo_font_extents_t extents;
+    cairo_font_extents(context, &extents);
+    const double before = align == Align::left ? 0 : align == Align::centre ? 0.5 : 1; // of the width
+    cairo_move_to(context, at.x - before * advance_of(context, clean), at.y + extents.ascent);
+    cairo_show_text(context, clean.c_str());
 }
 
 void Drawing::picture(glm::dvec2 corner, const perception::Image& picture) {
@@ -245,34 +190,31 @@ void Drawing::clip(glm::dvec2 corner, glm::dvec2 size) {
 }
 void Drawing::end_clip() { cairo_restore(context_.get()); }
 
-Result<void> Drawing::check_pixels() const {
-    if (svg_) return Error{ErrorCode::invalid_argument, "A drawing in SVG has no pixels."};
+Result<std::vector<std::uint32_t>> Drawing::pixels() const {
     if (const auto status = cairo_status(context_.get()); status != CAIRO_STATUS_SUCCESS)
-        return failure(status, shown_size(width_, height_) + " pixels");
+        return failure(status, width_, height_);
     cairo_surface_flush(surface_.get());
-    return {};
+    const unsigned char* row = cairo_image_surface_get_data(surface_.get());
+    const int stride = cairo_image_surface_get_stride(surface_.get());
+    const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
+    std::vector<std::uint32_t> pixels(width * height);
+    for (std::size_t y = 0; y < height; ++y, row += stride) std::memcpy(&pixels[y * width], row, 4 * width);
+    return pixels;
 }
 
 Result<perception::Image> Drawing::image() const {
-    if (auto valid = check_pixels(); !valid) return valid.error();
-    const unsigned char* row = cairo_image_surface_get_data(surface_.get());
-    const int stride = cairo_image_surface_get_stride(surface_.get());
+    const auto drawn = pixels();
+    if (!drawn) return drawn.error();
     perception::Image image{width_, height_, 3, {}};
-    image.values.reserve(image.index(0, height_, 0));
-    for (int y = 0; y < height_; ++y, row += stride) {
-        for (int x = 0; x < width_; ++x) {
-            std::uint32_t pixel = 0;
-            std::memcpy(&pixel, row + sizeof pixel * static_cast<std::size_t>(x), sizeof pixel);
-            for (const int shift : {16, 8, 0}) image.values.push_back(static_cast<float>(pixel >> shift & 255) / 255);
-        }
-    }
+    image.values.reserve(3 * drawn->size());
+    for (const std::uint32_t pixel : *drawn)
+        for (const int shift : {16, 8, 0}) image.values.push_back(static_cast<float>(pixel >> shift & 255) / 255);
     return image;
 }
 
 Result<std::vector<glm::u8vec4>> Drawing::layer_pixels() const {
-    if (auto valid = check_pixels(); !valid) return valid.error();
-    const unsigned char* row = cairo_image_surface_get_data(surface_.get());
-    const int stride = cairo_image_surface_get_stride(surface_.get());
+    const auto drawn = pixels();
+    if (!drawn) return drawn.error();
     const bool is_opaque = cairo_image_surface_get_format(surface_.get()) == CAIRO_FORMAT_RGB24;
     // Cairo's codes are multiplied by alpha, and rounded.
     const auto straight = [&](std::uint32_t pixel) {
@@ -283,34 +225,15 @@ Result<std::vector<glm::u8vec4>> Drawing::layer_pixels() const {
         };
         return glm::u8vec4(code(16), code(8), code(0), alpha);
     };
-    std::vector<glm::u8vec4> pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-    auto out = pixels.begin();
+    std::vector<glm::u8vec4> codes;
+    codes.reserve(drawn->size());
     std::uint32_t last = 0; // most pixels are like the one before
     glm::u8vec4 last_straight = straight(last);
-    for (int y = 0; y < height_; ++y, row += stride) {
-        for (int x = 0; x < width_; ++x) {
-            std::uint32_t pixel = 0;
-            std::memcpy(&pixel, row + sizeof pixel * static_cast<std::size_t>(x), sizeof pixel);
-            if (pixel != last) last_straight = straight(last = pixel);
-            *out++ = last_straight;
-        }
+    for (const std::uint32_t pixel : *drawn) {
+        if (pixel != last) last_straight = straight(last = pixel);
+        codes.push_back(last_straight);
     }
-    return pixels;
-}
-
-Result<void> Drawing::write(const std::filesystem::path& file) {
-    if (!svg_) {
-        const auto drawn = image();
-        return drawn ? perception::write_image(file, *drawn) : drawn.error();
-    }
-    cairo_status_t status = cairo_status(context_.get());
-    cairo_surface_finish(surface_.get());
-    if (status == CAIRO_STATUS_SUCCESS) status = cairo_surface_status(surface_.get());
-    if (status != CAIRO_STATUS_SUCCESS) return failure(status, "'" + file.string() + "'");
-    auto out = vdtree::AtomicFile::create(file);
-    if (!out) return out.error();
-    if (auto written = out->write(*svg_); !written) return written;
-    return out->commit();
+    return codes;
 }
 
 double Drawing::text_width(std::string_view text, double height_px) {

@@ -1,7 +1,7 @@
-// Text, lines and pictures on one surface, by cairo: an image of pixels, or SVG.
+// Text, lines and pictures on one image, by cairo.
 #pragma once
 
-#include <filesystem>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,6 +20,9 @@ struct _cairo_surface;
 
 namespace unseen::app {
 
+// Bytes of the printable character in UTF-8 that the text begins with; 0: there is none.
+std::size_t printable_bytes(std::string_view text);
+
 // Where a line of text is held.
 enum class Align { left, centre, right };
 
@@ -27,14 +30,10 @@ enum class Align { left, centre, right };
 // the surface, those of pixels at half. What lies outside is clipped. Not for several threads at once.
 class Drawing {
 public:
-    enum class Kind { image, svg };
-
     // Fails where a side is not in 1..32767 pixels, and where there is not enough memory.
-    static Result<Drawing> create(int width, int height, glm::vec3 background, Kind kind = Kind::image);
+    static Result<Drawing> create(int width, int height, glm::vec3 background);
     // An image that is transparent where nothing is drawn, to be laid over others: see layer_pixels().
     static Result<Drawing> layer(int width, int height);
-    // Of the kind that the file's ending asks for: .svg, or else an image.
-    static Result<Drawing> for_file(const std::filesystem::path& file, int width, int height, glm::vec3 background);
 
     int width() const noexcept { return width_; }
     int height() const noexcept { return height_; }
@@ -48,9 +47,6 @@ public:
     // One line of UTF-8 (what is none comes out as question marks), `height_px` from the top of its letters to the
     // bottom. `at` is the top left corner of it, or the middle of its upper edge, or the top right corner.
     void text(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px, Align align = Align::left);
-    // The same turned by a quarter to the left, so that it reads upward: `at` is on its left edge.
-    void text_upward(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px,
-                     Align align = Align::left);
     // Copies an image of code values, grey or RGB.
     void picture(glm::dvec2 corner, const perception::Image& picture);
 
@@ -62,9 +58,6 @@ public:
     Result<perception::Image> image() const;
     // Codes, and how much of the pixel they cover, which is not multiplied in; row-major from the top left.
     Result<std::vector<glm::u8vec4>> layer_pixels() const;
-    // SVG, or an image of whatever kind the ending says. The file is replaced whole or not at all. Nothing may be drawn
-    // afterwards.
-    Result<void> write(const std::filesystem::path& file);
 
     // How wide text() comes out; where it is wider than `most`, the height at which it fits.
     static double text_width(std::string_view text, double height_px);
@@ -76,12 +69,11 @@ private:
         void operator()(_cairo_surface* surface) const;
     };
     Drawing() = default;
-    static Result<Drawing> on(std::unique_ptr<_cairo_surface, End> surface, int width, int height);
-    static Result<void> check_size(int width, int height);
-    Result<void> check_pixels() const;
+    static Result<Drawing> on_image(int width, int height, bool is_transparent);
+    // What cairo holds of each pixel, row by row from the top left.
+    Result<std::vector<std::uint32_t>> pixels() const;
 
     int width_ = 0, height_ = 0;
-    std::unique_ptr<std::string> svg_; // what the surface writes to; null of an image
     std::unique_ptr<_cairo_surface, End> surface_;
     std::unique_ptr<_cairo, End> context_;
 };

@@ -12,6 +12,7 @@
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/errors.h>
 
 #include "scene_draft.h"
 #include "scene_parts.h"
@@ -27,6 +28,13 @@ constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj";
 // Lux and such are of no account for the picture: white that faces the sun is at 1, less the ambient light.
 constexpr double sun_lux = 1;
 
+// Shape alone, a metre high.
+vdtree::Mesh bare(vdtree::Mesh mesh) {
+    vdtree::Mesh shape;
+    shape.positions = std::move(mesh.positions), shape.triangles = std::move(mesh.triangles);
+    return set_upright(std::move(shape));
+}
+
 // By a quadric hierarchy, as unobtrusively as so many triangles can be.
 Result<vdtree::Mesh> with_at_most(const vdtree::Mesh& mesh, std::uint64_t triangles) {
     if (mesh.triangles.size() <= triangles) return mesh;
@@ -39,10 +47,7 @@ Result<vdtree::Mesh> with_at_most(const vdtree::Mesh& mesh, std::uint64_t triang
             for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = sizes[nodes[i]];
         },
         {.visibility = {}, .triangle_budget = static_cast<vdtree::Index>(triangles)});
-    vdtree::Mesh less = set_upright(vdtree::extract_mesh(cut));
-    less.colours.clear(), less.uvs.clear(), less.ranges.clear(), less.document.clear();
-    less.texture = {};
-    return less;
+    return bare(vdtree::extract_mesh(cut));
 }
 
 class Maker {
@@ -52,20 +57,24 @@ public:
     std::vector<std::string> left_out() && { return std::move(left_out_); }
     Result<SceneDraft> run() {
         if (const auto read = read_statues(); !read) return read.error();
-        const auto made = options_.kind == SceneKind::museum     ? museum()
-                          : options_.kind == SceneKind::treasure ? treasure()
-                          : options_.kind == SceneKind::house    ? house()
-                          : options_.kind == SceneKind::forest   ? forest()
-                          : options_.kind == SceneKind::building ? building()
-                          : options_.kind == SceneKind::spheres  ? spheres()
-                          : options_.kind == SceneKind::bunnies  ? bunnies()
-                                                                 : models();
+        Result<void> made;
+        switch (options_.kind) {
+        case SceneKind::museum: made = museum(); break;
+        case SceneKind::treasure: made = treasure(); break;
+        case SceneKind::house: made = house(); break;
+        case SceneKind::forest: made = forest(); break;
+        case SceneKind::building: made = building(); break;
+        case SceneKind::spheres: made = spheres(); break;
+        case SceneKind::bunnies: made = bunnies(); break;
+        case SceneKind::models: made = models(); break;
+        }
         if (!made) return made.error();
         return std::move(draft_);
     }
 
 private:
     std::uint64_t triangles(std::uint64_t usual) const { return options_.triangles > 0 ? options_.triangles : usual; }
+    static std::uint64_t at_least(std::uint64_t least, std::uint64_t triangles) { return std::max(least, triangles); }
 
     Result<void> read_statues() {
         std::vector<fs::path> files = options_.statues;
@@ -74,10 +83,7 @@ private:
         for (const fs::path& file : files) {
             auto read = meshio::read_mesh(file);
             if (!read) return read.error();
-            vdtree::Mesh mesh = set_upright(std::move(read->mesh));
-            mesh.colours.clear(), mesh.uvs.clear(), mesh.ranges.clear(), mesh.document.clear();
-            mesh.texture = {};
-            scanned_.push_back({file.stem().string(), std::move(mesh)});
+            scanned_.push_back({file.stem().string(), bare(std::move(read->mesh))});
         }
         return {};
     }
@@ -96,16 +102,11 @@ private:
                                         "; simplify it, or give more --triangles.");
                 continue;
             }
-            SubdivideOptions refining;
-            refining.triangles = triangles;
-            refining.seed = options_.seed;
-            auto mesh = subdivide(scanned.mesh, refining);
+            auto mesh = subdivide(scanned.mesh, {.triangles = triangles, .seed = options_.seed});
             if (!mesh) return mesh.error();
             made.push_back(draft_.add_mesh(scanned.name, std::move(*mesh), 0.7));
         }
-        if (made.size() < most) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
-        if (made.size() < most) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
-        return made;
+        return completed(std::move(made), triangles, most);
     }
 
     // As they are where they have no more than so many triangles, else simplified to that; and as many made ones as are
@@ -118,8 +119,13 @@ private:
             if (!mesh) return mesh.error();
             made.push_back(draft_.add_mesh(scanned.name, std::move(*mesh), 0.7));
         }
-        if (made.size() < count) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
-        if (made.size() < count) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
+        return completed(std::move(made), triangles, count);
+    }
+
+    // With made ones as long as there is room.
+    std::vector<std::size_t> completed(std::vector<std::size_t> made, std::uint64_t triangles, std::size_t most) {
+        if (made.size() < most) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
+        if (made.size() < most) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
         return made;
     }
 
@@ -223,9 +229,9 @@ private:
     Result<void> treasure() {
         constexpr int rows = 12, strewn = 160;
         const std::uint64_t all = triangles(2'000'000);
-        const auto figures = statues(std::max<std::uint64_t>(all * 7 / 10 / (2 * rows), 200));
+        const auto figures = statues(at_least(200, all * 7 / 10 / (2 * rows)));
         if (!figures) return figures.error();
-        const std::uint64_t each = std::max<std::uint64_t>(all * 3 / 10 / strewn, 100);
+        const std::uint64_t each = at_least(100, all * 3 / 10 / strewn);
         const std::array<std::size_t, 2> small = {draft_.add_mesh("goblet", urn(each), 0.7),
                                                   draft_.add_mesh("ring", ring(each), 0.75)};
         const std::size_t plinth = draft_.add_mesh("plinth", box({0.9, 0.6, 0.9}, 0.15), 0.45);
@@ -263,12 +269,10 @@ private:
     Result<void> house() {
         constexpr int columns = 8, niches = 5, bars_of_balcony = 60, trees = 6;
         const std::uint64_t all = triangles(1'500'000);
-        const auto figures = statues(std::max<std::uint64_t>(all * 4 / 10 / niches, 200));
+        const auto figures = statues(at_least(200, all * 4 / 10 / niches));
         if (!figures) return figures.error();
-        const std::size_t pillar =
-            draft_.add_mesh("column", column(std::max<std::uint64_t>(all * 3 / 10 / columns, 200)), 0.7);
-        const std::size_t baluster =
-            draft_.add_mesh("baluster", urn(std::max<std::uint64_t>(all / 10 / bars_of_balcony, 100)), 0.7);
+        const std::size_t pillar = draft_.add_mesh("column", column(at_least(200, all * 3 / 10 / columns)), 0.7);
+        const std::size_t baluster = draft_.add_mesh("baluster", urn(at_least(100, all / 10 / bars_of_balcony)), 0.7);
         for (int i = 0; i < columns; ++i)
             draft_.add(pillar, "column " + std::to_string(i), {.at = {2.0 * i - 7, 0.3, 1}, .scale = glm::dvec3(4)});
         for (int i = 0; i < niches; ++i)
@@ -286,9 +290,8 @@ private:
         draft_.add(draft_.add_mesh("ground", ground(60, 60, 0.0, options_.seed), 0.35), "ground", {.at = {0, 0, 0}},
                    true);
         const std::array<std::size_t, 2> green = {
-            draft_.add_mesh("tree 0", tree(std::max<std::uint64_t>(all * 2 / 10 / trees, 300), options_.seed), 0.4),
-            draft_.add_mesh("tree 1", tree(std::max<std::uint64_t>(all * 2 / 10 / trees, 300), options_.seed + 1),
-                            0.35)};
+            draft_.add_mesh("tree 0", tree(at_least(300, all * 2 / 10 / trees), options_.seed), 0.4),
+            draft_.add_mesh("tree 1", tree(at_least(300, all * 2 / 10 / trees), options_.seed + 1), 0.35)};
         for (int i = 0; i < trees; ++i)
             draft_.add(green[static_cast<std::size_t>(i % 2)], "tree " + std::to_string(i),
                        {.at = {3.6 * i - 9 + chance_.next(-0.6, 0.6), 0, 6 + chance_.next(-1, 2)},
@@ -305,14 +308,13 @@ private:
         constexpr int things = 1000, figures_every = 25, kinds_of_trees = 5;
         constexpr int figure_count = things / figures_every;
         const std::uint64_t all = triangles(2'000'000);
-        const auto figures = statues(std::max<std::uint64_t>(all / 5 / figure_count, 200));
+        const auto figures = statues(at_least(200, all / 5 / figure_count));
         if (!figures) return figures.error();
         std::vector<std::size_t> trees;
         for (int i = 0; i < kinds_of_trees; ++i)
             trees.push_back(draft_.add_mesh(
                 "tree " + std::to_string(i),
-                tree(std::max<std::uint64_t>(all * 4 / 5 / (things - figure_count), 300), options_.seed + 10 + i),
-                0.3 + 0.04 * i));
+                tree(at_least(300, all * 4 / 5 / (things - figure_count)), options_.seed + 10 + i), 0.3 + 0.04 * i));
         // A grid with each thing somewhere in its cell, so that nothing stands in another.
         constexpr int cells = 32;
         constexpr double cell_m = 3.5;
@@ -346,7 +348,7 @@ private:
     Result<void> building() {
         constexpr int rows = 5, columns = 10, things = 8;
         constexpr double side = 5, thick = 0.2, high = 3, door = 1, door_high = 2.1, pier = (side - door) / 2;
-        const std::uint64_t each = std::max<std::uint64_t>(triangles(5'000'000) / (rows * columns * things), 200);
+        const std::uint64_t each = at_least(200, triangles(5'000'000) / (rows * columns * things));
         auto kinds = statues(each);
         if (!kinds) return kinds.error();
         kinds->push_back(draft_.add_mesh("sphere", sphere(each), 0.6));
@@ -409,22 +411,17 @@ private:
     std::vector<std::string> left_out_;
 };
 
-Result<void> check(const MakeSceneOptions& options) {
-    const auto invalid = [](const std::string& what) { return Error{ErrorCode::invalid_argument, what}; };
-    if (options.triangles != 0 &&
-        (options.triangles < MakeSceneOptions::least_triangles || options.triangles > MakeSceneOptions::most_triangles))
-        return invalid("A scene has from " + std::to_string(MakeSceneOptions::least_triangles) + " to " +
-                       std::to_string(MakeSceneOptions::most_triangles) + " triangles, not " +
-                       std::to_string(options.triangles) + ".");
-    if (!(options.bars_per_metre >= 1 && options.bars_per_metre <= 100))
-        return invalid("A metre has from 1 to 100 bars.");
-    return {};
-}
-
 } // namespace
 
 Result<MadeScene> make_scene(const fs::path& file, const MakeSceneOptions& options) {
-    if (const auto valid = check(options); !valid) return valid.error();
+    using Options = MakeSceneOptions;
+    if (options.triangles != 0 &&
+        (options.triangles < Options::least_triangles || options.triangles > Options::most_triangles))
+        return invalid_argument("A scene has from " + std::to_string(Options::least_triangles) + " to " +
+                                std::to_string(Options::most_triangles) + " triangles, not " +
+                                std::to_string(options.triangles) + ".");
+    if (!(options.bars_per_metre >= 1 && options.bars_per_metre <= 100))
+        return invalid_argument("A metre has from 1 to 100 bars.");
     Maker maker(options);
     const auto draft = maker.run();
     if (!draft) return draft.error();

@@ -139,10 +139,11 @@ void draw(const PanelPlot& plot, Drawing& drawing) {
 }
 
 Result<void> write_plot(const std::filesystem::path& file, const PanelPlot& plot) {
-    auto drawing = Drawing::for_file(file, plot.width, height_of(plot), plot_paper);
+    auto drawing = Drawing::create(plot.width, height_of(plot), plot_paper);
     if (!drawing) return drawing.error();
     draw(plot, *drawing);
-    return drawing->write(file);
+    const auto image = drawing->image();
+    return image ? perception::write_image(file, *image) : image.error();
 }
 
 } // namespace unseen::app

@@ -32,7 +32,6 @@ void draw(const PanelPlot& plot, Drawing& drawing);
 
 int height_of(const PanelPlot& plot); // pixels
 
-// As .svg or .png, by the file's ending.
 Result<void> write_plot(const std::filesystem::path& file, const PanelPlot& plot);
 
 } // namespace unseen::app

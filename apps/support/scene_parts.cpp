@@ -17,9 +17,9 @@ using vdtree::Mesh;
 
 constexpr int least_segments = 6;
 
-// A grid of (rows + 1) x columns vertices, closed around: rows of quads between.
-void add_tube_faces(Mesh& mesh, Index first, int rows, int columns) {
-    const auto at = [&](int r, int c) { return first + static_cast<Index>(r * columns + c % columns); };
+// Two triangles for each of rows x columns cells; `at` is the vertex in a row and a column.
+template <class At>
+void add_cells(Mesh& mesh, int rows, int columns, const At& at) {
     for (int r = 0; r < rows; ++r) {
         for (int c = 0; c < columns; ++c) {
             mesh.triangles.push_back({at(r, c), at(r + 1, c), at(r, c + 1)});
@@ -43,7 +43,7 @@ void add_branch(Mesh& mesh, glm::dvec3 from, glm::dvec3 to, double thick, double
                                      radius * (std::cos(angle) * across - std::sin(angle) * third));
         }
     }
-    add_tube_faces(mesh, first, rows, sides);
+    add_cells(mesh, rows, sides, [&](int r, int c) { return first + static_cast<Index>(r * sides + c % sides); });
 }
 
 // Four triangles, folded along the midrib, pointing along `direction`.
@@ -103,13 +103,7 @@ Mesh tube(int rows, int sides, Curve curve, Radius radius) {
             mesh.positions.push_back(centre + radius(t, angle) * (std::cos(angle) * across + std::sin(angle) * third));
         }
     }
-    const auto at = [&](int r, int c) { return static_cast<Index>((r % rows) * sides + c % sides); };
-    for (int r = 0; r < rows; ++r) {
-        for (int c = 0; c < sides; ++c) {
-            mesh.triangles.push_back({at(r, c), at(r + 1, c), at(r, c + 1)});
-            mesh.triangles.push_back({at(r, c + 1), at(r + 1, c), at(r + 1, c + 1)});
-        }
-    }
+    add_cells(mesh, rows, sides, [&](int r, int c) { return static_cast<Index>((r % rows) * sides + c % sides); });
     return mesh;
 }
 
@@ -181,9 +175,24 @@ vdtree::Mesh ground(double side, int cells, double height, std::uint64_t seed) {
                                         z);
         }
     }
-    const auto at = [&](int i, int j) { return static_cast<Index>(j * (cells + 1) + i); };
-    for (int j = 0; j < cells; ++j) {
-        for (int i = 0; i < cells; ++i) {
+    add_cells(mesh, cells, cells, [&](int j, int i) { return static_cast<Index>(j * (cells + 1) + i); });
+    return mesh;
+}
+
+vdtree::Mesh bumpy_sphere(int rows) {
+    Mesh mesh;
+    const int columns = 2 * rows;
+    for (int i = 0; i <= rows; ++i) {
+        for (int j = 0; j < columns; ++j) {
+            const double theta = pi * i / rows, phi = 2 * pi * j / columns;
+            const double r = 1 + 0.02 * std::sin(20 * theta) * std::cos(14 * phi);
+            mesh.positions.push_back(
+                r * glm::dvec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
+        }
+    }
+    const auto at = [&](int i, int j) { return static_cast<Index>(i * columns + j % columns); };
+    for (int i = 0; i < rows; ++i) { // seen from outside, the other way round than in tubes
+        for (int j = 0; j < columns; ++j) {
             mesh.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j)});
             mesh.triangles.push_back({at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)});
         }

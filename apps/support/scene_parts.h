@@ -31,6 +31,9 @@ vdtree::Mesh ground(double side, int cells, double height, std::uint64_t seed);
 vdtree::Mesh lathe(const std::vector<glm::dvec2>& profile, int segments, int flutes = 0, double depth = 0);
 vdtree::Mesh bar(double height, double radius, int segments);
 
+// A closed sphere with bumps around the origin, radius about 1: 4 * rows * rows triangles (at the poles without area).
+vdtree::Mesh bumpy_sphere(int rows);
+
 // Of about so many triangles each, closed, a metre high.
 vdtree::Mesh urn(std::uint64_t triangles);
 vdtree::Mesh sphere(std::uint64_t triangles);

@@ -234,15 +234,19 @@ private:
         for (const Index e : edge_of_corner) count += midpoints[e] != not_split ? 1 : 0;
         std::vector<Triangle> parts;
         parts.reserve(count);
-        RangeMover ranges(mesh_.ranges);
+        std::vector<std::uint64_t> first_part; // by triangle, and their end; where ranges have to follow
         for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-            ranges.pass(t, parts.size());
+            if (!mesh_.ranges.empty()) first_part.push_back(parts.size());
             std::array<Index, 3> middles;
             for (std::size_t i = 0; i < 3; ++i) middles[i] = midpoints[edge_of_corner[3 * t + i]];
             append_parts(mesh_.triangles[t], middles, parts);
         }
-        ranges.pass(mesh_.triangles.size(), parts.size());
-        ranges.finish();
+        first_part.push_back(parts.size());
+        for (vdtree::MeshRange& range : mesh_.ranges) {
+            const std::uint64_t end = first_part[range.first_triangle + range.triangle_count];
+            range.first_triangle = first_part[range.first_triangle];
+            range.triangle_count = end - range.first_triangle;
+        }
         mesh_.triangles = std::move(parts);
     }
 
@@ -279,40 +283,6 @@ private:
                          {Triangle{a, ab, ca}, Triangle{ab, b, bc}, Triangle{ca, bc, c}, Triangle{ab, bc, ca}});
         }
     }
-
-    // Moves the ranges' begins and ends to where their triangles go; told of them in ascending order.
-    class RangeMover {
-    public:
-        explicit RangeMover(std::vector<vdtree::MeshRange>& ranges) : ranges_(ranges), moved_(ranges.size()) {
-            for (std::size_t i = 0; i < ranges.size(); ++i) {
-                marks_.push_back({ranges[i].first_triangle, i, false});
-                marks_.push_back({ranges[i].first_triangle + ranges[i].triangle_count, i, true});
-            }
-            std::sort(marks_.begin(), marks_.end(),
-                      [](const Mark& a, const Mark& b) { return a.triangle < b.triangle; });
-        }
-        void pass(std::uint64_t from, std::uint64_t to) {
-            for (; next_ < marks_.size() && marks_[next_].triangle == from; ++next_)
-                moved_[marks_[next_].range][marks_[next_].is_end ? 1 : 0] = to;
-        }
-        void finish() {
-            for (std::size_t i = 0; i < ranges_.size(); ++i) {
-                ranges_[i].first_triangle = moved_[i][0];
-                ranges_[i].triangle_count = moved_[i][1] - moved_[i][0];
-            }
-        }
-
-    private:
-        struct Mark {
-            std::uint64_t triangle = 0;
-            std::size_t range = 0;
-            bool is_end = false;
-        };
-        std::vector<vdtree::MeshRange>& ranges_;
-        std::vector<std::array<std::uint64_t, 2>> moved_;
-        std::vector<Mark> marks_;
-        std::size_t next_ = 0;
-    };
 
     Mesh mesh_;
     const SubdivideOptions& options_;

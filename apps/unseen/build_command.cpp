@@ -17,7 +17,6 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "build_team.h"
-#include "load_model.h"
 #include "option_names.h"
 #include "options.h"
 #include "other_libraries.h"
@@ -25,6 +24,7 @@
 #include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -170,7 +170,7 @@ Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&&
     if (!perception::knows_texture(tree)) {
         print_note(a.mesh +
                    " has a texture over vertices of several hues, and what folds change of it is not measured: "
-                   "the fold test is then luebke-hallen-safe (--no-texture leaves the texture out).");
+                   "the fold test is then luebke-hallen-safe (--texture none leaves it out).");
         return std::move(tree);
     }
     ProgressBar bar("measuring what folds change");
@@ -182,7 +182,7 @@ Result<vdtree::VertexTree> measure_under_lights(const BuildArguments& a, const v
         return Error{ErrorCode::unsupported,
                      a.mesh +
                          " has a texture over vertices of several hues, and what folds change of it under lights is "
-                         "not measured: leave out --lit-fold-errors, or add --no-texture."};
+                         "not measured: leave out --lit-fold-errors, or add --texture none."};
     ProgressBar bar("measuring what folds change under lights");
     return session::measured_under_lights(tree, a.threads, std::ref(bar));
 }

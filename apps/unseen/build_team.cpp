@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -37,24 +38,20 @@ struct Statement {
 };
 
 std::vector<std::byte> to_bytes(const Statement& s) {
-    std::vector<std::byte> bytes(sizeof(s.fingerprint) + sizeof(s.code) + s.complaint.size());
-    std::memcpy(bytes.data(), &s.fingerprint, sizeof(s.fingerprint));
-    std::memcpy(bytes.data() + sizeof(s.fingerprint), &s.code, sizeof(s.code));
-    if (!s.complaint.empty())
-        std::memcpy(bytes.data() + sizeof(s.fingerprint) + sizeof(s.code), s.complaint.data(), s.complaint.size());
-    return bytes;
+    const std::string text =
+        std::to_string(s.fingerprint) + " " + std::to_string(static_cast<int>(s.code)) + " " + s.complaint;
+    const auto bytes = std::as_bytes(std::span(text));
+    return {bytes.begin(), bytes.end()};
 }
 
 Statement to_statement(std::span<const std::byte> bytes) {
+    std::istringstream text(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
     Statement s;
-    if (bytes.size() < sizeof(s.fingerprint) + sizeof(s.code)) {
-        s.complaint = "A process of the team is another program.";
-        return s;
-    }
-    std::memcpy(&s.fingerprint, bytes.data(), sizeof(s.fingerprint));
-    std::memcpy(&s.code, bytes.data() + sizeof(s.fingerprint), sizeof(s.code));
-    const auto text = bytes.subspan(sizeof(s.fingerprint) + sizeof(s.code));
-    s.complaint.assign(reinterpret_cast<const char*>(text.data()), text.size());
+    int code = 0;
+    if (!(text >> s.fingerprint >> code)) return {.complaint = "A process of the team is another program."};
+    s.code = static_cast<ErrorCode>(code);
+    text.get(); // the blank
+    std::getline(text, s.complaint, '\0');
     return s;
 }
 

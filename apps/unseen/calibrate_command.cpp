@@ -37,7 +37,7 @@ struct CalibrateArguments {
     DisplayOptions& display;
     std::string out = {}, json = {}, simulate = {}, state = {}, photometer = {}, observer = {}, conditions = {},
                 date = {};
-    bool chart = false, gamma = false;
+    bool gamma = false;
     // The plan. Defaults are CalibrationPlan's, or those of the calibration that is resumed.
     std::optional<Method> method = {};
     std::optional<double> seed = {}, trials = {}, settings = {}, luminance = {};
@@ -384,23 +384,16 @@ Result<int> run(CalibrateArguments& a) {
     if (!display) return display.error();
     if (!a.photometer.empty()) return calibrate_by_photometer(a, *display);
     if (a.gamma) return calibrate_gamma(a, *display);
-    if (a.chart) {
-        a.window.display = *display;
-        if (auto shown = show_chart(a.window, a.out); !shown) return shown.error();
-        return exit_done;
-    }
     return calibrate_observer(a, *display);
 }
 
 void check(const CalibrateArguments& a) {
-    const int modes = a.chart + a.gamma + !a.photometer.empty() + !a.simulate.empty();
-    if (modes > 1) refuse("--simulate, --gamma, --photometer and --chart exclude each other: give one of them.");
-    const std::string ending = a.chart ? ".png" : ".json";
-    if (!a.out.empty() && !has_ending(a.out, ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
+    const int modes = a.gamma + !a.photometer.empty() + !a.simulate.empty();
+    if (modes > 1) refuse("--simulate, --gamma and --photometer exclude each other: give one of them.");
     if (a.frequencies.empty() != a.eccentricities.empty())
         refuse("--frequencies and --eccentricities belong together: give both.");
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
-    const bool is_of_display = a.chart || a.gamma || !a.photometer.empty();
+    const bool is_of_display = a.gamma || !a.photometer.empty();
     if (is_of_display && !a.json.empty()) refuse("--json reports observers: leave it out.");
     const bool has_plan =
         a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty() || a.wide;
@@ -449,7 +442,6 @@ void add_display_measures(CLI::App& verb, CalibrateArguments& a) {
     verb.add_flag("--gamma", a.gamma, "Measure the display's gamma by matching patches");
     verb.add_option("--photometer", a.photometer, "Take the display's luminances from a table, header code,cdm2")
         ->type_name("FILE.csv");
-    verb.add_flag("--chart", a.chart, "Campbell and Robson's chart, in a window or with -o as a picture");
     verb.add_flag("--full-screen", a.window.full_screen, "Not in a window");
     verb.add_option("--interval", a.window.interval_s,
                     "Seconds of a grating, and of the pause between two (default: 0.5)")
@@ -469,9 +461,9 @@ Command calibrate_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<CalibrateArguments>(CalibrateArguments{setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
-    verb->add_option("-o,--output", a->out,
-                     "The observer's profile; with --gamma or --photometer the display's; with --chart a picture")
-        ->type_name("OUT.json|.png");
+    verb->add_option("-o,--output", a->out, "The observer's profile; with --gamma or --photometer the display's")
+        ->type_name("OUT.json")
+        ->check(ending_in({".json"}));
     add_plan_options(*verb, *a);
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
@@ -485,7 +477,7 @@ Command calibrate_command(CLI::App& app, Setup& setup) {
         "\nExamples:\n  unseen calibrate --display mine.json --observer anna --resume anna-state.json -o anna.json\n"
         "  unseen calibrate --simulate castle:gain=0.7 --seed 3 -o observer.json\n"
         "  unseen calibrate --gamma --display mine.json -o mine-measured.json\n"
-        "  unseen calibrate --chart -o chart.png\n  unseen render bunny.vdt --csf anna.json -o bunny.png");
+        "  unseen render bunny.vdt --csf anna.json -o bunny.png");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -80,15 +80,9 @@ public:
     Result<void> save_screenshot() {
         int width = 0, height = 0;
         glfwGetFramebufferSize(window(), &width, &height);
-        return write_picture(drawer_, last_, width, height, options_.screenshot);
-    }
-
-    // Codes as grey pixels.
-    static Result<void> write_picture(render::TestPatternDrawer& drawer, const TestPattern& pattern, int width,
-                                      int height, const std::string& file) {
-        auto codes = drawer.draw(pattern, width, height);
+        auto codes = drawer_.draw(last_, width, height); // grey pixels
         if (!codes) return codes.error();
-        return perception::write_image(file, {width, height, 1, std::move(*codes)});
+        return perception::write_image(options_.screenshot, {width, height, 1, std::move(*codes)});
     }
 
     // Where the fixation cross goes, tangent to the right of the screen's centre; dots beneath it count the interval.
@@ -224,19 +218,6 @@ private:
     TestPattern pattern_;
 };
 
-TestPattern chart_of(const perception::Display& display) {
-    TestPattern chart;
-    chart.kind = TestPattern::Kind::chart;
-    chart.tangent_per_pixel = display.pixel_pitch / display.distance;
-    const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
-    chart.mean = (black + white) / 2;
-    const double nyquist = perception::pixels_per_degree(display).value() / 2; // of the picture
-    chart.frequency_cpd = std::min(0.3, nyquist / 8);
-    chart.highest_frequency_cpd = nyquist;
-    chart.decades = 3;
-    return chart;
-}
-
 } // namespace
 
 Result<void> run_calibration_window(Procedure& procedure, const CalibrationWindowOptions& options,
@@ -284,22 +265,6 @@ Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions& opti
     if (!options.screenshot.empty())
         if (auto saved = (*stage)->save_screenshot(); !saved) return saved.error();
     return matches;
-}
-
-Result<void> show_chart(const CalibrationWindowOptions& options, const std::string& file) {
-    const TestPattern chart = chart_of(options.display);
-    if (!file.empty()) {
-        auto context = render::Context::headless();
-        if (!context) return context.error();
-        auto drawer = render::TestPatternDrawer::create(*context, calibration::code_luminances(options.display));
-        if (!drawer) return drawer.error();
-        return Stage::write_picture(*drawer, chart, options.display.width_px, options.display.height_px, file);
-    }
-    auto stage = Stage::open(options, "Unseen - Campbell and Robson's chart");
-    if (!stage) return stage.error();
-    while (!(*stage)->is_closed() && (*stage)->take_key() == 0)
-        if (auto shown = (*stage)->show(chart); !shown) return shown;
-    return options.screenshot.empty() ? Result<void>() : (*stage)->save_screenshot();
 }
 
 } // namespace unseen::app

@@ -41,8 +41,4 @@ struct GammaMatch {
 };
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions& options);
 
-// Campbell and Robson's chart: frequency grows to the right, contrast to the bottom. In a window until a key is
-// pressed, or as a picture where `file` is given, dithered to the display's codes.
-Result<void> show_chart(const CalibrationWindowOptions& options, const std::string& file);
-
 } // namespace unseen::app

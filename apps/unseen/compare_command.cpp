@@ -1,7 +1,6 @@
 // unseen compare: where a picture differs visibly from a reference.
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -9,13 +8,13 @@
 #include <unseen/perception/image.h>
 #include <unseen/perception/judge.h>
 
-#include "gpu_comparison.h"
+#include "colour_bar.h"
+#include "on_gpu.h"
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
-#include "visibility_map.h"
 
 namespace unseen::app {
 namespace {
@@ -24,15 +23,14 @@ using perception::Image;
 using perception::ImageFile;
 using perception::Judgement;
 
-constexpr const char* perceptualdiff = "perceptualdiff";
 constexpr const char* gpu = "gpu";
 
 enum class Model { modern, second, rpg99 };
 
 struct CompareArguments {
     DisplayOptions& display;
-    std::string reference = {}, test = {}, map = {}, threshold_map = {}, json = {}, profile = {};
-    std::string model_name = "modern", device = "cpu";
+    std::string reference = {}, test = {}, map = {}, json = {};
+    std::string device = "cpu";
     Model model = Model::modern;
     std::optional<glm::dvec2> gaze_px = {};
     std::optional<double> field_degrees = {};
@@ -59,13 +57,6 @@ Result<Pair> read_pair(const CompareArguments& a) {
     }
     return Pair{std::move(*reference), std::move(*test)};
 }
-
-// Judges and, where it is wanted, maps.
-struct Verdict {
-    Judgement judgement;
-    std::optional<Image> threshold_map;
-    std::string gpu; // which judged; empty: the CPU
-};
 
 Result<session::ObserverChoice> chosen_observer(const CompareArguments& a) {
     return a.display.observer.empty() ? session::ObserverChoice() : session::choose_observer(a.display.observer);
@@ -105,44 +96,19 @@ Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, cons
     const Image test = perception::to_luminance(pair.test, display);
     const auto options = judge_options(a, display);
     if (!options) return options.error();
-    if (a.device == gpu) {
-        auto compared = compare_on_gpu(reference, test, *options, !a.threshold_map.empty());
-        if (!compared) return compared.error();
-        return Verdict{std::move(compared->judgement), std::move(compared->threshold_map), compared->renderer};
-    }
+    if (a.device == gpu) return compare_on_gpu(reference, test, *options);
     auto judgement = perception::judge_modern(reference, test, *options);
     if (!judgement) return judgement.error();
-    Verdict verdict{std::move(*judgement), {}, {}};
-    if (!a.threshold_map.empty()) {
-        auto map = perception::threshold_map_modern(reference, *options);
-        if (!map) return map.error();
-        verdict.threshold_map = std::move(*map);
-    }
-    return verdict;
+    return Verdict{std::move(*judgement), {}};
 }
 
 Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
-    const bool as_the_program = a.profile == perceptualdiff;
-    if (as_the_program && !pair.has_codes())
-        return Error{ErrorCode::invalid_argument,
-                     "--profile perceptualdiff is for PNG: PFM and EXR hold cd/m2, which that program does not know."};
-    const auto luminance = [&](const ImageFile& file) {
-        return as_the_program ? perception::perceptualdiff_luminance(file.image, display.peak.value())
-                              : perception::to_luminance(file, display);
-    };
-    const Image reference = luminance(pair.reference), test = luminance(pair.test);
+    const Image reference = perception::to_luminance(pair.reference, display);
     perception::Rpg99Options options;
     options.field_degrees = a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
-    options.masked_by_both = as_the_program;
-    auto judgement = perception::judge_rpg99(reference, test, options);
+    auto judgement = perception::judge_rpg99(reference, perception::to_luminance(pair.test, display), options);
     if (!judgement) return judgement.error();
-    Verdict verdict{std::move(*judgement), {}, {}};
-    if (!a.threshold_map.empty()) {
-        auto map = perception::rpg99_map(reference, test, options);
-        if (!map) return map.error();
-        verdict.threshold_map = std::move(map->threshold);
-    }
-    return verdict;
+    return Verdict{std::move(*judgement), {}};
 }
 
 // In any channel, however little.
@@ -171,19 +137,6 @@ double ssim_of(const Pair& pair) {
     return ssim ? *ssim : std::numeric_limits<double>::quiet_NaN();
 }
 
-Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
-    if (!a.map.empty()) {
-        const auto map = with_colour_bar(visibility_map(verdict.judgement.visibility), visibility_bar());
-        if (!map) return map.error();
-        if (auto ok = perception::write_image(a.map, *map); !ok) return ok;
-    }
-    if (!verdict.threshold_map) return {};
-    auto ok = perception::write_image(a.threshold_map, *verdict.threshold_map);
-    std::error_code ignored;
-    if (!ok && !a.map.empty()) std::filesystem::remove(a.map, ignored); // a failed run leaves nothing behind
-    return ok;
-}
-
 std::string observer_of(const CompareArguments& a) {
     const std::string& csf = a.display.csf;
     if (!csf.empty() && !perception::csf_model(csf)) return csf; // a viewer's file
@@ -197,8 +150,9 @@ std::string observer_of(const CompareArguments& a) {
 
 // Whose verdict it is, and under which conditions.
 std::string judged_by(const CompareArguments& a, const Verdict& verdict, const perception::Display& display) {
-    if (a.model == Model::rpg99) return "by the judge rpg99" + (a.profile.empty() ? "" : ", like " + a.profile);
-    std::string text = "by the judge " + a.model_name + " and the observer " + observer_of(a);
+    if (a.model == Model::rpg99) return "by the judge rpg99";
+    std::string text = "by the judge " + std::string(a.model == Model::second ? "second" : "modern") +
+                       " and the observer " + observer_of(a);
     text += ", seen from " + rounded(display.distance.value(), 3) + " m, ";
     text += a.gaze_px ? "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y)
                       : std::string("wherever they look");
@@ -215,9 +169,7 @@ void print(const Judgement& judgement, std::uint64_t different, double ssim) {
 }
 
 Result<int> run(const CompareArguments& a) {
-    if (const auto ready =
-            check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.threshold_map, a.json});
-        !ready)
+    if (const auto ready = check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.json}); !ready)
         return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
@@ -239,24 +191,18 @@ Result<int> run(const CompareArguments& a) {
                        {"ssim", number_or_null(ssim)},
                        {"device", a.device}};
     if (auto ok = report->prepare(json); !ok) return ok.error();
-    if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
+    if (!a.map.empty()) {
+        const auto map = with_colour_bar(visibility_map(judgement.visibility), visibility_bar());
+        if (!map) return map.error();
+        if (auto ok = perception::write_image(a.map, *map); !ok) return ok.error();
+    }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) {
         print(judgement, different, ssim);
         print_line(judged_by(a, *verdict, *display));
-        print_written({a.map, a.threshold_map, a.json});
+        print_written({a.map, a.json});
     }
     return a.fail_above && judgement.visible_pixels > *a.fail_above ? exit_failed : exit_done;
-}
-
-void check(CompareArguments& a) {
-    // The profile's name works in place of a display's file, too.
-    if (a.display.file == perceptualdiff) {
-        a.display.file.clear();
-        a.profile = perceptualdiff;
-    }
-    a.model = a.model_name == "rpg99" ? Model::rpg99 : a.model_name == "second" ? Model::second : Model::modern;
-    if (a.model != Model::rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
 }
 
 std::vector<Rule> compare_rules() {
@@ -277,19 +223,11 @@ Command compare_command(CLI::App& app, Setup& setup) {
         ->required()
         ->type_name("IMAGE");
     verb->add_option("TEST", a->test, "The image to judge")->required()->type_name("IMAGE");
-    verb->add_option("--model", a->model_name,
-                     "modern (default), second (by another model of sight), or rpg99 (of 1999, blind to fine detail)")
-        ->type_name("NAME")
-        ->check(one_of({"modern", "second", "rpg99"}));
-    verb->add_option("--profile", a->profile,
-                     "With rpg99: perceptualdiff behaves like that program (gamma 2.2, AdobeRGB, black 0)")
-        ->type_name("NAME")
-        ->check(one_of({perceptualdiff}));
-    verb->add_option_function<double>(
-            "--field", [o = a.get()](const double& v) { o->field_degrees = v; },
-            "With rpg99: the image's horizontal field (default: as shown on the display)")
-        ->type_name("DEGREES")
-        ->check(within(1e-3, 179.9));
+    add_choice<Model, Model>(
+        *verb, "--model", a->model, {{"modern", Model::modern}, {"second", Model::second}, {"rpg99", Model::rpg99}},
+        "modern (default), second (by another model of sight), or rpg99 (of 1999, blind to fine detail)");
+    add_number(*verb, "--field", a->field_degrees, within(1e-3, 179.9), "DEGREES",
+               "With rpg99: the image's horizontal field (default: as shown on the display)");
     verb->add_option("--device", a->device,
                      "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1%")
         ->type_name("NAME")
@@ -299,9 +237,6 @@ Command compare_command(CLI::App& app, Setup& setup) {
                      "The differences, with a scale below: blue where invisible, yellow to red where visible")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
-    verb->add_option("--threshold-map", a->threshold_map, "The least visible luminance step, in cd/m2")
-        ->type_name("OUT.pfm")
-        ->check(ending_in({".pfm", ".exr"}));
     verb->add_option_function<std::uint64_t>(
             "--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
             "Exit status 1 if a difference is visible at more than N pixels")
@@ -309,11 +244,10 @@ Command compare_command(CLI::App& app, Setup& setup) {
         ->check(not_negative());
     add_json_option(*verb, a->json);
     setup.act_in(*verb, Setup::display | Setup::observer | Setup::csf);
-    verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"
                  "  unseen compare a.png b.png --map map.png --json -\n"
                  "  unseen compare a.pfm b.pfm --model second --observer strict\n"
-                 "  unseen compare a.png b.png --model rpg99 --profile perceptualdiff --field 45");
+                 "  unseen compare a.png b.png --model rpg99 --field 45");
     return {verb, [a] { return run(*a); }, compare_rules()};
 }
 

@@ -1,13 +1,18 @@
 // unseen demo: a first look without a model of one's own.
+#include <cstdlib>
+#include <filesystem>
 #include <functional>
 #include <memory>
-#include <optional>
 
+#include <unseen/meshio/mesh_file.h>
+#include <unseen/perception/image.h>
+#include <unseen/vdtree/tree_io.h>
+
+#include "contact_sheet.h"
 #include "cut_report.h"
-#include "demo.h"
-#include "load_model.h"
 #include "output_files.h"
 #include "progress_bar.h"
+#include "scene_parts.h"
 #include "session_options.h"
 #include "sheet_report.h"
 #include "terminal.h"
@@ -17,6 +22,8 @@
 namespace unseen::app {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct DemoArguments {
     ViewOptions& view;
     std::string folder = "unseen-demo";
@@ -24,11 +31,78 @@ struct DemoArguments {
     int frames = 0;
 };
 
+constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj";
+constexpr int ball_rows = 120; // 57,600 triangles
+
+struct DemoModel {
+    std::filesystem::path mesh;
+    std::string name; // of files that are made of it
+    std::string what; // for people
+};
+
+// The Stanford bunny, where Debian's package glmark2-data is installed; without it, or where `is_made` says so, a ball
+// with bumps, the same at every time. Makes the folder.
+Result<DemoModel> demo_model(const fs::path& folder, bool is_made) {
+    std::error_code failure;
+    fs::create_directories(folder, failure);
+    if (failure)
+        return Error{ErrorCode::io_failure,
+                     "Cannot make the folder '" + folder.string() + "': " + failure.message() + "; name another one."};
+    if (!is_made && fs::is_regular_file(bunny, failure))
+        return DemoModel{bunny, "bunny", "the Stanford bunny of Debian's package glmark2-data"};
+    DemoModel ball{folder / "ball.ply", "ball", "a ball with bumps, made here"};
+    if (auto ok = meshio::write_mesh(ball.mesh, bumpy_sphere(ball_rows).view()); !ok) return ok.error();
+    return ball;
+}
+
+// What is written of a model, by name.
+struct DemoFiles {
+    fs::path tree, mesh, sheet, maps;
+
+    DemoFiles(const fs::path& folder, const std::string& name)
+        : tree(folder / (name + ".vdt")), mesh(folder / (name + "_small.ply")), sheet(folder / (name + "_sheet.png")),
+          maps(folder / (name + "_maps.png")) {}
+    std::vector<std::string> names() const { return {tree.string(), mesh.string(), sheet.string(), maps.string()}; }
+};
+
+struct Demo {
+    session::Report imperceptible;
+    std::vector<SheetCut> cuts; // of the sheet; none where there is no OpenGL
+};
+
+// Simplifies the session's only object for the default view, draws its cuts, and writes all files. Without OpenGL the
+// pictures are left out, and their names emptied.
 Result<Demo> make(session::Session& session, const DemoModel& model, DemoFiles& files) {
     auto context = render::Context::headless();
     if (!context) print_note("pictures are left out: " + context.error().message);
+    auto small = session.simplify();
+    if (!small) return small.error();
+    // Only now: the tree has its measurement.
+    if (auto ok = vdtree::write_tree(files.tree, session.tree()); !ok) return ok.error();
+    if (const auto notes = meshio::write_cut(files.mesh, small->cuts.front()); !notes) return notes.error();
+    Demo demo{std::move(*small), {}};
+    if (!context) {
+        files.sheet.clear();
+        files.maps.clear();
+        return demo;
+    }
     ProgressBar bar("drawing and judging");
-    return make_demo(session, context ? &*context : nullptr, model, files, std::ref(bar));
+    SheetOptions options;
+    options.model = model.name;
+    options.has_maps = true;
+    options.progress = std::ref(bar);
+    auto drawn = draw_contact_sheet(session, session.default_view(), *context, options);
+    if (!drawn) return drawn.error();
+    if (auto ok = perception::write_image(files.sheet, drawn->sheet); !ok) return ok.error();
+    if (auto ok = perception::write_image(files.maps, drawn->maps); !ok) return ok.error();
+    demo.cuts = std::move(drawn->cuts);
+    return demo;
+}
+
+bool has_display() {
+    for (const char* name : {"WAYLAND_DISPLAY", "DISPLAY"})
+        if (const char* display = std::getenv(name); display != nullptr && *display != '\0') return true;
+    return false;
 }
 
 Result<void> view(session::Session& session, const DemoModel& model, int frames) {
@@ -49,7 +123,7 @@ Result<void> view(session::Session& session, const DemoModel& model, int frames)
 Result<int> run(const DemoArguments& a) {
     const auto model = demo_model(a.folder, a.is_made);
     if (!model) return model.error();
-    DemoFiles files = demo_files(a.folder, *model);
+    DemoFiles files(a.folder, model->name);
     if (const auto ready = check_outputs({}, files.names()); !ready) return ready.error();
     print_line("the model: " + model->what + "; its tree is built now, if it is not kept from before");
     auto session = open_session(model->mesh, a.view, {});

@@ -9,8 +9,6 @@
 namespace unseen::app {
 namespace {
 
-std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
-
 template <class Value>
 std::vector<double> column(const std::vector<FrameRecord>& frames, Value value) {
     std::vector<double> values;
@@ -102,12 +100,9 @@ std::string to_csv(const std::vector<FrameRecord>& frames) {
         "drawn_triangles,gliding,change_v,flicker_v,picture_v\n";
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const FrameRecord& f = frames[i];
-        text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) +
-                "," + std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
-                std::to_string(f.stats.node_tests) + "," + cell(f.cut_ms) + "," + cell(f.index_ms) + "," +
-                cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "," +
-                cell(f.drawn_triangles) + "," + cell(f.gliding) + "," + cell(f.change_v) + "," + cell(f.flicker_v) +
-                "," + cell(f.picture_v) + "\n";
+        text += csv_line({i, f.stats.triangles, f.stats.folds, f.stats.unfolds, f.changes(), f.stats.node_tests,
+                          f.cut_ms, f.index_ms, f.uploaded_bytes, f.draw_ms, f.frame_ms, f.drawn_triangles, f.gliding,
+                          f.change_v, f.flicker_v, f.picture_v});
     }
     return text;
 }

@@ -11,7 +11,6 @@
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/scene_file.h>
 
-#include "load_model.h"
 #include "options.h"
 #include "other_libraries.h"
 #include "progress_bar.h"
@@ -29,11 +28,11 @@ struct InfoArguments {
     bool verify = false, is_exact = false, json = false, is_verbose = false;
 };
 
-using Rows = std::vector<std::vector<std::string>>;
+using Facts = std::vector<Fact>;
 
-void output(bool as_json, const Json& json, const Rows& rows) {
-    if (as_json) std::fputs(json_text(json).c_str(), stdout);
-    else print_table(rows);
+void output(bool as_json, const Facts& facts) {
+    if (as_json) std::fputs(json_text(to_json(facts)).c_str(), stdout);
+    else print_facts(facts);
 }
 
 const char* text_of(vdtree::Closedness closedness) {
@@ -147,6 +146,8 @@ Result<Arrays> arrays_of(const vdtree::VertexTree& tree) {
     return values_among(std::move(document->arrays));
 }
 
+const Fact is_sound = {"verified", "verified", true, "sound"};
+
 Result<int> describe_tree(const InfoArguments& a) {
     auto tree = load_tree(a.file);
     if (!tree) return tree.error();
@@ -163,40 +164,31 @@ Result<int> describe_tree(const InfoArguments& a) {
     }
     const auto arrays = arrays_of(*tree);
     if (!arrays) return Error{arrays.error().code, a.file + ": " + arrays.error().message};
-    const std::uint64_t file_bytes = file_bytes_of(a.file);
     const vdtree::LuminanceRange range = tree->luminance_range();
-    Json json = {{"kind", "tree"},
-                 {"vertices", tree->leaf_count()},
-                 {"triangles", tree->triangle_count()},
-                 {"dropped", tree->dropped_triangles()},
-                 {"nodes", tree->node_count()},
-                 {"bytes", tree->byte_size()},
-                 {"file_bytes", file_bytes},
-                 {"closed", tree->closedness() != vdtree::Closedness::open},
-                 {"prelit", tree->is_prelit()},
-                 {"texture", texture_json(*tree)},
-                 {"arrays", arrays_json(*arrays)},
-                 {"ranges", tree->ranges().size()}};
-    if (a.verify) json["verified"] = true;
-    if (exact) json["verified_exactly"] = {{"comparisons", exact->comparisons}, {"in_rationals", exact->in_rationals}};
-    Rows rows = {
-        {"kind", "tree"},
-        {"vertices", grouped(tree->leaf_count())},
-        {"triangles", grouped(tree->triangle_count())},
-        {"dropped", grouped(tree->dropped_triangles())},
-        {"nodes", grouped(tree->node_count())},
-        {"bytes in memory", grouped(tree->byte_size())},
-        {"bytes on disk", grouped(file_bytes)},
-        {"surface", text_of(tree->closedness())},
-        {"luminance", rounded(static_cast<double>(range.lo), 3) + " to " + rounded(static_cast<double>(range.hi), 3)},
-        {"colours", text_of_colours(*tree)},
-        {"texture", texture_text(*tree)},
-        {"groups and materials", grouped(tree->ranges().size())}};
-    if (a.verify) rows.push_back({"verified", "sound"});
+    Facts facts = {{"kind", "kind", "tree", "tree"},
+                   count_of("vertices", "vertices", tree->leaf_count()),
+                   count_of("triangles", "triangles", tree->triangle_count()),
+                   count_of("dropped", "dropped", tree->dropped_triangles()),
+                   count_of("nodes", "nodes", tree->node_count()),
+                   count_of("bytes", "bytes in memory", tree->byte_size()),
+                   count_of("file_bytes", "bytes on disk", file_bytes_of(a.file)),
+                   {"closed", "surface", tree->closedness() != vdtree::Closedness::open, text_of(tree->closedness())},
+                   {"",
+                    "luminance",
+                    {},
+                    rounded(static_cast<double>(range.lo), 3) + " to " + rounded(static_cast<double>(range.hi), 3)},
+                   {"prelit", "colours", tree->is_prelit(), text_of_colours(*tree)},
+                   {"texture", "texture", texture_json(*tree), texture_text(*tree)},
+                   {"arrays", "", arrays_json(*arrays)},
+                   count_of("ranges", "groups and materials", tree->ranges().size())};
+    if (a.verify) facts.push_back(is_sound);
     if (exact)
-        rows.push_back({"in exact arithmetic", "sound: " + grouped(exact->comparisons) + " comparisons, " +
-                                                   grouped(exact->in_rationals) + " of them in rationals"});
-    output(a.json, json, rows);
+        facts.push_back({"verified_exactly",
+                         "in exact arithmetic",
+                         {{"comparisons", exact->comparisons}, {"in_rationals", exact->in_rationals}},
+                         "sound: " + grouped(exact->comparisons) + " comparisons, " + grouped(exact->in_rationals) +
+                             " of them in rationals"});
+    output(a.json, facts);
     if (!a.json) print_arrays(*arrays);
     return exit_done;
 }
@@ -279,41 +271,31 @@ Result<int> describe_mesh(const InfoArguments& a) {
     if (!examined) return Error{examined.error().code, a.file + ": " + examined.error().message};
     const std::uint64_t bytes = bytes_of(mesh.positions) + bytes_of(mesh.triangles) + bytes_of(mesh.normals) +
                                 bytes_of(mesh.colours) + bytes_of(mesh.uvs);
-    const std::uint64_t file_bytes = file_bytes_of(a.file);
     const Arrays arrays = read->document ? values_among(std::move(read->document->arrays)) : Arrays();
-    const auto images = std::count_if(read->materials.begin(), read->materials.end(),
-                                      [](const meshio::Material& m) { return m.has_image(); });
-    Json json = {{"kind", "mesh"},
-                 {"vertices", mesh.positions.size()},
-                 {"triangles", mesh.triangles.size()},
-                 {"dropped", read->dropped_triangles},
-                 {"nodes", nullptr},
-                 {"bytes", bytes},
-                 {"file_bytes", file_bytes},
-                 {"faces", read->source_faces},
-                 {"images", images},
-                 {"materials", materials_json(read->materials)},
-                 {"arrays", arrays_json(arrays)},
-                 {"examination", examination_json(*read, *examined)},
-                 {"ranges", mesh.ranges.size()}};
-    if (a.verify) json["verified"] = true;
-    const auto yes = [](bool has) { return std::string(has ? "yes" : "no"); };
-    Rows rows = {{"kind", "mesh"},
-                 {"vertices", grouped(mesh.positions.size())},
-                 {"faces", grouped(read->source_faces)},
-                 {"triangles", grouped(mesh.triangles.size())},
-                 {"dropped", grouped(read->dropped_triangles)},
-                 {"bytes in memory", grouped(bytes)},
-                 {"bytes on disk", grouped(file_bytes)},
-                 {"normals", yes(!mesh.normals.empty())},
-                 {"colours", yes(!mesh.colours.empty())},
-                 {"texture coordinates", yes(!mesh.uvs.empty())},
-                 {"materials with images", std::to_string(images)},
-                 {"groups and materials", grouped(mesh.ranges.size())},
-                 {"components", grouped(examined->components)},
-                 {"of them closed", grouped(examined->closed_components)}};
-    if (a.verify) rows.push_back({"verified", "sound"});
-    output(a.json, json, rows);
+    const auto images =
+        static_cast<std::uint64_t>(std::ranges::count_if(read->materials, &meshio::Material::has_image));
+    const auto has = [](const char* label, bool there) { return Fact{"", label, {}, there ? "yes" : "no"}; };
+    Facts facts = {{"kind", "kind", "mesh", "mesh"},
+                   count_of("vertices", "vertices", mesh.positions.size()),
+                   count_of("", "faces", read->source_faces),
+                   count_of("triangles", "triangles", mesh.triangles.size()),
+                   count_of("dropped", "dropped", read->dropped_triangles),
+                   {"nodes", ""},
+                   count_of("bytes", "bytes in memory", bytes),
+                   count_of("file_bytes", "bytes on disk", file_bytes_of(a.file)),
+                   has("normals", !mesh.normals.empty()),
+                   has("colours", !mesh.colours.empty()),
+                   has("texture coordinates", !mesh.uvs.empty()),
+                   {"faces", "", read->source_faces},
+                   {"images", "materials with images", images, std::to_string(images)},
+                   {"materials", "", materials_json(read->materials)},
+                   {"arrays", "", arrays_json(arrays)},
+                   {"examination", "", examination_json(*read, *examined)},
+                   count_of("ranges", "groups and materials", mesh.ranges.size()),
+                   count_of("", "components", examined->components),
+                   count_of("", "of them closed", examined->closed_components)};
+    if (a.verify) facts.push_back(is_sound);
+    output(a.json, facts);
     if (!a.json) print_materials(read->materials, a.is_verbose);
     if (!a.json) print_arrays(arrays);
     if (!a.json) print_findings(*read, *examined, a.is_verbose);
@@ -362,8 +344,8 @@ Result<std::vector<SceneMesh>> examine_meshes(const InfoArguments& a, meshio::Sc
     return all;
 }
 
-Json scene_json(const meshio::SceneContents& contents, const std::vector<SceneMesh>& meshes) {
-    Json json = {{"kind", "scene"}};
+Facts scene_facts(const meshio::SceneContents& contents, const std::vector<SceneMesh>& meshes,
+                  const Materials& materials, std::uint64_t file_bytes) {
     std::uint64_t objects = 0, own = 0, shown = 0, background = 0;
     Json list = Json::array();
     for (const SceneMesh& mesh : meshes) {
@@ -386,28 +368,18 @@ Json scene_json(const meshio::SceneContents& contents, const std::vector<SceneMe
                   {"eye", json_of(contents.camera->eye)},
                   {"forward", json_of(contents.camera->forward)},
                   {"fov_y_degrees", contents.camera->fov_y_degrees}};
-    json.update({{"objects", objects},
-                 {"triangles", shown},
-                 {"meshes", std::move(list)},
-                 {"mesh_triangles", own},
-                 {"background_triangles", background},
-                 {"lights", std::move(lights)},
-                 {"camera", std::move(camera)}});
-    return json;
-}
-
-Rows scene_rows(const meshio::SceneContents& contents, const Json& json, std::size_t materials) {
-    const auto count = [&](const char* key) { return grouped(json[key].get<std::uint64_t>()); };
-    return {{"kind", "scene"},
-            {"objects", count("objects")},
-            {"their triangles", count("triangles")},
-            {"different meshes", grouped(json["meshes"].size())},
-            {"their triangles, once each", count("mesh_triangles")},
-            {"background triangles", count("background_triangles")},
-            {"materials", grouped(materials)},
-            {"lights", grouped(contents.lights.size())},
-            {"camera", contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none"},
-            {"bytes on disk", count("file_bytes")}};
+    const std::string field = contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none";
+    return {{"kind", "kind", "scene", "scene"},
+            count_of("objects", "objects", objects),
+            count_of("triangles", "their triangles", shown),
+            {"meshes", "different meshes", std::move(list), grouped(meshes.size())},
+            count_of("mesh_triangles", "their triangles, once each", own),
+            count_of("background_triangles", "background triangles", background),
+            count_of("", "materials", materials.size()),
+            {"lights", "lights", std::move(lights), grouped(contents.lights.size())},
+            {"camera", "camera", std::move(camera), field},
+            {"materials", "", materials_json(materials)},
+            count_of("file_bytes", "bytes on disk", file_bytes)};
 }
 
 Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
@@ -418,18 +390,17 @@ Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
     Materials materials;
     const auto meshes = examine_meshes(a, file, materials);
     if (!meshes) return meshes.error();
-    Json json = scene_json(contents, *meshes);
-    json["materials"] = materials_json(materials);
-    json["file_bytes"] = file_bytes_of(a.file);
-    Rows rows = scene_rows(contents, json, materials.size());
-    if (a.verify) json["verified"] = true, rows.push_back({"verified", "sound"});
+    Facts facts = scene_facts(contents, *meshes, materials, file_bytes_of(a.file));
+    if (a.verify) facts.push_back(is_sound);
     constexpr std::size_t most_lines = 40;
     const std::size_t lines = a.is_verbose ? meshes->size() : std::min(meshes->size(), most_lines);
     for (const SceneMesh& mesh : std::span(*meshes).first(lines))
-        rows.push_back({"mesh " + std::to_string(mesh.number) + " '" + printable(mesh.name) + "'",
-                        grouped(mesh.triangles) + " triangles, " + grouped(mesh.nodes) +
-                            (mesh.nodes == 1 ? " node" : " nodes") + (mesh.objects() == 0 ? ", background" : "")});
-    output(a.json, json, rows);
+        facts.push_back({"",
+                         "mesh " + std::to_string(mesh.number) + " '" + printable(mesh.name) + "'",
+                         {},
+                         grouped(mesh.triangles) + " triangles, " + grouped(mesh.nodes) +
+                             (mesh.nodes == 1 ? " node" : " nodes") + (mesh.objects() == 0 ? ", background" : "")});
+    output(a.json, facts);
     if (a.json) return exit_done;
     print_materials(materials, a.is_verbose);
     if (lines < meshes->size())

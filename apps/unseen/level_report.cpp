@@ -93,7 +93,7 @@ Json to_json(const LevelFrame& frame, int levels) {
 
 } // namespace
 
-Json to_json(const session::Session& session, const session::LevelControl& control, const LevelFlightOptions& options,
+Json to_json(const session::Session& session, const session::LevelControl& control, const LevelsArguments& options,
              const LevelRecords& records, int levels) {
     Json json;
     json["method"] = name_of(options.control.method);
@@ -127,7 +127,7 @@ Json to_json(const session::Session& session, const session::LevelControl& contr
     return json;
 }
 
-void print_summary(const LevelFlightOptions& options, const LevelRecords& records, const session::Session& session,
+void print_summary(const LevelsArguments& options, const LevelRecords& records, const session::Session& session,
                    int levels) {
     const Totals totals(records, levels);
     const auto frames = static_cast<std::uint64_t>(records.frames.size());

@@ -2,12 +2,32 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "level_flight.h"
+#include <unseen/session_gpu/level_control.h>
+
+#include "level_views.h"
+#include "options.h"
 #include "report.h"
 
 namespace unseen::app {
+
+struct LevelsArguments {
+    ViewOptions& view;
+    DisplayOptions& display;
+    std::string model = {};
+    session::LevelControlOptions control = {};
+    std::string path = {}; // see camera_path.h; empty: one picture, of the view in which nothing changes any more
+    std::string out = {};  // of pictures: with a path a name with one %d; empty: none
+    std::string json = {};
+    std::string selection = {}; // of the method `given`: a file, whose budget counts unless `what` has one
+    std::optional<LevelView> show = {};
+    double frames_a_second = 60;
+    WhatOptions what = {};
+    bool is_verbose = false;
+};
 
 struct LevelRecords {
     std::vector<session::LevelFrame> frames;
@@ -35,9 +55,9 @@ private:
     }
 };
 
-Json to_json(const session::Session& session, const session::LevelControl& control, const LevelFlightOptions& options,
+Json to_json(const session::Session& session, const session::LevelControl& control, const LevelsArguments& options,
              const LevelRecords& records, int levels);
-void print_summary(const LevelFlightOptions& options, const LevelRecords& records, const session::Session& session,
+void print_summary(const LevelsArguments& options, const LevelRecords& records, const session::Session& session,
                    int levels);
 
 } // namespace unseen::app

@@ -123,25 +123,11 @@ Result<Image> picture_of(LevelControl& control, const perception::Display& displ
         if (!picture) return picture;
         return picture_of_levels(control, *picture, levels);
     }
-    const render::LayerPasses& layers = control.layers();
     std::vector<Image> panels;
-    const auto add = [&](Result<Image> panel) -> Result<void> {
+    for (int i = 0; i < control.layers().combination_count(); ++i) {
+        auto panel = picture_of_thresholds(control, i);
         if (!panel) return panel.error();
         panels.push_back(std::move(*panel));
-        return {};
-    };
-    for (int i = 0; i < layers.combination_count(); ++i) {
-        if (*show == LevelView::maps) {
-            if (auto added = add(picture_of_thresholds(control, i)); !added) return added.error();
-            continue;
-        }
-        if (auto combined = control.combine(i); !combined) return combined.error();
-        // A picture that is not split has one layer: all of it, and the background.
-        const render::Target* own = layers.layer(i) ? layers.layer(i) : &layers.composite();
-        if (*show == LevelView::layers && i == 0 && layers.background())
-            if (auto added = add(coded(*layers.background())); !added) return added.error();
-        if (auto added = add(coded(*show == LevelView::layers ? *own : layers.combination())); !added)
-            return added.error();
     }
     if (panels.empty()) return coded(control.picture()); // no object is in sight
     return beside_each_other(panels);

@@ -1,4 +1,4 @@
-// Pictures of levels in use: the scene, its layers, what masks, and which level each object has.
+// Pictures of levels in use: the scene, what masks, and which level each object has.
 #pragma once
 
 #include <optional>
@@ -12,10 +12,8 @@ namespace unseen::app {
 
 // In place of the picture.
 enum class LevelView {
-    layers,       // the background and each layer
-    combinations, // for each layer, all the others
-    maps,         // for each layer, which steps of luminance those hide
-    levels,       // the picture, coloured by level
+    maps,   // for each layer of depth, which steps of luminance the others hide
+    levels, // the picture, coloured by level
 };
 
 Result<render::Frame> frame_of(const render::Target& target);

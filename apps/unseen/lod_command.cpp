@@ -5,7 +5,6 @@
 #include <memory>
 
 #include <unseen/session_gpu/lod.h>
-#include <unseen/vdtree/internal/csv.h>
 
 #include "cut_report.h"
 #include "level_sheet.h"
@@ -75,11 +74,9 @@ std::string to_csv(const session::Lod& lod) {
         for (std::size_t i = 0; i < object.levels.size(); ++i) {
             const session::LodLevel& level = object.levels[i];
             const Worst worst = worst_of(level);
-            text += csv_field(object.name) + "," + std::to_string(i) + "," + std::to_string(level.triangles) + "," +
-                    shortest(level.distance) + "," + shortest(level.coverage) + "," + shortest(level.shift) + "," +
-                    shortest(level.pixel_error) + "," + std::to_string(level.checks.size()) + "," +
-                    std::to_string(worst.visible) + "," + shortest(worst.v) + "," +
-                    std::to_string(worst.second_visible) + "," + shortest(worst.second_v) + "\n";
+            text += csv_line({object.name, i, level.triangles, level.distance, level.coverage, level.shift,
+                              level.pixel_error, level.checks.size(), worst.visible, worst.v, worst.second_visible,
+                              worst.second_v});
         }
     return text;
 }
@@ -181,10 +178,8 @@ Result<int> run(LodArguments& a) {
     if (a.gltf.meshopt && !meshio::has_meshoptimizer())
         return Error{ErrorCode::unsupported, "--meshopt is not in this build, for it was made without the library "
                                              "meshoptimizer: install libmeshoptimizer-dev and build again."};
-    auto report = JsonReport::open(a.json);
+    auto report = JsonReport::open(a.json, a.csv);
     if (!report) return report.error();
-    auto csv = open_if_named(a.csv);
-    if (!csv) return csv.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -203,11 +198,7 @@ Result<int> run(LodArguments& a) {
         if (!sheet) return sheet.error();
         if (auto ok = perception::write_image(a.sheet, *sheet); !ok) return ok.error();
     }
-    if (auto ok = report->prepare(to_json(*lod, *session, *written, *separate)); !ok) return ok.error();
-    if (*csv) {
-        if (auto ok = (*csv)->write(to_csv(*lod)); !ok) return ok.error();
-        if (auto ok = (*csv)->commit(); !ok) return ok.error();
-    }
+    if (auto ok = report->prepare(to_json(*lod, *session, *written, *separate), to_csv(*lod)); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_scene(*session);

@@ -5,11 +5,11 @@
 #include <subdivide.h>
 #include <unseen/meshio/mesh_file.h>
 
-#include "load_model.h"
 #include "options.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 

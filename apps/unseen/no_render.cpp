@@ -1,7 +1,6 @@
 // The verbs that draw, in a build without OpenGL: they say so.
 #include "calibration_window.h"
-#include "gpu_comparison.h"
-#include "hiding.h"
+#include "on_gpu.h"
 #include "verbs.h"
 
 namespace unseen::app {
@@ -29,7 +28,6 @@ Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWi
     return no_window();
 }
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
-Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
 
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
@@ -40,8 +38,7 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
                  "configure it with -DUNSEEN_BUILD_RENDER=ON."};
 }
 
-Result<GpuComparison> compare_on_gpu(const perception::Image&, const perception::Image&,
-                                     const perception::JudgeOptions&, bool) {
+Result<Verdict> compare_on_gpu(const perception::Image&, const perception::Image&, const perception::JudgeOptions&) {
     return Error{ErrorCode::unsupported,
                  "This build cannot judge on the GPU, for it was made without OpenGL; configure it "
                  "with -DUNSEEN_BUILD_RENDER=ON, or use --device cpu."};

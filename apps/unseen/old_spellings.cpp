@@ -15,6 +15,26 @@ Words::iterator find(Words& words, const std::string& option) {
         words, [&](const std::string& word) { return word == option || word.starts_with(option + "="); });
 }
 
+// What options are called today, and what stands before their value: "--gaze-error 0.5" is "--tracker error=0.5".
+struct Renamed {
+    std::string before, now, value;
+    bool is_flag = false;
+};
+
+void rename_options(Words& words) {
+    std::vector<Renamed> renamed = {{"--gaze-trace", "--gaze-mode", ""},
+                                    {"--gaze-error", "--tracker", "error="},
+                                    {"--gaze-latency", "--tracker", "latency="},
+                                    {"--suppression", "--tracker", "suppression", true}};
+    if (words[0] == "fly" || words[0] == "view") renamed.push_back({"--seed", "--tracker", "seed="});
+    for (const auto& [before, now, value, is_flag] : renamed)
+        for (auto word = words.begin(); word != words.end(); ++word) {
+            if (word->starts_with(before + "=")) word->replace(0, before.size() + 1, now + "=" + value);
+            else if (*word == before && is_flag) *word = now + "=" + value;
+            else if (*word == before && word + 1 != words.end()) *word = now, (word + 1)->insert(0, value);
+        }
+}
+
 // The method, which is taken out: "tree" means cuts.
 std::string take_method(Words& words) {
     const auto at = find(words, "--method");
@@ -45,6 +65,7 @@ void renew_spelling(Words& all) {
     if (words[0] == "render") renew_render(words);
     else if (words[0] == "select") words[0] = "levels";
     else if (words[0] == "scene" && words.size() > 1 && words[1] == "make") std::swap(words[0], words[1]);
+    rename_options(words);
     all.erase(verb, all.end());
     all.insert(all.end(), words.begin(), words.end());
 }

@@ -9,7 +9,7 @@
 
 #include "cut_report.h"
 #include "fold_map.h"
-#include "hiding.h"
+#include "on_gpu.h"
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
@@ -110,7 +110,7 @@ std::vector<Rule> render_rules() {
         {"--show eccentricity", Rule::needs_one_of, {"--gaze", "--gaze-mode"}, "without a gaze all of it is foveal"},
         {"--show", Rule::excludes, {"--wireframe", "--samples"}, "a map of folds has neither edges nor samples"},
         {"--gaze", Rule::excludes, {"--gaze-mode"}},
-        {"--gaze-error", Rule::needs_one_of, {"--gaze", "--gaze-mode"}}};
+        {"--tracker", Rule::needs_one_of, {"--gaze", "--gaze-mode"}}};
 }
 
 } // namespace
@@ -139,7 +139,7 @@ Command render_command(CLI::App& app, Setup& setup) {
     add_masking_option(*verb, a->what, rules);
     add_choice<GazeSource, GazeSource>(*verb, "--gaze-mode", a->gaze.source, {{"head", GazeSource::head}},
                                        "head: no tracker; the viewer looks within 15 degrees of the middle");
-    add_gaze_error_option(*verb, a->gaze);
+    add_tracker_option(*verb, a->gaze, false);
     setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
     verb->callback([a, samples = verb->get_option("--samples")] {
         if (a->map && !is_for_people(a->out)) refuse("--show draws pictures for people: -o must end in .png.");

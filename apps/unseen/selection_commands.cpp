@@ -1,8 +1,5 @@
 // unseen levels precompute, unseen levels info: levels of detail selected beforehand, for cameras all over a scene.
 #include <algorithm>
-#include <filesystem>
-#include <functional>
-#include <map>
 #include <memory>
 
 #include <unseen/session/selection.h>
@@ -14,9 +11,9 @@
 #include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
-#include "selection_commands.h"
 #include "session_options.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -34,24 +31,27 @@ struct PrecomputeArguments {
     PrecomputeOptions options = {};
     std::optional<double> eye_height = {};
     std::vector<double> grid = {};
-    bool is_verbose = false, begins_anew = false;
+    bool is_verbose = false;
 };
 
-Json to_json(const PrecomputeReport& r) {
-    return {{"corners", r.corners},
-            {"cells", r.cells},
-            {"cameras", r.cameras},
-            {"resumed_corners", r.resumed},
-            {"cameras_over_budget", r.over_budget},
-            {"processes", r.processes},
-            {"seconds", r.seconds},
-            {"load_seconds", r.load_seconds},
-            {"draw_seconds", r.draw_seconds},
-            {"read_seconds", r.read_seconds},
-            {"search_seconds", r.search_seconds},
-            {"drawings", r.drawings},
-            {"drawn_triangles", r.drawn_triangles},
-            {"evaluations", r.evaluations}};
+std::vector<Fact> facts_of(const PrecomputeReport& r) {
+    const auto seconds = [](const char* key, const char* label, double value) {
+        return Fact{key, label, value, rounded(value, 3)};
+    };
+    return {{"corners", "", r.corners},
+            {"cells", "", r.cells},
+            {"cameras", "", r.cameras},
+            {"resumed_corners", "", r.resumed},
+            {"cameras_over_budget", "", r.over_budget},
+            {"processes", "", r.processes},
+            {"seconds", "seconds", r.seconds},
+            seconds("load_seconds", "loading, levels", r.load_seconds),
+            seconds("draw_seconds", "drawing", r.draw_seconds),
+            seconds("read_seconds", "reading back", r.read_seconds),
+            seconds("search_seconds", "searching, of all threads", r.search_seconds),
+            count_of("drawings", "drawings", r.drawings),
+            count_of("drawn_triangles", "triangles drawn", r.drawn_triangles),
+            count_of("evaluations", "evaluations", r.evaluations)};
 }
 
 std::string counted(std::size_t count, const char* one, const char* many) {
@@ -108,15 +108,7 @@ void print(const PrecomputeReport& done, bool is_verbose) {
     if (done.over_budget > 0)
         print_note(counted(done.over_budget, "camera has", "cameras have") +
                    " more triangles in sight than half of the budget, even at the coarsest levels.");
-    if (is_verbose)
-        print_table({{"seconds", ""},
-                     {"loading, levels", rounded(done.load_seconds, 3)},
-                     {"drawing", rounded(done.draw_seconds, 3)},
-                     {"reading back", rounded(done.read_seconds, 3)},
-                     {"searching, of all threads", rounded(done.search_seconds, 3)},
-                     {"drawings", grouped(done.drawings)},
-                     {"triangles drawn", grouped(done.drawn_triangles)},
-                     {"evaluations", grouped(done.evaluations)}});
+    if (is_verbose) print_facts(facts_of(done));
 }
 
 Result<int> precompute(PrecomputeArguments& a) {
@@ -129,10 +121,6 @@ Result<int> precompute(PrecomputeArguments& a) {
     if (!ready) return is_first ? Result<int>(ready.error()) : Result<int>(exit_failed);
     auto& [report, context, session] = *ready;
     PrecomputeOptions options = options_of(a, session, team);
-    if (is_first && a.begins_anew) {
-        std::error_code ignored;
-        std::filesystem::remove(a.out + ".part", ignored);
-    }
     Result<PrecomputeReport> done = PrecomputeReport{};
     bool is_interrupted = false;
     {
@@ -147,9 +135,11 @@ Result<int> precompute(PrecomputeArguments& a) {
     }
     if (team) team->leave();
     if (!is_first) return done ? exit_done : exit_failed; // the first one says why
-    if (!done && is_interrupted) print_note("interrupted: the same command goes on from '" + a.out + ".part'.");
+    if (!done && is_interrupted)
+        print_note("interrupted: the same command goes on from '" + a.out +
+                   ".part', which may be removed to begin anew.");
     if (!done) return done.error();
-    if (auto ok = report.prepare(to_json(*done)); !ok) return ok.error();
+    if (auto ok = report.prepare(to_json(facts_of(*done))); !ok) return ok.error();
     if (auto ok = report.publish(); !ok) return ok.error();
     if (report.is_on_stdout()) return exit_done;
     print(*done, a.is_verbose);
@@ -184,37 +174,27 @@ Result<int> selection_info(const SelectionInfoArguments& a) {
     const std::int32_t cell = s.grid.cell_size();
     const glm::dvec3 high = s.grid.place({s.grid.cells.x * cell, s.grid.cells.y * cell, s.grid.cells.z * cell});
     const auto triple = [](const glm::dvec3& v) { return Json::array({v.x, v.y, v.z}); };
-    const Json json = {{"quality", name_of(s.quality)},
-                       {"budget", s.budget},
-                       {"window_px", s.window_px},
-                       {"objects", s.triangles.size()},
-                       {"levels", levels},
-                       {"is_in_space", !s.grid.is_on_ground()},
-                       {"corners", s.corners.size()},
-                       {"cells", s.cells.size()},
-                       {"cameras", cameras},
-                       {"low", triple(low)},
-                       {"high", triple(high)},
-                       {"objects_in_sight", in_sight / of},
-                       {"mean_loss", loss / of},
-                       {"selected_by_level", by_level}};
-    if (auto ok = report->prepare(json); !ok) return ok.error();
+    std::vector<Fact> facts = {
+        {"quality", "quality", name_of(s.quality), name_of(s.quality)},
+        count_of("budget", "budget, triangles a frame", s.budget),
+        count_of("window_px", "cameras' windows, pixels a side", static_cast<std::uint64_t>(s.window_px)),
+        count_of("objects", "objects", s.triangles.size()),
+        count_of("levels", "levels of an object", levels),
+        {"is_in_space", "", !s.grid.is_on_ground()},
+        count_of("corners", "corners", s.corners.size()),
+        count_of("cells", "cells", s.cells.size()),
+        count_of("cameras", "cameras with objects in sight", cameras),
+        {"low", "", triple(low)},
+        {"high", "", triple(high)},
+        {"objects_in_sight", "objects in sight, mean", in_sight / of, rounded(in_sight / of, 3)},
+        {"mean_loss", "lost a pixel, mean", loss / of, rounded(loss / of, 3)},
+        {"selected_by_level", "", by_level}};
+    if (auto ok = report->prepare(to_json(facts)); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
-    std::vector<std::vector<std::string>> rows = {
-        {"quality", name_of(s.quality)},
-        {"budget, triangles a frame", grouped(s.budget)},
-        {"cameras' windows, pixels a side", grouped(static_cast<std::uint64_t>(s.window_px))},
-        {"objects", grouped(s.triangles.size())},
-        {"levels of an object", grouped(levels)},
-        {"corners", grouped(s.corners.size())},
-        {"cells", grouped(s.cells.size())},
-        {"cameras with objects in sight", grouped(cameras)},
-        {"objects in sight, mean", rounded(in_sight / of, 3)},
-        {"lost a pixel, mean", rounded(loss / of, 3)}};
     for (std::size_t level = 0; level < levels; ++level)
-        rows.push_back({"selected at level " + std::to_string(level), grouped(by_level[level])});
-    print_table(std::move(rows));
+        facts.push_back(count_of("", "selected at level " + std::to_string(level), by_level[level]));
+    print_facts(facts);
     print_written({a.json});
     return exit_done;
 }
@@ -238,9 +218,6 @@ void add_search_options(CLI::App& verb, PrecomputeArguments& a) {
     verb.add_option("--depth", o.depth, "How often a cell is halved where its corners select differently (default: 1)")
         ->type_name("N")
         ->check(whole(0, session::most_selection_depth));
-    verb.add_option("--differ", o.differ, "Differently: by more than X levels on average (default: 0.5)")
-        ->type_name("X")
-        ->check(not_negative());
     add_number(verb, "--height", a.eye_height, finite_numbers(1), "Y",
                "Height of the eyes, world units (default: the scene camera's, or 1.7 above the lowest object)");
     verb.add_flag("--space", o.is_in_space, "A grid in space, cameras in six directions; else on the ground, in four");
@@ -250,10 +227,6 @@ void add_search_options(CLI::App& verb, PrecomputeArguments& a) {
     verb.add_option("--window", o.window_px, "Width and height of the cameras' pictures (default: 256)")
         ->type_name("PIXELS")
         ->check(whole(11, 8192));
-    verb.add_option("--threads", o.threads, "One draws, the others search; the result is the same (default: all cores)")
-        ->type_name("N")
-        ->check(whole(1, 1024));
-    verb.add_flag("--anew", a.begins_anew, "Do not continue an interrupted search");
 }
 
 } // namespace

@@ -8,7 +8,7 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "cut_report.h"
-#include "hiding.h"
+#include "on_gpu.h"
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"

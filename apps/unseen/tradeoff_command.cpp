@@ -4,7 +4,6 @@
 #include <memory>
 
 #include <unseen/session_gpu/tradeoff.h>
-#include <unseen/vdtree/internal/csv.h>
 
 #include "cut_report.h"
 #include "output_files.h"
@@ -62,18 +61,14 @@ Json to_json(const session::TradeoffPoint& p) {
             {"recommended", p.is_recommended}};
 }
 
-std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
-
 std::string to_csv(const session::Tradeoff& tradeoff) {
     std::string text =
         "name,options,triangles,make_ms,follow_ms,draw_ms,visible_pixels,v,second_visible_pixels,second_v,"
         "ssim,shift_m,pareto,recommended\n";
     for (const session::TradeoffPoint& p : tradeoff.points)
-        text += csv_field(p.name) + "," + options_of(p) + "," + std::to_string(p.triangles) + "," + cell(p.make_ms) +
-                "," + cell(p.follow_ms.median) + "," + cell(p.draw_ms.median) + "," + std::to_string(p.visible_pixels) +
-                "," + cell(p.v) + "," + std::to_string(p.second_visible_pixels) + "," + cell(p.second_v) + "," +
-                cell(p.ssim) + "," + cell(p.shift) + "," + (p.is_on_front ? "1" : "0") + "," +
-                (p.is_recommended ? "1" : "0") + "\n";
+        text += csv_line({p.name, options_of(p), p.triangles, p.make_ms, p.follow_ms.median, p.draw_ms.median,
+                          p.visible_pixels, p.v, p.second_visible_pixels, p.second_v, p.ssim, p.shift,
+                          int{p.is_on_front}, int{p.is_recommended}});
     return text;
 }
 
@@ -121,10 +116,8 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
 Result<int> run(TradeoffArguments& a) {
     if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.csv, a.json}); !ready)
         return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = JsonReport::open(a.json, a.csv);
     if (!report) return report.error();
-    auto csv = open_if_named(a.csv);
-    if (!csv) return csv.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -142,13 +135,10 @@ Result<int> run(TradeoffArguments& a) {
                                    {"samples", tradeoff->samples},
                                    {"measuring_s", tradeoff->measuring_s},
                                    {"points", std::move(points)},
-                                   {"left_out", tradeoff->left_out}});
+                                   {"left_out", tradeoff->left_out}},
+                                  to_csv(*tradeoff));
         !ok)
         return ok.error();
-    if (*csv) {
-        if (auto ok = (*csv)->write(to_csv(*tradeoff)); !ok) return ok.error();
-        if (auto ok = (*csv)->commit(); !ok) return ok.error();
-    }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_scene(*session);

@@ -24,6 +24,9 @@ Command study_command(CLI::App& app, Setup& setup);
 Command tradeoff_command(CLI::App& app, Setup& setup);
 Command view_command(CLI::App& app, Setup& setup);
 
-Command make_scene_command(CLI::App& make); // a part of `make`
+// Parts of `make`, and of `levels`.
+Command make_scene_command(CLI::App& make);
+Command precompute_command(CLI::App& levels, Setup& setup);
+Command selection_info_command(CLI::App& levels);
 
 } // namespace unseen::app

@@ -18,7 +18,6 @@
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
-#include "hiding.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "viewer_overlay.h"

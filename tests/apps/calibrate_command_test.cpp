@@ -197,23 +197,6 @@ TEST_F(CalibrateCommandTest, PhotometersMakeDisplays) {
     EXPECT_EQ(run({"calibrate", "--display", "display.json", "--simulate", "castle", "--trials", "5"}).status, 0);
 }
 
-TEST_F(CalibrateCommandTest, TheChartIsAPicture) {
-    const Outcome outcome = run({"calibrate", "--chart", "-o", "chart.png"});
-    if (outcome.status == 1 && outcome.err.find("OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    const auto chart = require(unseen::perception::read_image(path("chart.png")));
-    EXPECT_EQ(chart->image.width, 1600);
-    EXPECT_EQ(chart->image.height, 1200);
-    const auto spread = [&](int y) {
-        float lo = 1, hi = 0;
-        for (int x = 0; x < 1600; ++x)
-            lo = std::min(lo, chart->image.at(x, y)), hi = std::max(hi, chart->image.at(x, y));
-        return hi - lo;
-    };
-    EXPECT_GT(spread(1199), 0.9f);
-    EXPECT_LT(spread(0), 0.02f);
-}
-
 TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
     const std::vector<Words> wrong = {{"--simulate", "castle", "--trials", "0"},
                                       {"--simulate", "castle", "--trials", "1.5"},
@@ -221,15 +204,11 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
                                       {"--simulate", "castle", "--seed", "-1"},
                                       {"--simulate", "castle", "--method", "3ifc"},
                                       {"--simulate", "castle", "-o", "x.txt"},
-                                      {"--simulate", "castle", "--chart"},
                                       {"--photometer", "p.csv"},
-                                      {"--chart", "-o", "x.json"},
                                       {"--simulate", "castle", "--luminance", "0"},
                                       {"--simulate", "castle", "--frequencies", "4"},
                                       {"--simulate", "castle", "--settings", "9"},
                                       {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
-                                      {"--chart", "--seed", "2"},
-                                      {"--chart", "--wide"},
                                       {"--gamma", "--resume", "state.json"}};
     for (Words words : wrong) {
         words.insert(words.begin(), "calibrate");

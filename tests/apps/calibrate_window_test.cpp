@@ -123,13 +123,4 @@ TEST_F(CalibrateWindowTest, GammaIsMatched) {
     EXPECT_TRUE(unseen::perception::read_image(path("g.png")));
 }
 
-TEST_F(CalibrateWindowTest, TheChartStaysUntilAKey) {
-    if (!open({"--chart", "--screenshot", "c.png"})) GTEST_SKIP() << "no window: " << errors();
-    window().title_with("chart");
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    window().press(XK_space);
-    EXPECT_EQ(ended(), 0) << errors();
-    EXPECT_TRUE(unseen::perception::read_image(path("c.png")));
-}
-
 } // namespace calibrate_window_test

@@ -1,4 +1,4 @@
-// unseen csf: one number, rows of numbers, the table, and the plot.
+// unseen csf: one number, and the table.
 #include "run_command.h"
 
 #include <unseen/perception/image.h>
@@ -53,7 +53,6 @@ TEST_F(CsfCommandTest, GivesTheClassicalModelsAndTheColourBranches) {
 TEST_F(CsfCommandTest, MotionMakesFineDetailFadeAndPursuitBringsItBack) {
     const auto with = [&](Words more) { return sensitivity(joined({"--frequency", "8", "--luminance", "100"}, more)); };
     EXPECT_LT(with({"--velocity", "10"}), 0.1 * with({}));
-    EXPECT_EQ(with({"--velocity", "10", "--pursuit"}), with({"--velocity", std::to_string(10 - 8.35)}));
     EXPECT_LT(with({"--temporal", "20"}), with({}));
     EXPECT_NEAR(with({"--velocity", "10", "--table"}) / with({"--velocity", "10"}), 1, 0.005);
     EXPECT_NEAR(with({"--temporal", "8", "--table", "--field", "nasal", "--eccentricity", "5"}) /
@@ -67,11 +66,9 @@ TEST_F(CsfCommandTest, ContradictionsAreRefused) {
         {{"--temporal", "8", "--velocity", "1"}, "exclude each other"},
         {{"--model", "stela", "--csf", "castle"}, "--model and --csf exclude each other"},
         {{"--velocity", "-1"}, "0 or more"},
-        {{"--pursuit"}, "--velocity"},
         {{"--distance", "0"}, "above 0"},
         {{"--distance", "3"}, "--distance needs --model daly"},
-        {{"--plot", "csf.png"}, "leave --frequency away"},
-        {{"--table", "--save-table", "table.json"}, "leave these options away"},
+        {{"--table", "--save-table", "table.json"}, "it holds all of them"},
         {{"--table", "--area", "1"}, "--area"},
         {{"--model", "barten"}, "barten"},
         {{"--csf", "barten"}, "barten-1999"},
@@ -105,60 +102,6 @@ TEST_F(CsfCommandTest, TheWorstFieldIsTheMoreSensitive) {
     EXPECT_GT(in_field("nasal"), in_field("temporal"));
     EXPECT_EQ(sensitivity(words), in_field("nasal"));
     EXPECT_EQ(in_field("worst"), in_field("nasal"));
-}
-
-TEST_F(CsfCommandTest, AppendsSensitivityToRows) {
-    const std::string rows = "# measured on a rainy day\n"
-                             "subject,frequency,luminance,eccentricity,area,field\n"
-                             "anna,4,100,0,1,nasal\n"
-                             "\n"
-                             "ben,8, 20 ,10,,\r\n";
-    const Outcome outcome = succeed({"csf", "--csv", "-"}, rows);
-    std::istringstream lines(outcome.out);
-    Words line(5);
-    for (std::string& l : line) ASSERT_TRUE(std::getline(lines, l));
-    EXPECT_EQ(line[0], "# measured on a rainy day");
-    EXPECT_EQ(line[1], "subject,frequency,luminance,eccentricity,area,field,sensitivity");
-    EXPECT_EQ(line[3], "");
-    ASSERT_THAT(line[2], HasSubstr("anna,4,100,0,1,nasal,"));
-    ASSERT_THAT(line[4], HasSubstr("ben,8, 20 ,10,,,"));
-    const auto last = [](const std::string& l) { return std::strtod(l.c_str() + l.rfind(',') + 1, nullptr); };
-    EXPECT_NEAR(last(line[2]),
-                sensitivity({"--frequency", "4", "--luminance", "100", "--area", "1", "--field", "nasal"}), 1e-11);
-    EXPECT_NEAR(last(line[4]), sensitivity({"--frequency", "8", "--luminance", "20", "--eccentricity", "10"}), 1e-11);
-}
-
-TEST_F(CsfCommandTest, MissingColumnsTakeTheOptions) {
-    write_text(path("s.csv"), "frequency\n4\n");
-    const Outcome outcome = succeed({"csf", "--csv", "s.csv", "--luminance", "50", "--eccentricity", "5"});
-    const double expected = sensitivity({"--frequency", "4", "--luminance", "50", "--eccentricity", "5"});
-    EXPECT_NEAR(std::strtod(outcome.out.c_str() + outcome.out.rfind(',') + 1, nullptr), expected, 1e-11);
-}
-
-TEST_F(CsfCommandTest, BadRowsNameTheirLineAndPrintNothing) {
-    const std::vector<std::pair<std::string, std::string>> bad = {
-        {"", "names of the columns"},
-        {"frequency,luminance\n4,100\n4\n", "line 3"},
-        {"frequency,luminance\n4,many\n", "line 2: luminance"},
-        {"frequency,luminance\nnan,100\n", "line 2: frequency"},
-        {"frequency,luminance\n0,100\n", "line 2"},
-        {"frequency,luminance\n4,1e400\n", "line 2: luminance"},
-        {"frequency,luminance,field\n4,100,upper\n", "line 2: field"},
-        {"frequency\n4\n", "line 2: --luminance"},
-        {"frequency,luminance,velocity\n4,100,-1\n", "line 2"},
-        {"frequency,luminance,frequency\n4,100,5\n", "line 1: column 3, 'frequency', is there before"},
-        {"frequency,lumi\x1b[31mnance\n4,100\n", "line 1: column 15 is a control character"},
-        {"frequency,luminance,note\n4,100,\xc2\x9b\n", "line 2: column 7 is a control character"},
-        {std::string("frequency,luminance\n4,100\n\0", 27), "line 3: column 1 is a control character"},
-        {"frequency,luminance,velocity,temporal\n4,100,1,8\n", "line 2: no sensitivity: give a temporal"},
-    };
-    for (const auto& [rows, expected] : bad) {
-        const Outcome outcome = run({"csf", "--csv", "-"}, rows);
-        EXPECT_EQ(outcome.status, 1) << rows;
-        EXPECT_EQ(outcome.out, "") << rows;
-        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
-        EXPECT_THAT(outcome.err, HasSubstr(expected)) << rows;
-    }
 }
 
 TEST_F(CsfCommandTest, TheTableFollowsTheFormula) {
@@ -217,22 +160,6 @@ TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
         sensitivity({"--model", "barten-1999", "--table", "--velocity", "5", "--frequency", "5", "--luminance", "12"}));
     EXPECT_EQ(sensitivity({"--csf", "daly", "--frequency", "5", "--luminance", "12"}),
               sensitivity({"--model", "daly", "--table", "--frequency", "5", "--luminance", "12"}));
-    // A row cannot have conditions that the table has not.
-    EXPECT_THAT(run({"csf", "--table", "--csv", "-"}, "frequency,luminance,velocity\n4,100,3\n"),
-                fails(1, HasSubstr("line 2")));
-}
-
-TEST_F(CsfCommandTest, PlotsCurves) {
-    ASSERT_EQ(run({"csf", "--plot", "csf.png"}).status, 0);
-    const auto plot = require(unseen::perception::read_image(path("csf.png")));
-    EXPECT_GE(plot->image.width, 600);
-    std::size_t coloured = 0; // curves are, axes and text are not
-    for (std::size_t i = 0; i + 2 < plot->image.values.size(); i += 3)
-        coloured += std::abs(plot->image.values[i] - plot->image.values[i + 2]) > 0.2f;
-    EXPECT_GT(coloured, 2000u);
-    ASSERT_EQ(run({"csf", "--plot", "csf.svg"}).status, 0);
-    EXPECT_THAT(read_text(path("csf.svg")), HasSubstr("<svg"));
-    EXPECT_EQ(run({"csf", "--plot", "csf.gif"}).status, 2);
 }
 
 } // namespace csf_command_test

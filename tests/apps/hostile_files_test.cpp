@@ -43,7 +43,7 @@ TEST_F(HostileFilesTest, WaitForNoPipeThatNobodyWritesToAndReadNoDevice) {
                                        {"render", "ball.vdt", "-o", "o.png", "--observer"},
                                        {"render", "ball.vdt", "-o", "o.png", "--csf"},
                                        {"render", "ball.vdt", "-o", "f%d.png", "--path"},
-                                       {"csf", "--csv"},
+                                       {"csf", "--frequency", "4", "--luminance", "1", "--csf"},
                                        {"compare", "pipe"},
                                        {"study", "analyse"},
                                        {"info"},

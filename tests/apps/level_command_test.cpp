@@ -65,8 +65,8 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
 }
 
 TEST_F(LevelCommandTest, APathAndItsTotals) {
-    const Outcome flown = render({"--method", "perceptual", "--maps", "rpg99", "--half-floats", "--map-block", "2",
-                                  "--path", "orbit:1:9", "-o", "f%02d.png", "--json", "stats.json"});
+    const Outcome flown = render({"--method", "perceptual", "--maps", "rpg99", "--path", "orbit:1:9", "-o", "f%02d.png",
+                                  "--json", "stats.json"});
     ASSERT_EQ(flown.status, 0) << flown.err;
     const Json json = Json::parse(read_text(path("stats.json")));
     ASSERT_EQ(json["frames"].size(), 9u);
@@ -88,8 +88,7 @@ TEST_F(LevelCommandTest, APathAndItsTotals) {
     EXPECT_LT(totals["control_renderings"], totals["renderings"]);
     EXPECT_GT(totals["mean_ms"]["maps"], 0);
     // The same once more.
-    const Outcome again = render({"--method", "perceptual", "--maps", "rpg99", "--half-floats", "--map-block", "2",
-                                  "--path", "orbit:1:9", "--json", "-"});
+    const Outcome again = render({"--method", "perceptual", "--maps", "rpg99", "--path", "orbit:1:9", "--json", "-"});
     ASSERT_EQ(again.status, 0) << again.err;
     for (std::size_t i = 0; i < 9; ++i)
         EXPECT_EQ(again.json()["frames"][i]["levels"], json["frames"][i]["levels"]) << i;
@@ -109,17 +108,16 @@ TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
 }
 
 TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
-    for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
-        const char* shadows = show == "layers" ? "--shadows" : "--no-shadows"; // with a lamp's, seconds each
-        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, shadows});
+    for (const std::string show : {"maps", "levels"}) {
+        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show, "--no-shadows"});
         ASSERT_EQ(drawn.status, 0) << drawn.err;
         const auto picture = require(unseen::perception::read_image(path(show + ".png")));
-        const int panels = show == "levels" ? 1 : show == "layers" ? 6 : 5;
+        const int panels = show == "levels" ? 1 : 5;
         EXPECT_GE(picture->image.width, panels * width + (panels - 1) * 4) << show;
     }
     // One object is in no layers.
     ASSERT_EQ(run({"make", "scene", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
-    for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
+    for (const std::string show : {"maps", "levels"}) {
         succeed({"levels", "scene.glb", "--size", "48x36", "--method", "perceptual", "-o", show + ".png", "--show",
                  show, "--no-shadows"});
     }
@@ -151,7 +149,7 @@ TEST_F(LevelCommandTest, ASceneWithoutObjectsHasItsBackground) {
     const auto picture = require(unseen::perception::read_image(path("area.pfm")));
     const auto [least, most] = std::ranges::minmax(picture->image.values);
     EXPECT_GT(most, 2 * least) << "there are walls";
-    for (const std::string show : {"layers", "combinations", "maps", "levels"})
+    for (const std::string show : {"maps", "levels"})
         EXPECT_EQ(run({"levels", "scene.gltf", "--size", "64x48", "--method", "perceptual", "-o", show + ".png",
                        "--show", show})
                       .status,
@@ -168,11 +166,10 @@ TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
     const std::vector<std::pair<Words, std::string>> wrong = {
         {{}, "-o is required, or --json"},
         {{"--bias", "2", "--json", "-"}, "--bias needs --method distance or --method area"},
-        {{"--method", "area", "--layers", "3", "--json", "-"}, "--layers and --method area exclude each other"},
-        {{"--layers", "17", "--json", "-"}, "--layers"},
+        {{"--method", "area", "--maps", "rpg99", "--json", "-"}, "--maps and --method area exclude each other"},
         {{"--method", "area", "--fade", "3", "-o", "a.png"}, "--fade needs --path"},
         {{"--method", "area", "--show", "maps", "-o", "a.png"}, "only --method perceptual"},
-        {{"--method", "area", "--show", "cost", "-o", "a.png"}, "must be layers"},
+        {{"--method", "area", "--show", "cost", "-o", "a.png"}, "must be maps"},
         {{"--method", "area", "--full", "--json", "-"}, "no option '--full'"},
         {{"--method", "area", "--samples", "4", "--json", "-"}, "no option '--samples'"},
         {{"--method", "area", "--triangles", "9", "--json", "-"}, "--triangles needs --selection"},

@@ -102,7 +102,7 @@ TEST_F(TextureCommandTest, CanBeLeftOutOrReplaced) {
     if (const auto seen = draw("t.vdt", {"--no-texture"}, &drawn)) {
         EXPECT_NEAR(seen->first, seen->second, 0.1);
         EXPECT_FALSE(effect_named(drawn, "texture")["on"].get<bool>());
-        EXPECT_THAT(effect_named(drawn, "texture")["why"].get<std::string>(), HasSubstr("--no-texture"));
+        EXPECT_THAT(effect_named(drawn, "texture")["why"].get<std::string>(), HasSubstr("--texture none"));
     }
     EXPECT_THAT(complaint({"render", "t.vdt", "-o", "x.png", "--texture", "grey.png"}), HasSubstr("unseen build"));
     EXPECT_THAT(run({"build", "square.obj", "-o", "x.vdt", "--texture", "grey.png", "--no-texture"}),
@@ -263,7 +263,7 @@ TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
     write_png("p.png", halves());
     write_square("p.png");
     build("square.obj");
-    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--chroma"}), HasSubstr("--no-texture"));
+    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--chroma"}), HasSubstr("--texture none"));
     write_text(path("l.json"), R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.5}]})");
     if (const auto seen = draw("t.vdt", {"--lights", "l.json", "--full"})) {
         EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.6, 1);

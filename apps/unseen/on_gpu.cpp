@@ -1,6 +1,8 @@
-#include "hiding.h"
+#include "on_gpu.h"
 
+#include <unseen/render/context.h>
 #include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/gpu_judge.h>
 
 namespace unseen::app {
 
@@ -15,6 +17,17 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
     const auto own = render::Context::headless();
     if (!own) return own.error();
     return session::simplify_as_seen(session, *own, view, request, options);
+}
+
+Result<Verdict> compare_on_gpu(const perception::Image& reference, const perception::Image& test,
+                               const perception::JudgeOptions& options) {
+    const auto context = render::Context::headless();
+    if (!context) return context.error();
+    auto judge = session::GpuJudge::create(*context, reference, options);
+    if (!judge) return judge.error();
+    auto judgement = judge->judge(test);
+    if (!judgement) return judgement.error();
+    return Verdict{std::move(*judgement), context->renderer_name()};
 }
 
 } // namespace unseen::app
