@@ -173,7 +173,8 @@ void Setup::add_light() {
         ->group(in_file_alone);
     group
         .add_option("--lights", o.lights,
-                    "Lights in place of these three: directional, point, spot, headlight, ambient, with highlights; in "
+                    "Lights in place of --light, ambient and fill-light: directional, point, spot, headlight, ambient, "
+                    "with highlights; in "
                     "'unseen fly' and 'unseen view' they may move")
         ->type_name("FILE.json");
     group.add_flag_function(

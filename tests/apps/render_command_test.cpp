@@ -171,6 +171,8 @@ TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     EXPECT_LT(sum(first), everywhere);
     const double unsure = sum(triangles({"--gaze-mode", "simulated", "--seed", "7", "--gaze-error", "5"}));
     EXPECT_GT(unsure, sum(first)) << "an error widens the fovea";
+    EXPECT_EQ(sum(triangles({"--gaze-mode", "simulated", "--tracker", "seed=7,error=5"})), unsure)
+        << "as it is spelt now";
     EXPECT_LE(unsure, everywhere);
     EXPECT_LE(sum(triangles({"--gaze-mode", "simulated", "--seed", "7", "--gaze-latency", "60"})), everywhere);
     triangles({"--gaze-mode", "head"});
@@ -233,6 +235,7 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
                                                 {"--gaze-error", "-1"},
                                                 {"--gaze-error", "nan"},
                                                 {"--gaze-latency", "1e9"},
+                                                {"--gaze", "1", "2", "--tracker", "jitter=1"},
                                                 {"--gaze-mode", "head", "--gaze-trace", "gap.csv"},
                                                 {"--gaze", "1", "2", "--gaze-mode", "head"},
                                                 {"--seed", "3"},
