@@ -16,7 +16,6 @@
 #include <unseen/session/load.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
-#include "build_team.h"
 #include "option_names.h"
 #include "options.h"
 #include "other_libraries.h"

@@ -1,4 +1,4 @@
-#include "build_team.h"
+#include "process_team.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,7 +1,9 @@
 // unseen make: larger meshes and scenes, to try things out with.
+#include <algorithm>
 #include <functional>
 #include <memory>
 
+#include <make_scene.h>
 #include <subdivide.h>
 #include <unseen/meshio/mesh_file.h>
 
@@ -15,6 +17,8 @@
 
 namespace unseen::app {
 namespace {
+
+// ---- larger meshes
 
 struct SubdivideArguments {
     ViewOptions& view;
@@ -87,6 +91,109 @@ Command subdivide_command(CLI::App& make, Setup& setup) {
     verb->footer("A closed mesh stays closed, and the result depends on the mesh and the options alone.\n\n"
                  "Examples:\n  unseen make subdivide dragon.ply -o dragon_14m.ply --times 2\n"
                  "  unseen make subdivide dragon.ply -o dragon_28m.ply --triangles 28000000 --noise 0.01");
+    return {verb, [a] { return run(*a); }};
+}
+
+// ---- scenes
+
+struct SceneArguments {
+    std::string out, json;
+    std::vector<std::string> statues;
+    TriangleCount triangles;
+    MakeSceneOptions options;
+};
+
+Result<int> run(SceneArguments& a) {
+    if (const auto ready = check_outputs(a.statues, {a.out, a.json}); !ready) return ready.error();
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    a.options.statues.assign(a.statues.begin(), a.statues.end());
+    const auto made = make_scene(a.out, a.options);
+    if (!made) return made.error();
+    for (const std::string& sentence : made->left_out) print_note(sentence);
+    const Json json = {{"objects", made->objects},
+                       {"triangles", made->triangles},
+                       {"meshes", made->meshes},
+                       {"mesh_triangles", made->mesh_triangles},
+                       {"background_triangles", made->background_triangles}};
+    if (auto ok = report->prepare(json); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print_line("made " + grouped(made->objects) + (made->objects == 1 ? " object" : " objects") + " of " +
+               grouped(made->triangles) + " triangles, and " + grouped(made->background_triangles) +
+               " of background; " + grouped(made->meshes) + " different meshes");
+    print_written({a.out, a.json});
+    return exit_done;
+}
+
+CLI::App* add_scene_part(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
+    CLI::App* make =
+        verb.add_subcommand("scene", "Make a scene of many objects, with a camera, lights and a background");
+    make->add_option_function<std::string>(
+            "KIND",
+            [a](const std::string& kind) {
+                a->options.kind = kind == "museum"     ? SceneKind::museum
+                                  : kind == "treasure" ? SceneKind::treasure
+                                  : kind == "house"    ? SceneKind::house
+                                  : kind == "building" ? SceneKind::building
+                                  : kind == "spheres"  ? SceneKind::spheres
+                                  : kind == "bunnies"  ? SceneKind::bunnies
+                                  : kind == "models"   ? SceneKind::models
+                                                       : SceneKind::forest;
+            },
+            "museum: a statue behind a gate, lit through a barred window; treasure: a chamber of statues; "
+            "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
+            "trees; building: fifty furnished rooms with doors between them; spheres, bunnies (two of the statues) and "
+            "models (all of them): forty objects on a plain, to "
+            "select "
+            "levels of detail in")
+        ->required()
+        ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models")
+        ->check(one_of({"museum", "treasure", "house", "forest", "building", "spheres", "bunnies", "models"}));
+    make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
+    add_triangles_option(
+        *make, a->triangles,
+        "Roughly N in all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+        "(default: museum 0.3, house 1.5, treasure and forest 2, building 5, spheres 1.1, bunnies and models 2.8 "
+        "million); a forest has 0.3 million at least")
+        ->type_name("N");
+    make->add_option("--mesh", a->statues,
+                     "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "
+                     "installed). Those with more triangles than a statue may have are left out; the others are made "
+                     "here. Bunnies and models take the first two or four, simplified where they have more")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
+    CLI::Option* spacing = make->add_option("--bars-per-metre", a->options.bars_per_metre, "In the museum (default: 8)")
+                               ->type_name("N")
+                               ->check(within(1, 100));
+    CLI::Option* bars = add_choice<MuseumBars, MuseumBars>(*make, "--bars", a->options.bars,
+                                                           {{"both", MuseumBars::both},
+                                                            {"gate", MuseumBars::gate},
+                                                            {"window", MuseumBars::window},
+                                                            {"none", MuseumBars::none}},
+                                                           "In the museum: both (default), gate, window or none");
+    add_seed_option(*make, a->options.seed, "For what is strewn about");
+    add_json_option(*make, a->json);
+    make->callback([a, bars, spacing] {
+        if (a->options.kind != SceneKind::museum && (*bars || *spacing))
+            refuse("--bars and --bars-per-metre act in the museum alone.");
+        if (a->triangles.share > 0) refuse("--triangles: must be a number here, not a share.");
+        a->options.triangles = a->triangles.triangles;
+        if (a->options.triangles != 0 && (a->options.triangles < MakeSceneOptions::least_triangles ||
+                                          a->options.triangles > MakeSceneOptions::most_triangles))
+            refuse("--triangles: from 10,000 to 100,000,000.");
+    });
+    return make;
+}
+
+Command make_scene_command(CLI::App& make) {
+    auto a = std::make_shared<SceneArguments>();
+    CLI::App* verb = add_scene_part(make, a);
+    verb->footer("Examples:\n  unseen make scene museum -o museum.glb --bars-per-metre 12\n"
+                 "  unseen make scene museum -o open.glb --bars none --mesh dragon.ply\n"
+                 "  unseen make scene forest -o forest.glb --triangles 10M --seed 7\n"
+                 "  unseen render museum.glb -o museum.png\n"
+                 "  unseen simplify forest.glb -o seen.glb --triangles 5%");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -5,7 +5,6 @@
 #include <unseen/session/selection.h>
 #include <unseen/session_gpu/precompute_selections.h>
 
-#include "build_team.h"
 #include "interruption.h"
 #include "output_files.h"
 #include "process_team.h"

@@ -36,13 +36,12 @@ struct StudyArguments {
     std::string folder = {};
     std::optional<StudyTask> task = {};
     bool levels = false;
-    std::optional<double> views = {}, degrees = {}, samples = {}, repeats = {}, seed = {};
+    std::optional<double> views = {}, samples = {}, repeats = {}, seed = {};
     std::vector<double> distances = {};
     session::LevelControlOptions control = {};
     // run
     std::string subject = "unnamed", simulate = {}, answers = {};
     StudyWindowOptions window = {};
-    std::optional<double> criterion = {};
     // analyse
     std::vector<std::string> files = {};
     std::string json = {};
@@ -98,7 +97,7 @@ session::StudyPicturesOptions pictures_of(const StudyArguments& a, std::size_t m
     const bool is_scene = session.scene().objects.size() > 1 || !session.scene().backdrop.empty();
     options.views = static_cast<int>(a.views.value_or(is_scene ? 1 : 5));
     // All around a model; a scene is looked at from about where its camera is.
-    options.degrees = a.degrees.value_or(is_scene ? 3 : 360.0 / options.views);
+    options.degrees = is_scene ? 3 : 360.0 / options.views;
     options.samples = static_cast<int>(a.samples.value_or(64));
     if (!a.distances.empty()) options.distances = a.distances;
     return options;
@@ -201,8 +200,7 @@ Result<void> simulate(const StudyArguments& a, const Study& study, const percept
                       const Trials& trials, Answers& answers) {
     const auto person = perception::person(a.simulate);
     if (!person) return person.error();
-    calibration::PictureObserver observer{.person = *person, .seed = study.seed};
-    if (a.criterion) observer.criterion = *a.criterion;
+    const calibration::PictureObserver observer{.person = *person, .seed = study.seed};
     SimulatedSubject subject(observer, display, study);
     ProgressBar bar("answering");
     for (std::size_t i = answers.size(); i < trials.size(); ++i) {
@@ -389,9 +387,6 @@ void add_make(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments
         make->add_option(name, value, text)->type_name("N")->check(whole(1, most));
     };
     count("--views", a->views, 360, "Views around each model (default: 5; of a scene 1)");
-    make->add_option("--degrees", a->degrees, "Angle from one view to the next (default: all around; in a scene 3)")
-        ->type_name("A")
-        ->check(finite_numbers(1));
     make->add_option("--distances", a->distances,
                      "Distances of the eye, as multiples of the view's; all views from each (default: 1)")
         ->type_name("X ...")
@@ -431,12 +426,6 @@ void add_run(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments>
                          "Nobody looks: an observer answers who sees by Barten's model, with noise, "
                          "and is right in three of four at the threshold: median, default or strict")
             ->type_name("PERSON");
-    part->add_option("--criterion", a->criterion,
-                     "With --simulate and the task differ: how many standard deviations of noise a difference must "
-                     "exceed (default: 1, 16% false alarms)")
-        ->type_name("X")
-        ->check(within(-5, 5))
-        ->needs(simulate);
     part->add_flag("--full-screen", a->window.full_screen, "On the primary monitor")->excludes(simulate);
     part->add_option("--seconds", a->window.seconds, "Show each pair for so long (default: until it is answered)")
         ->type_name("T")

@@ -24,8 +24,7 @@ Command study_command(CLI::App& app, Setup& setup);
 Command tradeoff_command(CLI::App& app, Setup& setup);
 Command view_command(CLI::App& app, Setup& setup);
 
-// Parts of `make`, and of `levels`.
-Command make_scene_command(CLI::App& make);
+// Parts of `levels`.
 Command precompute_command(CLI::App& levels, Setup& setup);
 Command selection_info_command(CLI::App& levels);
 
