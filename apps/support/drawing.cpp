@@ -236,6 +236,11 @@ Result<std::vector<glm::u8vec4>> Drawing::layer_pixels() const {
     return codes;
 }
 
+Result<void> Drawing::write(const std::filesystem::path& file) const {
+    const auto drawn = image();
+    return drawn ? perception::write_image(file, *drawn) : drawn.error();
+}
+
 double Drawing::text_width(std::string_view text, double height_px) {
     const std::unique_ptr<cairo_surface_t, End> surface(cairo_image_surface_create(CAIRO_FORMAT_RGB24, 1, 1));
     const std::unique_ptr<cairo_t, End> context(cairo_create(surface.get()));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -56,6 +57,8 @@ public:
 
     // What was drawn, of an image; of a layer, over black. Errors are those of drawing.
     Result<perception::Image> image() const;
+    // The same as a file of whatever kind the ending says. It is replaced whole or not at all.
+    Result<void> write(const std::filesystem::path& file) const;
     // Codes, and how much of the pixel they cover, which is not multiplied in; row-major from the top left.
     Result<std::vector<glm::u8vec4>> layer_pixels() const;
 

@@ -142,8 +142,7 @@ Result<void> write_plot(const std::filesystem::path& file, const PanelPlot& plot
     auto drawing = Drawing::create(plot.width, height_of(plot), plot_paper);
     if (!drawing) return drawing.error();
     draw(plot, *drawing);
-    const auto image = drawing->image();
-    return image ? perception::write_image(file, *image) : image.error();
+    return drawing->write(file);
 }
 
 } // namespace unseen::app
