@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <iterator>
 
-#include <drawing.h>
+#include <printable.h>
 
 namespace unseen::app {
 namespace {

@@ -1,7 +1,6 @@
 #include "drawing.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -9,6 +8,8 @@
 #include <vector>
 
 #include <cairo.h>
+
+#include "printable.h"
 
 namespace unseen::app {
 namespace {
@@ -66,22 +67,6 @@ std::uint32_t code_of(float value) {
 } // 0 for NaN
 
 } // namespace
-
-std::size_t printable_bytes(std::string_view text) {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-    const unsigned char first = byte(0);
-    if (first < 0x80) return first >= 0x20 && first != 0x7f;
-    const std::size_t length = first >= 0xf0 ? 4 : first >= 0xe0 ? 3 : 2;
-    if (first < 0xc2 || first > 0xf4 || text.size() < length) return 0;
-    char32_t code = first & (0xff >> (length + 1));
-    for (std::size_t i = 1; i < length; ++i) {
-        if ((byte(i) & 0xc0) != 0x80) return 0;
-        code = code << 6 | (byte(i) & 0x3f);
-    }
-    constexpr std::array<char32_t, 5> least = {0, 0, 0xa0, 0x800, 0x10000}; // by length, less the controls below 0xa0
-    const bool is_surrogate = code >= 0xd800 && code < 0xe000;
-    return code >= least[length] && code <= 0x10ffff && !is_surrogate ? length : 0;
-}
 
 void Drawing::End::operator()(cairo_t* context) const { cairo_destroy(context); }
 void Drawing::End::operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }

@@ -21,9 +21,6 @@ struct _cairo_surface;
 
 namespace unseen::app {
 
-// Bytes of the printable character in UTF-8 that the text begins with; 0: there is none.
-std::size_t printable_bytes(std::string_view text);
-
 // Where a line of text is held.
 enum class Align { left, centre, right };
 
