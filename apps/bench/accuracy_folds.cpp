@@ -31,7 +31,7 @@ TreeBytes bytes_a_triangle(const session::Session& session) {
         if (!seen.insert(&tree.data()).second) continue;
         all += static_cast<double>(tree.byte_size());
         triangles += tree.triangle_count();
-        for (const vdtree::AttributeInfo& attribute : tree.attributes())
+        for (const vdtree::Attribute& attribute : tree.attributes())
             attributes += static_cast<double>(attribute.count * attribute.element_bytes);
     }
     return {all / triangles, (all - attributes) / triangles};

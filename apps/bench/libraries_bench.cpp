@@ -23,7 +23,7 @@ vdtree::Mesh cut_to(const vdtree::VertexTree& tree, vdtree::Index triangles) {
         for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = t.displacement()[nodes[i]] * scale;
     };
     vdtree::Cut cut(tree);
-    cut.adjust(displacement, {.triangle_budget = triangles});
+    cut.adjust(displacement, triangles);
     return vdtree::extract_mesh(cut);
 }
 

@@ -46,7 +46,7 @@ Result<vdtree::Mesh> with_at_most(const vdtree::Mesh& mesh, std::uint64_t triang
         [&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> nodes, std::span<float> costs) {
             for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = sizes[nodes[i]];
         },
-        {.visibility = {}, .triangle_budget = static_cast<vdtree::Index>(triangles)});
+        static_cast<vdtree::Index>(triangles));
     return bare(vdtree::extract_mesh(cut));
 }
 

@@ -92,14 +92,13 @@ Projection projection_of(const vdtree::View& view, const vdtree::Similarity& pla
 
     if (view.orthographic_height) return parallel(view, view_from_unit, world_unit, frame.radius);
 
-    const vdtree::WindowPlane window = vdtree::window_plane(view);
     glm::dmat4 clip_from_view(0);
-    clip_from_view[0][0] = 1 / window.half.x;
-    clip_from_view[1][1] = 1 / window.half.y;
+    clip_from_view[0][0] = 1 / axes.half_window.x;
+    clip_from_view[1][1] = 1 / axes.half_window.y;
     clip_from_view[2][0] = view.shift.x;
     clip_from_view[2][1] = view.shift.y;
     clip_from_view[2][3] = -1;
-    clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, glm::abs(window.middle) + window.half);
+    clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, glm::abs(axes.window) + axes.half_window);
 
     Projection projection;
     projection.clip_from_unit = clip_from_view * view_from_unit;

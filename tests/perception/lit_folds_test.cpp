@@ -143,7 +143,7 @@ TEST(LitFolds, CostNothingWhereNoLightReaches) {
 
 std::string bytes_of(const VertexTree& tree) {
     std::string all;
-    for (const AttributeInfo& info : tree.attributes()) {
+    for (const Attribute& info : tree.attributes()) {
         all += info.name + ' ';
         if (info.name == record_name) {
             const auto bytes = std::as_bytes(tree.attribute<FoldRecord>(record_name));

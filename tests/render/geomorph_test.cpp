@@ -13,7 +13,6 @@ using namespace unseen::render;
 using namespace unseen::render::testing;
 using unseen::vdtree::Cut;
 using unseen::vdtree::Geomorph;
-using unseen::vdtree::GeomorphOptions;
 using unseen::vdtree::NodeId;
 using unseen::vdtree::View;
 
@@ -53,7 +52,7 @@ protected:
         return stats ? stats->folds + stats->unfolds : 0;
     }
 
-    Geomorph geomorph(double seconds) { return std::move(*require(Geomorph::create(tree(), {.seconds = seconds}))); }
+    Geomorph geomorph(double seconds) { return std::move(*require(Geomorph::create(tree(), seconds))); }
 
     template <class Drawn>
     Frame draw(Renderer& renderer, const Drawn& drawn, const View& view, int samples = 4) {
@@ -143,7 +142,7 @@ TEST_F(GeomorphTest, AVertexInTheMiddleIsDrawnThere) {
     // picture.
     Scene scene(rectangle({-0.5, -0.5}, {0.5, 0.5}, 0, grey(0.8f)));
     auto renderer = require(Renderer::create(context(), scene.tree));
-    auto made = require(Geomorph::create(scene.tree, {.seconds = 1}));
+    auto made = require(Geomorph::create(scene.tree, 1));
     Cut cut(scene.tree);
     ASSERT_TRUE(made->step(cut, 0));
     cut.unfold_all();

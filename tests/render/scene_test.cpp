@@ -163,8 +163,7 @@ TEST_F(SceneTest, GlidesOfOneCutDoNotMoveAnotherOfItsTree) {
     GpuCut still(tree), gliding(tree);
     ASSERT_TRUE(still.follow(scene.cut));
     Cut followed(scene.tree);
-    auto geomorph =
-        require(Geomorph::create(scene.tree, {.seconds = 1, .jump_share = std::numeric_limits<double>::infinity()}));
+    auto geomorph = require(Geomorph::create(scene.tree, 1, std::numeric_limits<double>::infinity()));
     ASSERT_TRUE(geomorph->step(followed, 0));
     followed.unfold_all();
     ASSERT_TRUE(geomorph->step(followed, 0));

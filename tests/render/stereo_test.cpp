@@ -22,13 +22,12 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
     for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = 320, .count = 4, .far_fill = 0.3})) {
         const vdtree::CameraFrame frame = vdtree::camera_frame(look.view);
         const double apart = 0.063, screen = glm::length(look.view.eye - look.view.target); // world units
-        const vdtree::WindowPlane window = vdtree::window_plane(look.view);
         View eyes[2] = {look.view, look.view};
         for (int i = 0; i < 2; ++i) {
             const double aside = (i == 0 ? -0.5 : 0.5) * apart;
             eyes[i].eye += aside * frame.right;
             eyes[i].target += aside * frame.right;
-            eyes[i].shift.x = -aside / screen / window.half.x;
+            eyes[i].shift.x = -aside / screen / frame.half_window.x;
         }
         perception::FoldTestOptions options = look.options;
         options.gaze_px = {};

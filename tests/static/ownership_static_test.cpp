@@ -46,8 +46,6 @@ concept owns_progress = requires(Options options) {
     requires std::is_copy_assignable_v<Options>;
 };
 static_assert(owns_progress<BuildOptions> && owns_progress<meshio::ReadOptions>);
-static_assert(std::is_same_v<decltype(AdjustOptions::visibility), VisibilityTest> &&
-              std::is_copy_assignable_v<AdjustOptions>);
 
 // What cannot be copied is kept only where that is said, and is no temporary.
 struct Unique {
@@ -62,11 +60,6 @@ concept can_refer_to = requires(T&& value) {
 };
 static_assert(can_refer_to<Unique&> && !can_refer_to<Unique>);
 static_assert(std::is_assignable_v<Progress&, std::reference_wrapper<Unique>>);
-
-// An object of a scene refers to its cut and its criterion.
-static_assert(std::is_constructible_v<SceneObject, Cut&, const DistanceCriterion&, Viewpoint>);
-static_assert(!std::is_constructible_v<SceneObject, Cut&, DistanceCriterion, Viewpoint>);
-static_assert(!std::is_constructible_v<SceneObject, Cut, const DistanceCriterion&, Viewpoint>);
 
 // A clusterer's mesh is a view of its own, not a reference to one.
 static_assert(std::is_same_v<decltype(ClusterInput::mesh), MeshView>);

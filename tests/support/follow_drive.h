@@ -198,12 +198,12 @@ private:
             viewpoint_.frusta.assign(in_.below(3), {});
             for (Frustum& frustum : viewpoint_.frusta)
                 for (unsigned planes = in_.below(4); planes > 0; --planes)
-                    frustum.planes.push_back({in_.direction(), radius * in_.between(-2, 3)});
+                    frustum.push_back({in_.direction(), radius * in_.between(-2, 3)});
         }
         if (in_.below(2) == 0) {
             const double step = std::pow(10.0, in_.between(-4, 0));
             for (Frustum& frustum : viewpoint_.frusta)
-                for (Plane& plane : frustum.planes) {
+                for (Plane& plane : frustum) {
                     if (const glm::dvec3 turned = plane.normal + step * in_.direction(); glm::length(turned) > 0.1)
                         plane.normal = glm::normalize(turned);
                     plane.offset += step * radius * in_.between(-1, 1);
@@ -300,8 +300,8 @@ private:
         case 1: viewpoint.eye = {0, 3e18, 0}; break;
         case 2: viewpoint.gaze = glm::dvec3(bad, 0, 0); break;
         case 3: viewpoint.gaze = glm::dvec3(0); break;
-        case 4: viewpoint.frusta = {{{Plane{{0, 0, 1}, bad}}}}; break;
-        case 5: viewpoint.frusta = {{{Plane{{0, 0, 0}, 1}}}}; break;
+        case 4: viewpoint.frusta = {{Plane{{0, 0, 1}, bad}}}; break;
+        case 5: viewpoint.frusta = {{Plane{{0, 0, 0}, 1}}}; break;
         case 6: options.threshold = in_.below(2) ? static_cast<float>(bad) : -0.0f; break;
         case 7: options.hysteresis = in_.below(2) ? static_cast<float>(bad) : 0.5f; break;
         default: options.milliseconds = in_.below(2) ? nan : -1.0; break;

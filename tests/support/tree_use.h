@@ -25,7 +25,7 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     valid &= is_sound || !verify(tree);
     valid &= is_sound == tree.untextured().has_value();
     valid &= is_sound || !conserve_light(tree);
-    for (const AttributeInfo& attribute : tree.attributes()) (void)tree.attribute<std::uint8_t>(attribute.name).size();
+    for (const Attribute& attribute : tree.attributes()) (void)tree.attribute<std::uint8_t>(attribute.name).size();
     for (const double distance : {0.5, 1.5})
         (void)check_lights(tree,
                            {.lights = {{.kind = LightSource::Kind::point, .position = glm::dvec3(distance, 0.1, 0.2)}}})
@@ -56,13 +56,13 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     };
     cut.adjust(bright_ones);
     extract();
-    cut.adjust(bright_ones, {.triangle_budget = tree.triangle_count() / 2});
+    cut.adjust(bright_ones, tree.triangle_count() / 2);
     extract();
     if (is_sound) (void)conserve_light(tree).has_value(); // not those with a texture
     (void)LightBounds::measure(tree).has_value();
     const auto everything = DistanceCriterion::create(tree, {.switch_distance = {DistanceCriterion::always_visible}});
     valid &= everything.has_value();
-    const std::vector<Sphere> occluders = inner_spheres(tree, {.count = 2, .cells = 8}); // quickly made
+    const std::vector<Sphere> occluders = inner_spheres(tree, 2, 8); // quickly made
     for (const glm::dvec3 eye : {glm::dvec3(3, 1, 2), glm::dvec3(1e9, 0, 0)}) {
         (void)cut.follow(*everything, {.eye = eye, .occluders = occluders}).has_value(); // not from within one
         extract();
@@ -70,7 +70,7 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     for (const auto& criterion : {extent_criterion(tree, view, 20), displacement_criterion(tree, view, 2)})
         if (criterion) (void)cut.follow(*criterion, {.eye = view.eye}).has_value();
     extract();
-    if (auto geomorph = Geomorph::create(tree, {.seconds = 1})) {
+    if (auto geomorph = Geomorph::create(tree, 1)) {
         (void)geomorph->step(cut, 0).has_value();
         cut.fold_all();
         (void)geomorph->step(cut, 0.5).has_value();

@@ -32,7 +32,7 @@ Mesh simplified(const VertexTree& tree, Index triangles) {
         for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = t.displacement()[nodes[i]] * scale;
     };
     Cut cut(tree);
-    cut.adjust(displacement, {.triangle_budget = triangles});
+    cut.adjust(displacement, triangles);
     return extract_mesh(cut);
 }
 

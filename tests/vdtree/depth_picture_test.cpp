@@ -1,5 +1,6 @@
 // What a picture's depths hide, against points between others, looked up one by one.
 #include <unseen/vdtree/depth_picture.h>
+#include <unseen/vdtree/internal/footprint.h>
 
 #include <unseen/vdtree/cut.h>
 

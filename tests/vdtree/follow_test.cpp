@@ -200,7 +200,7 @@ public:
             view.target = tree_.origin() + centre_ + 0.3 * radius_ * turn_;
             view.up = {0.1, 1, 0.05};
             if (validate(view)) viewpoint.frusta.push_back(frustum_of(tree_, view));
-            else viewpoint.frusta.push_back({{Plane{{0, 0, 1}, 0}}});
+            else viewpoint.frusta.push_back({Plane{{0, 0, 1}, 0}});
         }
         viewpoint.occluders = occluders_seen_from(eye_, occluders_);
         return viewpoint;
@@ -932,7 +932,7 @@ TEST(FollowBadInput, IsRefusedAndChangesNothing) {
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = infinity}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(0)}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(nan)}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .frusta = {{{Plane{{0, 0, nan}, 0}}}}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .frusta = {{Plane{{0, 0, nan}, 0}}}}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = 0}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = std::nanf("")}));
     EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.hysteresis = 0.5f}));

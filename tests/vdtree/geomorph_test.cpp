@@ -26,8 +26,8 @@ VertexTree built(Mesh mesh, ClustererKind kind) {
     return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .threads = 1})));
 }
 
-Geomorph made(const VertexTree& tree, const GeomorphOptions& options) {
-    return std::move(*require(Geomorph::create(tree, options)));
+Geomorph made(const VertexTree& tree, double seconds = 0.25, double jump_share = 0.25) {
+    return std::move(*require(Geomorph::create(tree, seconds, jump_share)));
 }
 
 struct TreeClass {
@@ -154,7 +154,7 @@ TEST_P(Geomorphs, NothingPopsWhateverTheFollowedCutDoes) {
         const Waves waves(tree, seed);
         std::mt19937_64 random(seed);
         Cut cut(tree);
-        Geomorph geomorph = made(tree, {glide_seconds, std::numeric_limits<double>::infinity()});
+        Geomorph geomorph = made(tree, glide_seconds, std::numeric_limits<double>::infinity());
         waves.adjust(cut, 0);
         ASSERT_TRUE(geomorph.step(cut, 0));
         ASSERT_TRUE(is_same_cut(geomorph.drawn(), cut)) << "the first step is a jump";
@@ -203,7 +203,7 @@ TEST_P(Geomorphs, DrawsNoMoreThanTheLatestFoldsTookAway) {
     const VertexTree tree = GetParam().make();
     const Waves waves(tree, 8);
     Cut cut(tree);
-    Geomorph geomorph = made(tree, {glide_seconds, std::numeric_limits<double>::infinity()});
+    Geomorph geomorph = made(tree, glide_seconds, std::numeric_limits<double>::infinity());
     std::vector<double> folded; // triangles, by frame
     constexpr std::size_t frames_a_glide = 16;
     static_assert(frames_a_glide * frame_seconds > glide_seconds);
@@ -230,7 +230,7 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
     const std::vector<Longest> longest = longest_glides(tree);
     const Sphere sphere = tree.bounding_sphere();
     Cut cut(tree);
-    Geomorph geomorph = made(tree, {});
+    Geomorph geomorph = made(tree);
     std::vector<MovedVertex> before;
     std::vector<NodeId> copy;
     std::uint64_t changes = 0, version = 0;
@@ -299,7 +299,7 @@ protected:
 
     VertexTree tree_ = built(shapes::bumpy_sphere(3, 0.05), ClustererKind::quadric);
     Cut cut_{tree_};
-    Geomorph geomorph_ = made(tree_, {.seconds = 0.5});
+    Geomorph geomorph_ = made(tree_, 0.5);
     NodeId node_ = 0;
 };
 
@@ -375,7 +375,7 @@ TEST_F(OneNode, WhatUnfoldsUnderAGlidingVertexBeginsWhereThatIs) {
 TEST(Geomorph, JumpsAreCutShort) {
     const VertexTree tree = tree_classes[1].make();
     Cut cut(tree);
-    Geomorph geomorph = made(tree, {.seconds = 1, .jump_share = 0.25});
+    Geomorph geomorph = made(tree, 1);
     const Waves waves(tree, 4);
     waves.adjust(cut, 0);
     ASSERT_TRUE(geomorph.step(cut, 0));
@@ -395,7 +395,7 @@ TEST(Geomorph, JumpsAreCutShort) {
 TEST(Geomorph, FewChangesGlideHoweverCoarseTheCut) {
     const VertexTree tree = tree_classes[0].make();
     Cut cut(tree);
-    Geomorph geomorph = made(tree, {});
+    Geomorph geomorph = made(tree);
     ASSERT_TRUE(geomorph.step(cut, 0));
     cut.unfold(VertexTree::root());
     ASSERT_TRUE(geomorph.step(cut, 0));
@@ -420,7 +420,7 @@ TEST(Geomorph, GlidesDownChainsOfAnyDepth) {
     };
     const auto tree = require(build_tree(mesh.view(), chain));
     Cut cut(*tree);
-    Geomorph geomorph = made(*tree, {0.25, std::numeric_limits<double>::infinity()});
+    Geomorph geomorph = made(*tree, 0.25, std::numeric_limits<double>::infinity());
     ASSERT_TRUE(geomorph.step(cut, 0));
     cut.unfold_all();
     ASSERT_TRUE(geomorph.step(cut, 0));
@@ -438,7 +438,7 @@ TEST(Geomorph, InNoTimeIsTheFollowedCut) {
     const VertexTree tree = tree_classes[0].make();
     const Waves waves(tree, 6);
     Cut cut(tree);
-    Geomorph geomorph = made(tree, {0, std::numeric_limits<double>::infinity()});
+    Geomorph geomorph = made(tree, 0, std::numeric_limits<double>::infinity());
     for (int frame = 0; frame < 50; ++frame) {
         waves.adjust(cut, frame);
         ASSERT_TRUE(geomorph.step(cut, frame % 2 ? frame_seconds : 0));
@@ -451,7 +451,7 @@ TEST(Geomorph, TheSameStepsDrawTheSame) {
     const VertexTree tree = tree_classes[0].make();
     const Waves waves(tree, 7);
     Cut cut(tree);
-    Geomorph one = made(tree, {}), other = made(tree, {});
+    Geomorph one = made(tree), other = made(tree);
     std::size_t moved = 0;
     for (int frame = 0; frame < 60; ++frame) {
         waves.adjust(cut, frame);
@@ -472,7 +472,7 @@ TEST(Geomorph, TakesAnotherCutForAChange) {
     Cut one(tree), other(tree);
     waves.adjust(one, 0);
     waves.adjust(other, 3);
-    Geomorph geomorph = made(tree, {});
+    Geomorph geomorph = made(tree);
     ASSERT_TRUE(geomorph.step(one, 0));
     ASSERT_TRUE(geomorph.step(other, 0));
     ASSERT_TRUE(geomorph.step(other, 1));
@@ -485,11 +485,11 @@ TEST(Geomorph, TakesAnotherCutForAChange) {
 TEST(Geomorph, RefusesWhatIsNoTime) {
     const VertexTree tree = tree_classes[0].make(), twin = tree_classes[0].make();
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
-    for (const double seconds : {nan, -0.1, infinite}) EXPECT_FALSE(Geomorph::create(tree, {.seconds = seconds}));
-    for (const double share : {nan, -0.1}) EXPECT_FALSE(Geomorph::create(tree, {.jump_share = share}));
+    for (const double seconds : {nan, -0.1, infinite}) EXPECT_FALSE(Geomorph::create(tree, seconds));
+    for (const double share : {nan, -0.1}) EXPECT_FALSE(Geomorph::create(tree, 1, share));
     Cut cut(tree);
     const Cut of_another_tree(twin);
-    Geomorph geomorph = made(tree, {});
+    Geomorph geomorph = made(tree);
     ASSERT_TRUE(geomorph.step(cut, 0));
     cut.unfold(VertexTree::root());
     for (const double seconds : {nan, -0.1, infinite}) {

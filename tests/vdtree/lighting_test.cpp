@@ -491,7 +491,8 @@ DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {
     parts.bin_degrees = 2;
     const AbsoluteScale scale{.offset = 0.5, .span = 99.5};
     const ContrastClasses classes(scale);
-    parts.lit = LitClasses{std::make_shared<LightBounds>(s.bounds), scale, classes.class_of({0, 1}, 1)};
+    parts.lit = std::make_shared<const LitClasses>(
+        LitClasses{std::make_shared<LightBounds>(s.bounds), scale, classes.class_of({0, 1}, 1)});
     parts.switch_distance.assign(ContrastClasses::class_count * parts.eccentricity_bins,
                                  DistanceCriterion::never_visible);
     for (std::size_t row = 1; row < ContrastClasses::class_count; ++row)
@@ -521,7 +522,9 @@ TEST(FollowLights, RefusesAScaleThatIsNone) {
     const DistanceCriterion::Parts good = lit_criterion(s, false).parts();
     for (const AbsoluteScale scale : {AbsoluteScale{-1, 2}, {0, 0}, {0, std::nan("")}, {0, infinity}}) {
         DistanceCriterion::Parts parts = good;
-        parts.lit->scale = scale;
+        LitClasses lit = *good.lit;
+        lit.scale = scale;
+        parts.lit = std::make_shared<const LitClasses>(lit);
         EXPECT_FALSE(DistanceCriterion::create(s.tree, std::move(parts))) << scale.offset << ", " << scale.span;
     }
 }

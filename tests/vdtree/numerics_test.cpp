@@ -5,6 +5,7 @@
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/depth_picture.h>
+#include <unseen/vdtree/internal/footprint.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 
 #include "build/bounding_sphere.h"
@@ -14,8 +15,8 @@
 #include "exact_sphere.h"
 #include "shapes.h"
 #include "testing.h"
-#include "tree/unit_vector.h"
 #include "tree_checks.h"
+#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {
 namespace {

@@ -61,7 +61,7 @@ TEST(Numerics, BudgetsOf0And1AndMoreThanThereAre) {
             if (budget >= all) EXPECT_EQ(triangles, all);
         }
         Cut adjusted(tree);
-        EXPECT_LE(adjusted.adjust(costs, {.triangle_budget = budget}).triangles, budget);
+        EXPECT_LE(adjusted.adjust(costs, budget).triangles, budget);
         const SceneObject objects[] = {{cut, criterion, viewpoint}, {adjusted, criterion, viewpoint}};
         const auto shared = require(follow_scene(objects, budget));
         EXPECT_LE(std::uint64_t{(*shared)[0].triangles} + (*shared)[1].triangles, budget);
@@ -69,10 +69,9 @@ TEST(Numerics, BudgetsOf0And1AndMoreThanThereAre) {
     // Inside, budgets are of 64 bits, and so are sums over a scene.
     FoldTester tester(tree, criterion, false, 1, false);
     tester.look_from(viewpoint, 1);
-    const VertexTree* const trees[] = {&tree};
     const CostSource* const sources[] = {&tester};
     for (const std::uint64_t budget : {std::uint64_t{1} << 32, ~std::uint64_t{0}}) {
-        const BudgetDecision decision = decide_budget(trees, sources, {.triangles = budget, .fill = true});
+        const BudgetDecision decision = decide_budget(sources, {.triangles = budget, .fill = true});
         std::uint64_t triangles = 0;
         for (NodeId node = 0; node < tree.interior_count(); ++node)
             if (decision.unfolded[0][node / 64] >> (node % 64) & 1)
@@ -134,10 +133,10 @@ TEST(Numerics, MillionsOfEqualCosts) {
     const FoldCriterion costs = [](const VertexTree&, std::span<const NodeId>, std::span<float> out) {
         std::ranges::fill(out, 2.0f);
     };
-    cut.adjust(costs, {.triangle_budget = budget});
+    cut.adjust(costs, budget);
     expect_expected(cut, "by a criterion of one's own");
     cut.unfold_all();
-    cut.adjust(costs, {.triangle_budget = budget});
+    cut.adjust(costs, budget);
     expect_expected(cut, "from another cut");
     DistanceCriterion::Parts parts;
     parts.switch_distance = {DistanceCriterion::always_visible}; // all costs are infinite
@@ -302,7 +301,7 @@ TEST(Numerics, TimeStepsOf0AndBelow) {
     const DistanceCriterion criterion = extent(tree, 20);
     const double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
     for (const double seconds : {0.0, 5e-324, 0.25, 1e300}) {
-        auto geomorph = require(Geomorph::create(tree, {.seconds = seconds, .jump_share = inf}));
+        auto geomorph = require(Geomorph::create(tree, seconds, inf));
         Cut cut(tree);
         double distance = 6;
         for (const double step : {0.0, -0.0, 5e-324, 1e-300, 1 / 60.0, 1e300}) {
@@ -318,7 +317,7 @@ TEST(Numerics, TimeStepsOf0AndBelow) {
         }
         for (const double none : {-1.0, -5e-324, -inf, inf, nan}) EXPECT_FALSE(geomorph->step(cut, none)) << none;
     }
-    for (const double none : {-1.0, inf, nan}) EXPECT_FALSE(Geomorph::create(tree, {.seconds = none}));
+    for (const double none : {-1.0, inf, nan}) EXPECT_FALSE(Geomorph::create(tree, none));
 }
 
 std::uint64_t naive_end_ns(std::uint64_t now_ns, std::uint64_t limit_ms) { return now_ns + limit_ms * 1'000'000; }

@@ -99,7 +99,7 @@ TEST(OpenMeshAdapter, ASmallCutIsAManifoldMeshOrSaysWhatIsLoose) {
                                  std::span<float> costs) {
         for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = t.displacement()[nodes[i]];
     };
-    cut.adjust(displacement, {.triangle_budget = 300});
+    cut.adjust(displacement, 300);
     const auto small = require(extract_mesh<FloatMesh>(cut));
     EXPECT_EQ(small->mesh.n_faces(), cut.triangle_count()); // none is lost
 }
@@ -228,7 +228,7 @@ TEST(DecimaterClusterer, StraysLittleFartherThanOurs) {
                                      std::span<float> costs) {
             for (std::size_t k = 0; k < nodes.size(); ++k) costs[k] = t.displacement()[nodes[k]];
         };
-        cut.adjust(displacement, {.triangle_budget = 1000});
+        cut.adjust(displacement, 1000);
         distance[i] = mean_distance(mesh, vdtree::extract_mesh(cut));
     }
     constexpr double most_ratio = 2; // their proxies are vertices of the mesh

@@ -43,24 +43,6 @@ TEST(OptionsOwn, WhatABuildTells) {
     EXPECT_EQ(calls.use_count(), 1);
 }
 
-TEST(OptionsOwn, TheirVisibilityTest) {
-    const auto tree = require(build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1}));
-    AdjustOptions options;
-    auto calls = std::make_shared<int>(0);
-    options.visibility = [calls](const VertexTree&, std::span<const NodeId>, std::span<RingVisibility> seen) {
-        ++*calls;
-        std::fill(seen.begin(), seen.end(), RingVisibility::out);
-    };
-    EXPECT_EQ(calls.use_count(), 2);
-    Cut cut(*tree);
-    cut.unfold_all();
-    cut.adjust([](const VertexTree&, std::span<const NodeId>,
-                  std::span<float> costs) { std::fill(costs.begin(), costs.end(), 9.0f); },
-               options);
-    EXPECT_EQ(cut.triangle_count(), 0u);
-    EXPECT_GT(*calls, 0);
-}
-
 TEST(CutOwns, AHandleOfItsTree) {
     auto tree = require(build_tree(shapes::bumpy_sphere(2).view(), {.threads = 1}));
     std::optional<VertexTree> first = std::move(*tree);

@@ -18,8 +18,8 @@
 #include "follow_tools.h"
 #include "shapes.h"
 #include "testing.h"
-#include "tree/unit_vector.h"
 #include "tree_checks.h"
+#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {
 namespace {

@@ -51,7 +51,7 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
                 const glm::vec2 lo(shapes::random_between(random, -2, 2), shapes::random_between(random, -2, 2));
                 const glm::vec2 hi =
                     lo + glm::vec2(size * shapes::random_unit(random), size * shapes::random_unit(random));
-                const TexturePyramid::Range range = pyramid.range({lo, hi});
+                const PackedRange range = pyramid.range({lo, hi});
                 double least = 1, most = 0;
                 for (int k = 0; k < 40; ++k) {
                     const double u = shapes::random_between(random, lo.x, hi.x),

@@ -504,8 +504,8 @@ TEST_F(TreeIo, LeavesDamagedNodesOfAMappedTreeFolded) {
     };
     EXPECT_EQ(asked.adjust(all).triangles, cut.triangle_count());
     asked.fold_all();
-    EXPECT_EQ(asked.adjust(all, {.triangle_budget = tree.triangle_count()}).triangles, cut.triangle_count());
-    EXPECT_EQ(asked.adjust(all, {.triangle_budget = tree.triangle_count()}).max_fold_cost, 2.0f);
+    EXPECT_EQ(asked.adjust(all, tree.triangle_count()).triangles, cut.triangle_count());
+    EXPECT_EQ(asked.adjust(all, tree.triangle_count()).max_fold_cost, 2.0f);
 
     EXPECT_THAT(error_in(mapped->check()), HasSubstr("Node " + std::to_string(damaged)));
     EXPECT_FALSE(verify(*mapped));

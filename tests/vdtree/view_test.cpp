@@ -1,4 +1,5 @@
 // Views: the camera's frame, framing a sphere, and what is no view.
+#include <unseen/vdtree/internal/footprint.h>
 #include <unseen/vdtree/view.h>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -296,7 +297,6 @@ TEST(View, RefusesShiftsAndHeightsThatAreNone) {
     EXPECT_FALSE(validate({.shift = {1, 0}, .orthographic_height = 2}));
     EXPECT_FALSE(validate_perspective({.orthographic_height = 2}, "This"));
     EXPECT_TRUE(validate_perspective({.shift = {1, 0}}, "This"));
-    EXPECT_FALSE(validate_centred({.shift = {1, 0}}, "This"));
 }
 
 } // namespace unseen::vdtree::view_test

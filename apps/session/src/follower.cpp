@@ -96,7 +96,7 @@ Result<void> Follower::State::set_glide(double seconds) {
         if (!tree.texture().empty())
             return invalid_field("{Follower::set_glide()} does not move textures: leave it out, or add "
                                  "{load.without_textures}.");
-        auto made = vdtree::Geomorph::create(tree, {.seconds = seconds});
+        auto made = vdtree::Geomorph::create(tree, seconds);
         if (!made) return made.error();
         objects_[i].geomorph = std::move(*made);
     }
@@ -115,7 +115,7 @@ Result<void> Follower::State::take_up_trees() {
         object.stats_out_of_sight.reset();
         object.tree_count = session_->tree_count[i];
         if (!glide_s_) continue;
-        auto made = vdtree::Geomorph::create(tree, {.seconds = *glide_s_});
+        auto made = vdtree::Geomorph::create(tree, *glide_s_);
         if (!made) return made.error();
         object.geomorph = std::move(*made);
     }
@@ -165,8 +165,8 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Req
     std::vector<vdtree::SceneObject> objects;
     for (Followed& object : objects_) {
         CutRecipe& recipe = *object.recipe;
-        objects.emplace_back(*object.cut, *recipe.criterion, std::move(recipe.viewpoint),
-                             recipe.options.cull_back_faces);
+        objects.push_back(
+            {*object.cut, *recipe.criterion, std::move(recipe.viewpoint), recipe.options.cull_back_faces});
     }
     return vdtree::follow_scene(objects, request.goal.triangles);
 }

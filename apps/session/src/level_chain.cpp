@@ -6,6 +6,7 @@
 #include <string>
 
 #include <unseen/session/session.h>
+#include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>
 
 namespace unseen::session {
@@ -84,7 +85,7 @@ double LevelChain::distance_of(vdtree::Index triangles) const {
         [&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> nodes, std::span<float> costs) {
             for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = seen_from[nodes[i]];
         },
-        {.visibility = {}, .triangle_budget = triangles});
+        triangles);
     return static_cast<double>(stats.max_fold_cost);
 }
 

@@ -38,18 +38,13 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
 
 // Around the eye. In perspective the planes go through it, and their offsets are 0.
 std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
-    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
-    if (const auto height = view.orthographic_height) {
-        const double half_up = *height / 2, half_right = half_up * view.width / view.height;
-        return {{frame.right, half_right}, {-frame.right, half_right}, {frame.up, half_up}, {-frame.up, half_up}};
-    }
-    const vdtree::WindowPlane window = vdtree::window_plane(view);
-    const glm::dvec2 low = window.half - window.middle,
-                     high = window.half + window.middle; // left and down; right and up
     std::vector<vdtree::Plane> planes;
-    for (const glm::dvec3& inward : {-frame.back, frame.right - low.x * frame.back, -frame.right - high.x * frame.back,
-                                     frame.up - low.y * frame.back, -frame.up - high.y * frame.back})
-        planes.push_back({glm::normalize(inward), 0});
+    for (const glm::dvec3& inward : vdtree::inward_of_window(view)) {
+        const double half_up = view.orthographic_height.value_or(0) / 2,
+                     half_right = half_up * view.width / view.height;
+        if (view.orthographic_height) planes.push_back({inward, planes.size() < 2 ? half_right : half_up});
+        else planes.push_back({glm::normalize(inward), 0});
+    }
     return planes;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 
 #include <unseen/perception/masking.h>
+#include <unseen/vdtree/internal/footprint.h>
 
 #include "fold/error_distances.h"
 

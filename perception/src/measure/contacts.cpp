@@ -5,8 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/fold_sequence.h>
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/internal/scaled_geometry.h>
 
 namespace unseen::perception {
 

@@ -8,7 +8,6 @@
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
-#include <unseen/vdtree/internal/packed_range.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 #include <unseen/vdtree/internal/texture_fit.h>
@@ -190,7 +189,7 @@ private:
     void bound_along(const TreePart& part, Index here, Index neighbour) {
         NodeId other = parent_of_leaf(neighbour);
         Box places;
-        PackedRange lights{{Unorm16::largest}, {0}};
+        PackedRange lights = empty_range;
         ChromaRange colours = no_chroma_yet;
         UvBox uvs;
         thread_local std::vector<NodeId> others; // with a texture: those seen so far
@@ -281,11 +280,11 @@ private:
         footprints_ = bound_footprints(g_, parts_);
         fits_ = TextureFits(g_, parts_);
         residuals_.assign(interior_, 0);
-        rings_.vertices.assign(interior_, {{Unorm16::largest}, {0}});
+        rings_.vertices.assign(interior_, empty_range);
         parts_.for_each_triangle([&](const TreePart& part) {
             return [&](Index triangle) {
                 const Triangle& t = g_.triangles[triangle];
-                PackedRange range{{Unorm16::largest}, {0}};
+                PackedRange range = empty_range;
                 for (const Index leaf : t) range = unite(range, shade_of(interior_ + leaf));
                 for (const Index leaf : t)
                     if (const NodeId parent = parent_of_leaf(leaf); parts_.owns(part, parent))
@@ -310,8 +309,7 @@ private:
             rings_.vertices[parent] = unite(rings_.vertices[parent], rings_.vertices[node]);
         }
         parallel_loop(NodeId{0}, interior_, [&](NodeId node) {
-            const TexturePyramid::Range texture = vertices_.pyramid.range(footprints_[node]);
-            rings_.texture[node] = {texture.lo, texture.hi};
+            rings_.texture[node] = vertices_.pyramid.range(footprints_[node]);
             if (!is_still(node))
                 rings_.luminance[node] =
                     unite(rings_.luminance[node], product(rings_.vertices[node], rings_.texture[node]));

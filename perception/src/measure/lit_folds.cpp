@@ -10,7 +10,6 @@
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/internal/spot_share.h>
 
 #include "measure/measure_folds.h"
 

@@ -5,7 +5,7 @@
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/fold_sequence.h>
 
 #include "measure/fold_measurer.h"
 

@@ -8,7 +8,7 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/slab_axes.h>
+#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "measure/fold_picture.h"

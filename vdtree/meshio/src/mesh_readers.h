@@ -11,9 +11,9 @@
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/budget.h>
-#include <unseen/vdtree/internal/finite.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/names.h>
+#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::meshio {
 

@@ -5,6 +5,7 @@
 #include "polygon_triangulator.h"
 #include "text_scanner.h"
 #include "weld.h"
+#include <unseen/vdtree/internal/vectors.h>
 
 #include <array>
 #include <unordered_map>

@@ -7,7 +7,7 @@
 
 #include "build/bounding_sphere.h"
 #include "build/spatial_order.h"
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

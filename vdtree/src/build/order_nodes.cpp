@@ -9,7 +9,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 
 #include "build/parallel_array.h"
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

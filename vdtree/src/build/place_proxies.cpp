@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "build/parallel_array.h"
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

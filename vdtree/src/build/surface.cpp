@@ -13,10 +13,10 @@
 #include <tbb/task_arena.h>
 
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/vectors.h>
 
 #include "build/parallel_array.h"
 #include "build/spatial_order.h"
-#include "tree/unit_vector.h"
 
 namespace unseen::vdtree {
 

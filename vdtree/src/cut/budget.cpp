@@ -1,18 +1,11 @@
 #include "cut/budget.h"
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
 #include <iterator>
-#include <limits>
 #include <optional>
 #include <queue>
 #include <utility>
 
 #include "cut/decide_tree.h"
-#include "cut/kernel/prefetch.h"
-#include "tree/unchecked_links.h"
-#include "tree/walk_children.h"
 
 namespace unseen::vdtree {
 
@@ -29,6 +22,7 @@ constexpr std::size_t samples = 6144;
 constexpr double guess_deviations = 2.5, guess_share = 0.01;
 // Decisions and costs are rounded differently: a dozen roundings of floats.
 constexpr float decision_rounding = 1e-5f;
+constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float far_factor = 1.5f; // costs lower than the guess by this are hardly reached
 
 struct Entry {
@@ -47,18 +41,16 @@ std::size_t bucket_of(float cost) { return std::bit_cast<std::uint32_t>(cost) >>
 
 class Budgeter {
 public:
-    Budgeter(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
-             const BudgetLimits& limits)
-        : trees_(trees), sources_(sources), limits_(limits), asked_(trees.size()), above_(trees.size()),
+    Budgeter(std::span<const CostSource* const> sources, const BudgetLimits& limits)
+        : sources_(sources), limits_(limits), asked_(sources.size()), above_(sources.size()),
           has_bounds_(!limits.only_unfolding && std::ranges::all_of(sources, &CostSource::has_bounds)) {
-        for (const VertexTree* tree : trees)
-            decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
+        for (const CostSource* source : sources)
+            decision_.unfolded.emplace_back(words_for(source->tree.interior_count()));
     }
 
     // From the roots down; the result of all ways.
     BudgetDecision run() {
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree)
-            ask(tree, VertexTree::root(), std::numeric_limits<float>::infinity());
+        for (std::uint32_t tree = 0; tree < sources_.size(); ++tree) ask(tree, VertexTree::root(), infinity);
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
         return run_buckets();
     }
@@ -80,12 +72,9 @@ private:
         if (limits_.is_out_of_time && limits_.is_out_of_time()) decision_.is_complete = false;
         return !decision_.is_complete;
     }
-    std::uint64_t triangles_of(std::uint32_t tree, NodeId node) const {
-        const auto first = unchecked_links(*trees_[tree]).first_triangle;
-        return first[node + 1] - first[node];
-    }
-    std::uint64_t triangles_of(const Entry& e) const { return triangles_of(e.tree, e.node); }
-    void take(const Entry& e) { decision_.unfolded[e.tree][e.node >> 6] |= std::uint64_t{1} << (e.node & 63); }
+    const VertexTree& tree(std::uint32_t number) const { return sources_[number]->tree; }
+    std::uint64_t triangles_of(const Entry& e) const { return unchecked_links(tree(e.tree)).triangles_of(e.node); }
+    void take(const Entry& e) { set_bit(decision_.unfolded[e.tree], e.node); }
     void leave(const Entry& e) {
         decision_.threshold = std::max(decision_.threshold, e.cost);
         decision_.max_seen_cost = std::max(decision_.max_seen_cost, e.seen_cost);
@@ -96,18 +85,19 @@ private:
     // Nodes nest, so each unfolds whatever the others do: a sample tells how many unfold at a threshold.
     float guess() {
         std::size_t nodes = 0;
-        for (const VertexTree* tree : trees_) nodes += tree->interior_count();
+        for (const CostSource* source : sources_) nodes += source->tree.interior_count();
         const std::size_t stride = nodes / samples + 1;
         std::vector<std::pair<float, double>> found; // costs, and triangles that the node speaks for
         std::vector<NodeId> sample;
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
+        for (std::uint32_t number = 0; number < sources_.size(); ++number) {
             sample.clear();
-            for (std::size_t node = stride / 2; node < trees_[tree]->interior_count(); node += stride)
+            for (std::size_t node = stride / 2; node < tree(number).interior_count(); node += stride)
                 sample.push_back(static_cast<NodeId>(node));
-            find_costs(tree, sample);
+            find_costs(number, sample);
+            const auto& links = unchecked_links(tree(number));
             for (std::size_t i = 0; i < sample.size(); ++i)
                 if (costs_[i] > 0)
-                    found.emplace_back(costs_[i], static_cast<double>(stride * triangles_of(tree, sample[i])));
+                    found.emplace_back(costs_[i], static_cast<double>(stride * links.triangles_of(sample[i])));
         }
         std::make_heap(found.begin(), found.end()); // only the first of them are asked for
         double triangles = 0, variance = 0;
@@ -130,24 +120,19 @@ private:
         far_bucket_ = bucket_of(threshold / far_factor);
         // A node that would unfold as an outline, but did not, is not an outline.
         const float unfolding = threshold * (1 + decision_rounding);
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
+        for (std::uint32_t number = 0; number < sources_.size(); ++number) {
             const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) {
-                sources_[tree]->decide_at(threshold, nodes, bits);
+                sources_[number]->decide_at(threshold, nodes, bits);
             };
-            decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](std::span<const NodeId> folded) {
+            decision_.unfolded[number] = decider.run(tree(number), decide, [&](std::span<const NodeId> folded) {
                 for (const NodeId node : folded) {
-                    is_damaged |= !trees_[tree]->is_sound(node);
-                    ask(tree, node, std::numeric_limits<float>::infinity());
+                    is_damaged |= !tree(number).is_sound(node);
+                    ask(number, node, infinity);
                 }
-                find_bounds(tree, &unfolding, [&](const Entry& entry) { wait(entry); });
+                find_bounds(number, &unfolding, [&](const Entry& entry) { wait(entry); });
             });
-            const auto& unfolded = decision_.unfolded[tree];
-            const auto first = unchecked_links(*trees_[tree]).first_triangle;
-            for (std::size_t word = 0; word < unfolded.size(); ++word)
-                for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
-                    const std::size_t node = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-                    triangles_ += first[node + 1] - first[node];
-                }
+            const auto& links = unchecked_links(tree(number));
+            for_each_bit(decision_.unfolded[number], [&](NodeId node) { triangles_ += links.triangles_of(node); });
         }
         decision_.node_tests += decider.decisions;
         return !is_damaged && triangles_ <= limits_.triangles;
@@ -165,23 +150,23 @@ private:
             std::size_t end = first + 1;
             while (end < entries.size() && entries[end].tree == entries[first].tree) ++end;
             const auto of_tree = entries.subspan(first, end - first);
-            const std::uint32_t tree = of_tree.front().tree;
+            const std::uint32_t number = of_tree.front().tree;
             walk_children(
-                *trees_[tree], of_tree.size(), [&](std::size_t i) { return of_tree[i].node; },
-                [&](std::size_t i, NodeId child) { ask(tree, child, of_tree[i].cost); });
+                tree(number), of_tree.size(), [&](std::size_t i) { return of_tree[i].node; },
+                [&](std::size_t i, NodeId child) { ask(number, child, of_tree[i].cost); });
             first = end;
         }
     }
     void find_costs(std::uint32_t tree, std::span<const NodeId> nodes) {
         costs_.resize(nodes.size());
         seen_costs_.resize(nodes.size());
-        unfolded_.resize((nodes.size() + 63) / 64);
+        unfolded_.resize(words_for(nodes.size()));
         if (nodes.empty()) return;
         sources_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
         decision_.node_tests += nodes.size();
     }
     Entry entry_of(std::uint32_t tree, std::size_t i) const {
-        const float cost = costs_[i] >= 0 ? costs_[i] : std::numeric_limits<float>::infinity();
+        const float cost = costs_[i] >= 0 ? costs_[i] : infinity;
         return {std::min(cost, above_[tree][i]), seen_costs_[i], tree, asked_[tree][i]};
     }
     void forget_asked(std::uint32_t tree) {
@@ -191,16 +176,15 @@ private:
     // Entries with their costs; those that must stay folded are left.
     template <class F>
     void answer(F&& f) {
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
-            find_costs(tree, asked_[tree]);
-            for (std::size_t i = 0; i < asked_[tree].size(); ++i) {
-                const Entry entry = entry_of(tree, i);
-                const bool wanted =
-                    limits_.only_unfolding ? (unfolded_[i / 64] >> (i % 64)) & 1 : entry.cost > 0 || limits_.fill;
-                if (wanted && trees_[tree]->is_sound(entry.node)) f(entry);
+        for (std::uint32_t number = 0; number < sources_.size(); ++number) {
+            find_costs(number, asked_[number]);
+            for (std::size_t i = 0; i < asked_[number].size(); ++i) {
+                const Entry entry = entry_of(number, i);
+                const bool wanted = limits_.only_unfolding ? test_bit(unfolded_, i) : entry.cost > 0 || limits_.fill;
+                if (wanted && tree(number).is_sound(entry.node)) f(entry);
                 else leave(entry);
             }
-            forget_asked(tree);
+            forget_asked(number);
         }
     }
     // Waits with what its costs are at most.
@@ -233,7 +217,7 @@ private:
     void answer(std::size_t bucket, F&& f, G&& g) {
         if (!has_bounds_) return answer(f);
         near_.clear();
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree)
+        for (std::uint32_t tree = 0; tree < sources_.size(); ++tree)
             find_bounds(tree, nullptr, [&](const Entry& entry) {
                 if (bucket_of(entry.cost) == bucket) near_.push_back(entry);
                 else g(entry);
@@ -297,7 +281,7 @@ private:
             constexpr std::size_t ahead = 16; // entries between a prefetch and its use
             for (std::size_t i = 0; i < fresh.size(); ++i) {
                 if (i + ahead < fresh.size())
-                    prefetch(&unchecked_links(*trees_[fresh[i + ahead].tree]).first_triangle[fresh[i + ahead].node]);
+                    prefetch(&unchecked_links(tree(fresh[i + ahead].tree)).first_triangle[fresh[i + ahead].node]);
                 sum += triangles_of(fresh[i]);
             }
             all.insert(all.end(), fresh.begin(), fresh.end());
@@ -333,9 +317,8 @@ private:
         }
         // What is left is folded, as far as its parent is not.
         const auto is_folded_under_unfolded = [&](const Entry& e) {
-            const NodeId parent = unchecked_links(*trees_[e.tree]).parents[e.node];
-            const auto& bits = decision_.unfolded[e.tree];
-            return parent == no_node || ((bits[parent >> 6] >> (parent & 63)) & 1);
+            const NodeId parent = unchecked_links(tree(e.tree)).parents[e.node];
+            return parent == no_node || test_bit(decision_.unfolded[e.tree], parent);
         };
         for (; i < all.size(); ++i)
             if (is_folded_under_unfolded(all[i])) leave(all[i]);
@@ -358,7 +341,6 @@ private:
         for (; !queue.empty(); queue.pop()) leave(queue.top());
     }
 
-    std::span<const VertexTree* const> trees_;
     std::span<const CostSource* const> sources_;
     const BudgetLimits& limits_;
     std::uint64_t triangles_ = 0;
@@ -377,10 +359,9 @@ private:
 
 } // namespace
 
-BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
-                             const BudgetLimits& limits) {
-    if (auto decision = Budgeter(trees, sources, limits).run_from_guess()) return std::move(*decision);
-    return Budgeter(trees, sources, limits).run();
+BudgetDecision decide_budget(std::span<const CostSource* const> sources, const BudgetLimits& limits) {
+    if (auto decision = Budgeter(sources, limits).run_from_guess()) return std::move(*decision);
+    return Budgeter(sources, limits).run();
 }
 
 } // namespace unseen::vdtree

@@ -1,38 +1,35 @@
 #include <unseen/vdtree/cut.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <string>
 
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/vectors.h>
+
 #include "cut/budget.h"
-#include "cut/cut_follower.h"
 #include "cut/cut_state.h"
 #include "cut/decide_tree.h"
-#include "tree/unchecked_links.h"
-#include <unseen/vdtree/internal/finite.h>
+#include "cut/kernel/fold_tester.h"
 
 namespace unseen::vdtree {
 
 namespace {
 
-// Nodes are handed to the callbacks in batches of at most this many: enough to hide the call, little enough for the
-// first-level cache.
-constexpr std::size_t batch_size = 1024;
-
-// Costs of the caller's own criterion: 0 for invisible nodes; NaN counts as infinite.
+// Costs of the caller's own criterion; NaN counts as infinite.
 class CallbackCosts final : public CostSource {
 public:
-    CallbackCosts(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
-        : tree_(tree), criterion_(criterion), visibility_(visibility) {}
+    CallbackCosts(const VertexTree& of, const FoldCriterion& criterion) : CostSource(of), criterion_(criterion) {}
 
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& found) const override {
-        std::fill_n(found.unfolded, (nodes.size() + 63) / 64, 0);
+        // Batches large enough to hide the call, and small enough for the first-level cache.
+        constexpr std::size_t batch_size = 1024;
+        std::fill_n(found.unfolded, words_for(nodes.size()), 0);
         std::fill_n(found.cost, nodes.size(), 0.0f);
         for (std::size_t begin = 0; begin < nodes.size(); begin += batch_size) {
             const auto batch = nodes.subspan(begin, std::min(batch_size, nodes.size() - begin));
-            test(batch, std::span(found.cost + begin, batch.size()));
+            criterion_(tree, batch, std::span(found.cost + begin, batch.size()));
         }
+        tests_ += nodes.size();
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             float& cost = found.cost[i];
             cost = cost >= 0 ? cost : std::numeric_limits<float>::infinity();
@@ -43,59 +40,20 @@ public:
     std::uint64_t tests() const { return tests_; }
 
 private:
-    void test(std::span<const NodeId> nodes, std::span<float> costs) const {
-        if (!visibility_) {
-            criterion_(tree_, nodes, costs);
-            tests_ += nodes.size();
-            return;
-        }
-        seen_.assign(nodes.size(), RingVisibility::partly);
-        visibility_(tree_, nodes, seen_);
-        visible_.clear();
-        for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (seen_[i] != RingVisibility::out) visible_.push_back(nodes[i]);
-        visible_costs_.assign(visible_.size(), 0.0f);
-        criterion_(tree_, visible_, visible_costs_);
-        tests_ += visible_.size();
-        for (std::size_t i = 0, j = 0; i < nodes.size(); ++i)
-            if (seen_[i] != RingVisibility::out) costs[i] = visible_costs_[j++];
-    }
-
-    const VertexTree& tree_;
     const FoldCriterion& criterion_;
-    const VisibilityTest& visibility_;
-    mutable std::vector<float> visible_costs_; // scratch
-    mutable std::vector<NodeId> visible_;
-    mutable std::vector<RingVisibility> seen_;
     mutable std::uint64_t tests_ = 0;
 };
 
-// What a criterion asks for: the nodes to unfold, and the largest cost among those left folded under them.
-struct Decision {
-    std::vector<std::uint64_t> unfolded;
-    float max_fold_cost = 0;
-};
-
-// Top-down, many nodes at once, so that the callbacks get whole batches.
-Decision decide_by_threshold(const VertexTree& tree, const CostSource& source) {
-    Decision decision;
+// Top-down, many nodes at once, so that the callback gets whole batches. Finds the largest cost of what stays folded.
+std::vector<std::uint64_t> decide_by_threshold(const CostSource& source, float& max_fold_cost) {
     std::vector<float> costs;
     const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* unfolded) {
         costs.resize(nodes.size());
         source.find_costs(nodes, {costs.data(), costs.data(), unfolded});
         for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (costs[i] <= 1 || !tree.is_sound(nodes[i]))
-                decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
+            if (costs[i] <= 1 || !source.tree.is_sound(nodes[i])) max_fold_cost = std::max(max_fold_cost, costs[i]);
     };
-    decision.unfolded = TreeDecider().run(tree, decide, [](std::span<const NodeId>) {});
-    return decision;
-}
-
-Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Index budget) {
-    const VertexTree* const trees[] = {&tree};
-    const CostSource* const sources[] = {&source};
-    BudgetDecision decision = decide_budget(trees, sources, {.triangles = budget});
-    return {std::move(decision.unfolded.front()), decision.max_seen_cost};
+    return TreeDecider().run(source.tree, decide, [](std::span<const NodeId>) {});
 }
 
 // The cut's triangles in the order of the input, in which groups and materials are runs: input triangle, triangle of
@@ -155,15 +113,21 @@ std::uint64_t Cut::index_writes_from() const noexcept { return state_->index_wri
 Index Cut::triangle_count() const noexcept { return state_->triangle_count(); }
 std::uint64_t Cut::byte_size() const noexcept { return state_->byte_size(); }
 
-AdjustStats Cut::adjust(const FoldCriterion& criterion, const AdjustOptions& options) {
-    const CallbackCosts costs(*tree_, criterion, options.visibility);
-    Decision decision = options.triangle_budget ? decide_by_budget(*tree_, costs, *options.triangle_budget)
-                                                : decide_by_threshold(*tree_, costs);
+AdjustStats Cut::adjust(const FoldCriterion& criterion, std::optional<Index> triangle_budget) {
+    const CallbackCosts costs(*tree_, criterion);
     AdjustStats stats;
+    std::vector<std::uint64_t> unfolded;
+    if (triangle_budget) {
+        const CostSource* const source = &costs;
+        BudgetDecision decision = decide_budget({&source, 1}, {.triangles = *triangle_budget});
+        stats.max_fold_cost = decision.max_seen_cost;
+        unfolded = std::move(decision.unfolded.front());
+    } else {
+        unfolded = decide_by_threshold(costs, stats.max_fold_cost);
+    }
     stats.node_tests = costs.tests();
-    stats.max_fold_cost = decision.max_fold_cost;
     state_->forget_followed();
-    state_->change_to(std::move(decision.unfolded), stats);
+    state_->change_to(std::move(unfolded), stats);
     return stats;
 }
 
@@ -172,45 +136,42 @@ namespace {
 // Far enough away that squares of distances still fit floats.
 constexpr double farthest_eye = 1e18; // mesh units
 
-Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
-    const auto invalid = [](std::string what) { return Error{ErrorCode::invalid_argument, std::move(what)}; };
+Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const DistanceCriterion& criterion,
+                   const FollowOptions& options = {}) {
     if (criterion.interior_count() != tree.interior_count())
-        return invalid("The criterion is for a tree of " + std::to_string(criterion.interior_count()) +
-                       " interior nodes, and this one has " + std::to_string(tree.interior_count()) +
-                       "; make one for this tree.");
-    if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
-    if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
+        return invalid_argument("The criterion is for a tree of " + std::to_string(criterion.interior_count()) +
+                                " interior nodes, and this one has " + std::to_string(tree.interior_count()) +
+                                "; make one for this tree.");
+    if (!is_finite(viewpoint.eye)) return invalid_argument("The eye's position is not finite.");
+    if (!(glm::length(viewpoint.eye) <= farthest_eye))
+        return invalid_argument("The eye is more than 1e18 mesh units away.");
     if (!(viewpoint.eye_spread >= 0 && viewpoint.eye_spread <= farthest_eye))
-        return invalid("The spread of the eyes must be 0 or more and at most 1e18 mesh units.");
+        return invalid_argument("The spread of the eyes must be 0 or more and at most 1e18 mesh units.");
     constexpr double unit_slack = 1e-3; // directions given with three digits
     if (viewpoint.gaze && !(std::abs(glm::length(*viewpoint.gaze) - 1) <= unit_slack))
-        return invalid("The gaze must be a direction of length 1.");
+        return invalid_argument("The gaze must be a direction of length 1.");
     for (const Frustum& frustum : viewpoint.frusta)
-        for (const Plane& plane : frustum.planes)
+        for (const Plane& plane : frustum)
             if (!(std::abs(glm::length(plane.normal) - 1) <= unit_slack) || !std::isfinite(plane.offset))
-                return invalid("A frustum's plane needs a normal of length 1 and a finite offset.");
+                return invalid_argument("A frustum's plane needs a normal of length 1 and a finite offset.");
     if (!viewpoint.occluders.empty() && criterion.parts().spheres != DistanceCriterion::Spheres::ring)
-        return invalid("Occluders need a criterion of ring spheres.");
+        return invalid_argument("Occluders need a criterion of ring spheres.");
     for (const Sphere& occluder : viewpoint.occluders) {
         const glm::dvec3 centre(occluder.centre);
         if (!is_finite(centre) || !(occluder.radius >= 0) || !std::isfinite(occluder.radius))
-            return invalid("An occluder needs a finite centre and a finite radius of 0 or more.");
+            return invalid_argument("An occluder needs a finite centre and a finite radius of 0 or more.");
         if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius) + viewpoint.eye_spread))
-            return invalid("The eye is inside an occluder, or one of the eyes within the spread is.");
+            return invalid_argument("The eye is inside an occluder, or one of the eyes within the spread is.");
     }
-    if (criterion.parts().lit) return validate(viewpoint.lighting);
-    return {};
-}
-
-Result<void> check(const FollowOptions& options) {
-    const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
+    if (criterion.parts().lit)
+        if (const auto valid = validate(viewpoint.lighting); !valid) return valid;
     constexpr float most_hysteresis = 2;
     if (!(options.threshold > 0) || !std::isfinite(options.threshold))
-        return invalid("The threshold must be more than 0 and finite.");
+        return invalid_argument("The threshold must be more than 0 and finite.");
     if (!(options.hysteresis >= 1 && options.hysteresis <= most_hysteresis))
-        return invalid("The hysteresis must be from 1 to 2.");
+        return invalid_argument("The hysteresis must be from 1 to 2.");
     if (options.milliseconds && !(*options.milliseconds >= 0))
-        return invalid("The time limit must be 0 or more milliseconds.");
+        return invalid_argument("The time limit must be 0 or more milliseconds.");
     return {};
 }
 
@@ -218,38 +179,34 @@ Result<void> check(const FollowOptions& options) {
 
 Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                 const FollowOptions& options) {
-    if (const auto valid = check(*tree_, viewpoint, criterion); !valid) return valid.error();
-    if (const auto valid = check(options); !valid) return valid.error();
-    return state_->follower().follow(*state_, criterion, viewpoint, options);
+    if (const auto valid = check(*tree_, viewpoint, criterion, options); !valid) return valid.error();
+    return state_->follow(criterion, viewpoint, options);
 }
 
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion,
                                                    const Viewpoint& viewpoint, const FollowOptions& options) {
-    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
-    if (const auto valid = check(options); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion, options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
-    std::vector<std::uint64_t> unfolded((std::size_t{tree.interior_count()} + 63) / 64);
+    std::vector<std::uint64_t> unfolded(words_for(tree.interior_count()));
     tester.decide_range(0, tree.interior_count(), unfolded.data());
     return unfolded;
 }
 
 Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion,
                                            const Viewpoint& viewpoint, const FollowOptions& options) {
-    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
-    if (const auto valid = check(options); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion, options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
     std::vector<NodeId> nodes(tree.interior_count());
     std::iota(nodes.begin(), nodes.end(), NodeId(0));
     std::vector<float> without_least(nodes.size()), costs(nodes.size());
-    std::vector<std::uint64_t> unfolded((nodes.size() + 63) / 64);
+    std::vector<std::uint64_t> unfolded(words_for(nodes.size()));
     tester.find_costs(nodes, {without_least.data(), costs.data(), unfolded.data()});
     return costs;
 }
 
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {
-    std::vector<const VertexTree*> trees;
     std::vector<std::unique_ptr<FoldTester>> testers;
     std::vector<const CostSource*> tests;
     for (std::size_t i = 0; i < objects.size(); ++i) {
@@ -258,15 +215,14 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
             return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
         for (std::size_t other = 0; other < i; ++other)
             if (&objects[other].cut == &object.cut)
-                return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " +
-                                                              std::to_string(i) + " share one cut; give each its own."};
-        trees.push_back(&object.cut.tree());
+                return invalid_argument("Objects " + std::to_string(other) + " and " + std::to_string(i) +
+                                        " share one cut; give each its own.");
         testers.push_back(
             std::make_unique<FoldTester>(object.cut.tree(), object.criterion, object.cull_back_faces, 1.0f, false));
         testers.back()->look_from(object.viewpoint, 1);
         tests.push_back(testers.back().get());
     }
-    BudgetDecision decision = decide_budget(trees, tests, {.triangles = triangle_budget});
+    BudgetDecision decision = decide_budget(tests, {.triangles = triangle_budget});
     std::vector<AdjustStats> stats(objects.size());
     for (std::size_t i = 0; i < objects.size(); ++i) {
         CutState& cut = CutState::of(objects[i].cut);

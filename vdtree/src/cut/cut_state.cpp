@@ -1,15 +1,11 @@
 #include "cut/cut_state.h"
 
-#include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cassert>
 #include <utility>
 
 #include "cut/cut_follower.h"
 #include "cut/index_buffer.h"
-#include "cut/kernel/prefetch.h"
-#include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -28,10 +24,6 @@ std::uint64_t first_revision() {
     return ++cuts << 40;
 }
 
-bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i >> 6] >> (i & 63)) & 1; }
-void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
-void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
-
 } // namespace
 
 // The index buffer and what is known of it.
@@ -45,6 +37,12 @@ struct CutState::Indices {
     void count_changes(std::size_t changes, Index triangles) {
         quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0;
     }
+    // Until the next gathering.
+    void drop() {
+        is_stale = true;
+        is_patched = false;
+        buffer.drop_lists();
+    }
     std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
 
     void change_version() {
@@ -54,13 +52,14 @@ struct CutState::Indices {
 };
 
 CutState::CutState(const VertexTree& tree)
-    : tree_(tree.share()), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+    : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), proxy_(tree.leaf_count(), VertexTree::root()),
       revision_(first_revision()) {}
 CutState::~CutState() = default;
 
-CutFollower& CutState::follower() {
+AdjustStats CutState::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                             const FollowOptions& options) {
     if (!follower_) follower_ = std::make_unique<CutFollower>(tree_);
-    return *follower_;
+    return follower_->follow(*this, criterion, viewpoint, options);
 }
 
 void CutState::forget_followed() noexcept {
@@ -69,14 +68,12 @@ void CutState::forget_followed() noexcept {
 
 void CutState::set_unfolded(NodeId node) {
     set_bit(unfolded_, node);
-    const auto first = unchecked_links(tree_).first_triangle;
-    triangle_count_ += first[node + 1] - first[node];
+    triangle_count_ += unchecked_links(tree_).triangles_of(node);
 }
 
 void CutState::set_folded(NodeId node) {
     clear_bit(unfolded_, node);
-    const auto first = unchecked_links(tree_).first_triangle;
-    triangle_count_ -= first[node + 1] - first[node];
+    triangle_count_ -= unchecked_links(tree_).triangles_of(node);
 }
 
 // Makes the leaves of a node stand for the node itself.
@@ -101,10 +98,8 @@ void CutState::make_stale() {
     revision_ += 2;
     forget_followed();
     if (!indices_) return;
-    indices_->is_stale = true;
-    indices_->is_patched = false;
+    indices_->drop();
     indices_->quiet_frames = 0;
-    indices_->buffer.drop_lists();
 }
 
 bool CutState::unfold(NodeId node) {
@@ -245,23 +240,24 @@ void CutState::apply_fold(NodeId node, std::span<const NodeId> children) {
 
 void CutState::fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
     const NodeId end = unchecked_links(tree_).subtree_end[node];
-    for (std::size_t word = (std::size_t{end} + 63) / 64; word-- > node / 64;) {
+    for (std::size_t word = words_for(end); word-- > node / 64;) {
         std::uint64_t bits = unfolded_[word];
         if (word == node / 64) bits &= ~std::uint64_t{0} << (node & 63);
         if (word == end / 64) bits &= (std::uint64_t{1} << (end & 63)) - 1;
-        while (bits) {
-            const int highest = 63 - std::countl_zero(bits);
-            bits &= ~(std::uint64_t{1} << highest);
-            const NodeId below = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
+        for_each_bit_down(bits, 64 * word, [&](NodeId below) {
             apply_fold(below);
             on_fold(below);
-        }
+        });
     }
 }
 
-void CutState::end_changes(AdjustStats& stats) {
+void CutState::count(AdjustStats& stats) const {
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
     stats.triangles = triangle_count_;
+}
+
+void CutState::end_changes(AdjustStats& stats) {
+    count(stats);
     if (!indices_) return;
     indices_->count_changes(changes_.size(), triangle_count_);
     if (indices_->is_patched) {
@@ -298,17 +294,17 @@ void CutState::change_further(std::vector<std::uint64_t> unfolded) {
 
 // Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn
 // comes, and folds run downward.
-void CutState::replay(std::span<const std::uint64_t> unfolded) {
+template <class Unfold, class Fold>
+void CutState::for_each_change(std::span<const std::uint64_t> unfolded, Unfold&& unfold, Fold&& fold) {
     for (std::size_t word = 0; word < unfolded.size(); ++word)
-        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
-            apply_unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
-    for (std::size_t word = unfolded.size(); word-- > 0;) {
-        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
-            const int highest = 63 - std::countl_zero(bits);
-            apply_fold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)));
-            bits &= ~(std::uint64_t{1} << highest);
-        }
-    }
+        for_each_bit(unfolded[word] & ~unfolded_[word], 64 * word, unfold);
+    for (std::size_t word = unfolded.size(); word-- > 0;)
+        for_each_bit_down(unfolded_[word] & ~unfolded[word], 64 * word, fold);
+}
+
+void CutState::replay(std::span<const std::uint64_t> unfolded) {
+    for_each_change(
+        unfolded, [&](NodeId node) { apply_unfold(node); }, [&](NodeId node) { apply_fold(node); });
 }
 
 // The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for
@@ -349,31 +345,25 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
 void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     ++revision_;
-    for (std::size_t word = 0; word < unfolded.size(); ++word)
-        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
-            changes_.push_back(
-                {static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
-    for (std::size_t word = unfolded.size(); word-- > 0;) {
-        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
-            const int highest = 63 - std::countl_zero(bits);
-            bits &= ~(std::uint64_t{1} << highest);
-            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
-        }
-    }
+    for_each_change(
+        unfolded,
+        [&](NodeId node) {
+            changes_.push_back({node, false});
+        },
+        [&](NodeId node) {
+            changes_.push_back({node, true});
+        });
     if (tree_.leaf_count() < leaves_per_change * changes_.size()) {
         count_triangles();
         assign_all(unfolded);
     } else {
         assign_changed(unfolded);
     }
-    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
-    stats.triangles = triangle_count_;
     unfolded_ = std::move(unfolded);
+    count(stats);
     if (!indices_ || changes_.empty()) return;
-    indices_->is_stale = true;
-    indices_->is_patched = false;
+    indices_->drop();
     indices_->count_changes(changes_.size(), triangle_count_);
-    indices_->buffer.drop_lists();
 }
 
 // The triangles of changes_.
@@ -382,9 +372,8 @@ void CutState::count_triangles() {
     constexpr std::size_t ahead = 32; // changes between a prefetch and its use
     for (std::size_t i = 0; i < changes_.size(); ++i) {
         if (i + ahead < changes_.size()) prefetch(&first[changes_[i + ahead].node]);
-        const auto [node, folded] = changes_[i];
-        const Index triangles = first[node + 1] - first[node];
-        triangle_count_ = folded ? triangle_count_ - triangles : triangle_count_ + triangles;
+        const Index triangles = unchecked_links(tree_).triangles_of(changes_[i].node);
+        triangle_count_ = changes_[i].folded ? triangle_count_ - triangles : triangle_count_ + triangles;
     }
 }
 
@@ -411,12 +400,11 @@ void CutState::assign_changed(const std::vector<std::uint64_t>& unfolded) {
             if (child < subtree_end[soon] && subtree_end[child] < subtree_end[soon]) prefetch_links(subtree_end[child]);
         }
         const auto [node, folded] = changes_[i];
-        const Index triangles = first[node + 1] - first[node];
         if (folded) {
-            triangle_count_ -= triangles;
+            triangle_count_ -= links.triangles_of(node);
             if (node == VertexTree::root() || test_bit(unfolded, parents[node])) assign(node);
         } else {
-            triangle_count_ += triangles;
+            triangle_count_ += links.triangles_of(node);
             tree_.for_each_child(node, [&](NodeId child) {
                 if (tree_.is_leaf(child) || !test_bit(unfolded, child)) assign(child);
             });

@@ -9,7 +9,7 @@
 
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/function_ref.h>
-#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/internal/node_bits.h>
 
 #include "tree/unchecked_links.h"
 
@@ -35,7 +35,7 @@ public:
     std::span<const FoldChange> changes() const noexcept { return changes_; }
     // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
     std::uint64_t revision() const noexcept { return revision_; }
-    bool is_unfolded_interior(NodeId node) const noexcept { return (unfolded_[node >> 6] >> (node & 63)) & 1; }
+    bool is_unfolded_interior(NodeId node) const noexcept { return test_bit(unfolded_, node); }
     bool is_unfolded(NodeId node) const noexcept { return !tree_.is_leaf(node) && is_unfolded_interior(node); }
     bool is_active(NodeId node) const noexcept {
         // Not by its parent, which a damaged file may lie about.
@@ -44,7 +44,8 @@ public:
         return leaf < tree_.leaf_count() && proxy_[leaf] == node;
     }
 
-    CutFollower& follower();         // made when it is first asked for
+    // By the follower, which is made when it is first asked for.
+    AdjustStats follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options);
     void forget_followed() noexcept; // the cut is changed by others than the follower
 
     // ---- by hand
@@ -93,6 +94,9 @@ private:
     bool is_patching();
     std::span<const NodeId> children_of(NodeId node);
     bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
+    template <class Unfold, class Fold>
+    void for_each_change(std::span<const std::uint64_t> unfolded, Unfold&& unfold, Fold&& fold);
+    void count(AdjustStats& stats) const;
     void replay(std::span<const std::uint64_t> unfolded);
     void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
     void count_triangles();

@@ -2,14 +2,12 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/internal/node_bits.h>
 
-#include "cut/kernel/prefetch.h"
 #include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
@@ -24,13 +22,13 @@ public:
     template <class Decide, class OnFolded>
     std::vector<std::uint64_t> run(const VertexTree& tree, Decide&& decide, OnFolded&& on_folded) {
         constexpr std::size_t at_once = 1024; // what they read stays in the cache
-        std::vector<std::uint64_t> unfolded((std::size_t{tree.interior_count()} + 63) / 64);
+        std::vector<std::uint64_t> unfolded(words_for(tree.interior_count()));
         waiting_.assign(1, VertexTree::root()); // the next ones last
         while (!waiting_.empty()) {
             const auto first = waiting_.end() - static_cast<std::ptrdiff_t>(std::min(at_once, waiting_.size()));
             piece_.assign(first, waiting_.end());
             waiting_.erase(first, waiting_.end());
-            bits_.resize((piece_.size() + 63) / 64);
+            bits_.resize(words_for(piece_.size()));
             decide(std::span<const NodeId>(piece_), bits_.data());
             decisions += piece_.size();
             part();
@@ -39,7 +37,7 @@ public:
                 folded_.push_back(node);
                 return true;
             });
-            for (const NodeId node : unfolding_) unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
+            for (const NodeId node : unfolding_) set_bit(unfolded, node);
             if (!folded_.empty()) on_folded(std::span<const NodeId>(folded_));
             add_children(unchecked_links(tree).subtree_end);
         }
@@ -53,7 +51,7 @@ private:
         folded_.resize(piece_.size());
         std::size_t unfolding = 0, folded = 0;
         for (std::size_t i = 0; i < piece_.size(); ++i) {
-            const bool unfolds = (bits_[i / 64] >> (i % 64)) & 1;
+            const bool unfolds = test_bit(bits_, i);
             // Never beyond the ends: neither list is longer than i.
             unfolding_[unfolding] = folded_[folded] = piece_[i];
             unfolding += unfolds;

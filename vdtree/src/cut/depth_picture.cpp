@@ -1,15 +1,57 @@
-// Boxes on the screen against the farthest depths there: a pyramid of maxima, of which a question takes a few texels.
+// Boxes on the screen, against the farthest depths there: a pyramid of maxima, of which a question takes a few texels.
 #include <unseen/vdtree/depth_picture.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/footprint.h>
+#include <unseen/vdtree/internal/node_bits.h>
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
+
+void Footprint::add(const Footprint& other) noexcept {
+    left = std::min(left, other.left), top = std::min(top, other.top);
+    right = std::max(right, other.right), bottom = std::max(bottom, other.bottom);
+    nearest = std::min(nearest, other.nearest);
+}
+
+Projector::Projector(const View& view)
+    : eye_(view.eye), camera_(camera_frame(view)), axis_px_(axis_px(view)),
+      focal_px_(view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360))) {}
+
+Footprint Projector::operator()(glm::dvec3 point) const noexcept {
+    const glm::dvec3 from_eye = point - eye_;
+    const double along = -glm::dot(from_eye, camera_.back), scale = focal_px_ / along;
+    if (!(along > 0)) return {.nearest = 0};
+    const double x = axis_px_.x + scale * glm::dot(from_eye, camera_.right);
+    const double y = axis_px_.y - scale * glm::dot(from_eye, camera_.up);
+    return {x, y, x, y, along};
+}
+
+Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view) {
+    if (const auto valid = validate_perspective(view, "What parts cover of a window"); !valid) return valid.error();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    const NodeId interior = tree.interior_count();
+    const Projector project(view);
+    std::vector<Footprint> footprints(tree.node_count());
+    parallel_loop(NodeId{0}, tree.node_count(), [&](NodeId node) {
+        footprints[node] = project(placement.to_world(tree.origin() + glm::dvec3(tree.positions()[node])));
+    });
+    // Leaves: all triangles that touch them. From their own places, not from what has grown.
+    std::vector<Footprint> leaves(footprints.begin() + interior, footprints.end());
+    for (const Triangle& triangle : sound->triangles())
+        for (const Index corner : triangle)
+            for (const Index other : triangle) leaves[corner].add(footprints[interior + other]);
+    std::copy(leaves.begin(), leaves.end(), footprints.begin() + interior);
+    for (NodeId node = tree.node_count(); node-- > 1;) footprints[sound->parents()[node]].add(footprints[node]);
+    footprints.resize(interior);
+    return footprints;
+}
+
 namespace {
 
 // Share of a depth: those of pictures are floats, and went through a few roundings.
@@ -83,38 +125,13 @@ Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Sim
     const auto footprints = find_footprints(tree, placement, picture.view());
     if (!footprints) return footprints.error();
     const NodeId interior = tree.interior_count();
-    constexpr NodeId word = 64;
-    std::vector<std::uint64_t> hidden((interior + word - 1) / word, 0);
+    std::vector<std::uint64_t> hidden(words_for(interior), 0);
     constexpr std::size_t grain = 64;
     parallel_loop_over(tbb::blocked_range<std::size_t>(0, hidden.size(), grain), [&](const auto& range) {
-        for (std::size_t w = range.begin(); w < range.end(); ++w) {
-            const NodeId end = std::min(static_cast<NodeId>((w + 1) * word), interior);
-            for (auto node = static_cast<NodeId>(w * word); node < end; ++node)
-                if (picture.hides((*footprints)[node])) hidden[w] |= std::uint64_t{1} << (node % word);
-        }
+        for (std::size_t node = 64 * range.begin(); node < std::min<std::size_t>(64 * range.end(), interior); ++node)
+            if (picture.hides((*footprints)[node])) set_bit(hidden, node);
     });
     return hidden;
-}
-
-Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
-                                         std::span<const std::uint64_t> hidden) {
-    constexpr NodeId word = 64;
-    if (criterion.interior_count() != tree.interior_count() ||
-        hidden.size() != (tree.interior_count() + word - 1) / word)
-        return invalid_argument("The criterion, or what is hidden, is not of this tree.");
-    DistanceCriterion::Parts parts = criterion.parts();
-    if (parts.lit) return invalid_argument("Criteria with lights cannot fold what a picture hides.");
-    const std::size_t rows = parts.switch_distance.size() / parts.eccentricity_bins;
-    constexpr std::size_t most_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
-    if (rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
-    parts.classes.resize(tree.interior_count()); // empty: the first row for all
-    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
-                                 DistanceCriterion::never_visible);
-    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
-    const auto nothing = static_cast<std::uint16_t>(rows);
-    for (NodeId node = 0; node < tree.interior_count(); ++node)
-        if ((hidden[node / word] >> (node % word) & 1) != 0) parts.classes[node] = {nothing, nothing};
-    return DistanceCriterion::create(tree, std::move(parts));
 }
 
 } // namespace unseen::vdtree

@@ -1,31 +1,21 @@
-#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/depth_picture.h>
 
-#include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <limits>
 #include <numbers>
-#include <span>
 #include <string>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/node_bits.h>
 
 #include "cut/kernel/fold_kernel.h"
-#include "cut/orthographic.h"
 #include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
 
 namespace {
-
-std::uint64_t next_id() {
-    static std::atomic<std::uint64_t> last{0};
-    return ++last;
-}
 
 // With lights, rows are compared by their contrasts and luminances.
 Result<void> check_growth(const DistanceCriterion::Parts& p) {
@@ -50,22 +40,19 @@ Result<void> check_growth(const DistanceCriterion::Parts& p) {
 
 Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const std::size_t nodes = tree.interior_count();
-    if (!p.classes.empty() && p.classes.size() != nodes)
-        return invalid_argument("A criterion has " + std::to_string(p.classes.size()) + " classes for " +
-                                std::to_string(nodes) + " interior nodes.");
+    for (const auto& [count, what] : {std::pair(p.classes.size(), "classes"),
+                                      {p.facing.size(), "sets of directions"},
+                                      {p.lengths.size(), "lengths"},
+                                      {p.silhouette_lengths.size(), "lengths"}})
+        if (count != 0 && count != nodes)
+            return invalid_argument("A criterion has " + std::to_string(count) + " " + what + " for " +
+                                    std::to_string(nodes) + " interior nodes.");
     if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
         return invalid_argument("A criterion with lights needs bounds of its tree's normals, and no other classes.");
-    if (!p.facing.empty() && p.facing.size() != nodes)
-        return invalid_argument("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
-                                std::to_string(nodes) + " interior nodes.");
-    for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
-        if (!lengths->empty() && lengths->size() != nodes)
-            return invalid_argument("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
-                                    std::to_string(nodes) + " interior nodes.");
+    for (const auto* lengths : {&p.lengths, &p.silhouette_lengths})
         for (std::size_t i = 0; i < lengths->size(); ++i)
             if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
                 return invalid_argument("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
-    }
     if (p.eccentricity_bins == 0 || p.switch_distance.empty() || p.switch_distance.size() % p.eccentricity_bins != 0)
         return invalid_argument("A criterion's table of " + std::to_string(p.switch_distance.size()) +
                                 " switch distances has no whole rows of " + std::to_string(p.eccentricity_bins) +
@@ -165,105 +152,46 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     return true;
 }
 
-double radians_of_pixels(const View& view, double pixels) { return pixels / pixels_per_radian(view); }
-
 } // namespace
-
-DistanceCriterion::ObjectId::ObjectId() noexcept : value(next_id()) {}
-
-DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
-    uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
-                                    [](FoldClass c) { return c.interior != c.silhouette; }) ||
-                        (!parts_.classes.empty() && !parts_.silhouette_lengths.empty()) || parts_.lit;
-}
 
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
     for (float& switch_distance : parts.switch_distance)
         switch_distance = std::clamp(switch_distance, never_visible, always_visible);
-    DistanceCriterion criterion(std::move(parts));
-    criterion.interior_count_ = tree.interior_count();
+    const bool uses_silhouettes = std::any_of(parts.classes.begin(), parts.classes.end(),
+                                              [](FoldClass c) { return c.interior != c.silhouette; }) ||
+                                  (!parts.classes.empty() && !parts.silhouette_lengths.empty()) || parts.lit;
     // With lights the ranges nest but for rounding, which may lift a child by a class.
-    criterion.is_monotone_ = !criterion.parts_.lit && is_monotone_in(tree, criterion.parts_);
-    return criterion;
+    const bool is_monotone = !parts.lit && is_monotone_in(tree, parts);
+    return DistanceCriterion(
+        std::make_shared<const Values>(Values{std::move(parts), tree.interior_count(), uses_silhouettes, is_monotone}));
 }
 
 namespace {
 
-// The sides of an orthographic window are parallel to the line of sight.
-Frustum orthographic_frustum(const VertexTree& tree, const View& view, const Similarity& placement) {
-    const CameraFrame frame = camera_frame(view);
-    const double half_up = *view.orthographic_height / 2 / placement.scale,
-                 half_right = half_up * view.width / view.height;
-    const glm::dvec3 middle = placement.to_mesh(view.eye) - tree.origin();
-    // Heights over these planes are summed in floats from products as large as the eye's distance: a few roundings of it.
-    constexpr double float_rounding = 1e-6;
-    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
-    const WholeSphere all = whole_sphere(tree);
-    const double inexact = float_rounding * (glm::length(eye - all.centre) + all.radius);
-    Frustum frustum;
-    const auto add = [&](glm::dvec3 direction, double half) {
-        const glm::dvec3 normal = glm::normalize(placement.direction_to_mesh(direction));
-        frustum.planes.push_back({normal, half + inexact - glm::dot(normal, middle)});
-    };
-    add(frame.right, half_right);
-    add(-frame.right, half_right);
-    add(frame.up, half_up);
-    add(-frame.up, half_up);
-    return frustum;
+double radians_of_pixels(const View& view, double pixels) { return pixels / pixels_per_radian(view); }
+
+// One bit a node, for the nodes that the criterion is for.
+bool are_of(const VertexTree& tree, const DistanceCriterion& criterion, std::span<const std::uint64_t> nodes) {
+    return criterion.interior_count() == tree.interior_count() && nodes.size() == words_for(tree.interior_count());
+}
+
+// Gives a row of one switch distance and no least cost to some nodes.
+Result<void> give_row(DistanceCriterion::Parts& parts, NodeId nodes, float switch_distance,
+                      std::span<const std::uint64_t> which) {
+    const std::size_t row = parts.switch_distance.size() / parts.eccentricity_bins;
+    if (row > std::numeric_limits<std::uint16_t>::max())
+        return invalid_argument("The criterion has no room for a row more.");
+    parts.classes.resize(nodes); // empty: the first row for all
+    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins, switch_distance);
+    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
+    const auto number = static_cast<std::uint16_t>(row);
+    for (NodeId node = 0; node < nodes; ++node)
+        if (test_bit(which, node)) parts.classes[node] = {number, number};
+    return {};
 }
 
 } // namespace
-
-Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {
-    if (view.orthographic_height) return orthographic_frustum(tree, view, placement);
-    const CameraFrame frame = camera_frame(view);
-    const WindowPlane window = window_plane(view);
-    const glm::dvec2 low = window.half - window.middle,
-                     high = window.half + window.middle; // left and down; right and up
-    const glm::dvec3 inward[] = {-frame.back, frame.right - low.x * frame.back, -frame.right - high.x * frame.back,
-                                 frame.up - low.y * frame.back, -frame.up - high.y * frame.back};
-    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
-    Frustum frustum;
-    for (const glm::dvec3& direction : inward) {
-        const glm::dvec3 normal = glm::normalize(placement.direction_to_mesh(direction));
-        frustum.planes.push_back({normal, -glm::dot(normal, eye)});
-    }
-    return frustum;
-}
-
-Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement, bool window_only) {
-    Viewpoint viewpoint;
-    viewpoint.eye = eye_in_tree(tree, view, placement);
-    if (view.orthographic_height) {
-        // Every point of the tree is seen along the axis from one of the eyes.
-        const glm::dvec3 back = glm::normalize(placement.direction_to_mesh(camera_frame(view).back));
-        const WholeSphere all = whole_sphere(tree);
-        const glm::dvec3 to = all.centre - viewpoint.eye;
-        viewpoint.eye_spread = glm::length(to - back * glm::dot(to, back)) + all.radius;
-    }
-    if (window_only) viewpoint.frusta.push_back(frustum_of(tree, view, placement));
-    return viewpoint;
-}
-
-Result<Viewpoint> viewpoint_of_pair(const VertexTree& tree, const View& left, const View& right,
-                                    const Similarity& placement, bool window_only) {
-    for (const View* view : {&left, &right})
-        if (const auto valid = validate(*view); !valid) return valid.error();
-    if (left.orthographic_height.has_value() != right.orthographic_height.has_value())
-        return invalid_argument("Of a stereo pair both views must be orthographic, or none.");
-    if (left.orthographic_height && *left.orthographic_height != *right.orthographic_height)
-        return invalid_argument("The orthographic views of a stereo pair must be equally high.");
-    const Viewpoint a = viewpoint_of(tree, left, placement, window_only),
-                    b = viewpoint_of(tree, right, placement, window_only);
-    Viewpoint both = a;
-    both.eye = a.eye + (b.eye - a.eye) * 0.5;
-    constexpr double rounding = 1e-12; // of the middle and the distance, in doubles
-    both.eye_spread = glm::length(b.eye - a.eye) * 0.5 + rounding * (glm::length(a.eye) + glm::length(b.eye)) +
-                      std::max(a.eye_spread, b.eye_spread);
-    both.frusta.insert(both.frusta.end(), b.frusta.begin(), b.frusta.end());
-    return both;
-}
 
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
     if (!(tolerance_pixels > 0)) return invalid_argument("The tolerance must be more than 0 pixels.");
@@ -283,8 +211,7 @@ Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const V
     const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
     const float switch_distance = static_cast<float>(1 / (2 * std::sin(half_angle)));
     parts.switch_distance = {switch_distance};
-    if (std::find(displacement.begin(), displacement.end(), 0.0f) !=
-        displacement.end()) { // a row of their own for what never moves
+    if (std::ranges::find(displacement, 0.0f) != displacement.end()) { // a row of their own for what never moves
         parts.switch_distance = {DistanceCriterion::never_visible, switch_distance};
         for (const float moved : displacement) parts.classes.push_back(moved == 0 ? FoldClass{0, 0} : FoldClass{1, 1});
     }
@@ -293,36 +220,37 @@ Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const V
 
 Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,
                                   std::span<const std::uint64_t> kept) {
-    constexpr NodeId word = 64;
-    const NodeId nodes = tree.interior_count();
-    if (criterion.interior_count() != nodes || kept.size() != (nodes + word - 1) / word)
+    if (!are_of(tree, criterion, kept))
         return invalid_argument("The criterion, or what is to be kept, is not of this tree.");
     DistanceCriterion::Parts parts = criterion.parts();
-    const std::size_t rows = parts.switch_distance.size() / parts.eccentricity_bins;
-    constexpr std::size_t most_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
-    if (!parts.lit && rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
+    // With lights there are no classes: those that are kept are outlines of the scene's contrast.
+    const NodeId nodes = tree.interior_count();
+    if (!parts.lit)
+        if (const auto given = give_row(parts, nodes, DistanceCriterion::always_visible, kept); !given)
+            return given.error();
     if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
-    if (parts.silhouette_lengths.empty())
-        for (NodeId node = 0; node < nodes; ++node)
+    const bool has_lengths = !parts.silhouette_lengths.empty(), has_facing = !parts.facing.empty();
+    for (NodeId node = 0; node < nodes; ++node) {
+        if (!has_lengths)
             parts.silhouette_lengths.push_back(parts.spheres == DistanceCriterion::Spheres::ring
                                                    ? tree.bounds()[node].ring.radius
                                                    : tree.support_spheres()[node].radius);
-    if (parts.facing.empty())
-        for (NodeId node = 0; node < nodes; ++node) parts.facing.push_back(tree.bounds()[node].slabs);
-    // With lights there are no classes: those that are kept are outlines of the scene's contrast.
-    if (!parts.lit) {
-        parts.classes.resize(nodes); // empty: the first row for all
-        parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
-                                     DistanceCriterion::always_visible);
-        if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
-    }
-    const auto everywhere = static_cast<std::uint16_t>(rows);
-    for (NodeId node = 0; node < nodes; ++node) {
-        if ((kept[node / word] >> (node % word) & 1) == 0) continue;
+        if (!has_facing) parts.facing.push_back(tree.bounds()[node].slabs);
+        if (!test_bit(kept, node)) continue;
         parts.silhouette_lengths[node] = kept_length;
         parts.facing[node] = NormalSlabs::everything(); // whatever faces the eye
-        if (!parts.lit) parts.classes[node] = {everywhere, everywhere};
     }
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
+                                         std::span<const std::uint64_t> hidden) {
+    if (!are_of(tree, criterion, hidden))
+        return invalid_argument("The criterion, or what is hidden, is not of this tree.");
+    DistanceCriterion::Parts parts = criterion.parts();
+    if (parts.lit) return invalid_argument("Criteria with lights cannot fold what a picture hides.");
+    if (const auto given = give_row(parts, tree.interior_count(), DistanceCriterion::never_visible, hidden); !given)
+        return given.error();
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

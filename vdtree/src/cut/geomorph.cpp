@@ -1,19 +1,14 @@
 #include <unseen/vdtree/geomorph.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <functional>
-#include <memory>
-#include <utility>
-#include <vector>
 
 #include <unseen/vdtree/internal/errors.h>
 
 #include <glm/common.hpp>
 
 #include "cut/cut_state.h"
-#include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -52,26 +47,157 @@ struct Geomorph::State {
         std::vector<MovedVertex> children; // in their own places
     };
 
-    State(const VertexTree& tree, const GeomorphOptions& options_)
-        : options(options_), drawn_cut(tree), drawn(CutState::of(drawn_cut)) {}
+    State(const VertexTree& tree, double seconds, double jump_share)
+        : glide_s(seconds), jump_share(jump_share), drawn_cut(tree), drawn(CutState::of(drawn_cut)) {}
 
-    void step(const CutState& cut, double seconds);
-    std::span<const FoldChange> changes_of(const CutState& cut);
-    bool is_jump(const CutState& cut, std::span<const FoldChange> changes) const;
-    void become(const CutState& cut);
-    void pass(double seconds);
-    void take_up(const CutState& cut, std::span<const FoldChange> changes);
-    void end_glides();
-    void move_vertices();
+    void step(const CutState& cut, double seconds) {
+        const bool is_first = revision == 0;
+        const auto changes = changes_of(cut);
+        revision = cut.revision();
+        if (is_first || is_jump(cut, changes)) {
+            become(cut);
+            return;
+        }
+        AdjustStats unused;
+        drawn.begin_changes();
+        pass(seconds);
+        take_up(cut, changes);
+        end_glides();
+        drawn.end_changes(unused);
+        move_vertices();
+    }
+
+    // What leads from the cut at the last step, or from the drawn one, to this cut; parents unfold before their children.
+    std::span<const FoldChange> changes_of(const CutState& cut) {
+        if (cut.revision() == revision) return {};
+        if (cut.revision() == revision + 1) return cut.changes();
+        found.clear();
+        for (std::size_t word = 0; word < cut.unfolded().size(); ++word)
+            for_each_bit(cut.unfolded()[word] ^ drawn.unfolded()[word], 64 * word, [&](NodeId node) {
+                found.push_back({node, drawn.is_unfolded_interior(node)});
+            });
+        return found;
+    }
+
+    bool is_jump(const CutState& cut, std::span<const FoldChange> changes) const {
+        if (changes.size() <= fewest_of_a_jump) return false;
+        std::uint64_t triangles = 0;
+        for (const FoldChange& change : changes) triangles += unchecked_links(cut.tree()).triangles_of(change.node);
+        const double shown = std::max(cut.triangle_count(), drawn.triangle_count());
+        return static_cast<double>(triangles) > jump_share * shown;
+    }
+
+    void become(const CutState& cut) {
+        for (const Glide& glide : glides) slot_of_node[glide.own.node] = no_slot;
+        glides.clear();
+        moved.clear();
+        AdjustStats unused;
+        drawn.change_to({cut.unfolded().begin(), cut.unfolded().end()}, unused);
+    }
+
+    void pass(double seconds) {
+        if (glides.empty()) return;
+        const double share = seconds < glide_s ? seconds / glide_s : 1;
+        for (Glide& glide : glides)
+            glide.weight = glide.unfolds ? std::min(glide.weight + share, 1.0) : std::max(glide.weight - share, 0.0);
+    }
+
+    // A node may have changed more than once: only what it is now counts.
+    void take_up(const CutState& cut, std::span<const FoldChange> changes) {
+        for (const auto [node, folded] : changes) {
+            const bool is_drawn_unfolded = drawn.is_unfolded_interior(node);
+            if (cut.is_unfolded_interior(node)) {
+                if (is_drawn_unfolded) continue;
+                drawn.apply_unfold(node);
+                begin(node, 0);
+            } else if (is_drawn_unfolded && !is_gliding(node)) {
+                begin(node, 1);
+            }
+        }
+        for (Glide& glide : glides) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
+    }
+
+    // A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner;
+    // where rounding says otherwise, the parent waits for it.
+    void end_glides() {
+        arrived_nodes.clear();
+        const bool at_once = !(glide_s > 0);
+        for (const Glide& glide : glides)
+            if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived))
+                arrived_nodes.push_back(glide.own.node);
+        std::sort(arrived_nodes.begin(), arrived_nodes.end(), std::greater<>()); // children first
+        for (const NodeId node : arrived_nodes) {
+            if (!glides[slot_of_node[node]].unfolds) {
+                bool is_flat = true;
+                for (const MovedVertex& child : glides[slot_of_node[node]].children)
+                    is_flat &= !drawn.is_unfolded(child.node);
+                if (!is_flat) continue;
+                drawn.apply_fold(node);
+            }
+            end(node);
+        }
+    }
+
+    void move_vertices() {
+        moved.clear();
+        ++steps;
+        for (Slot slot = 0; slot < glides.size(); ++slot) {
+            place(slot);
+            const Glide& glide = glides[slot];
+            const float share = static_cast<float>(glide.weight);
+            for (const MovedVertex& child :
+                 glide.children) // those of a node that is unfolded are active, or unfolded, too
+                if (!drawn.is_unfolded(child.node)) moved.push_back(between(glide.drawn, child, share));
+        }
+    }
+
+    // Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without
+    // recursion, for trees may be as deep as they have vertices.
+    void place(Slot slot) {
+        unplaced.clear();
+        for (; slot != no_slot && glides[slot].placed != steps; slot = slot_of(glides[slot].parent))
+            unplaced.push_back(slot);
+        for (; !unplaced.empty(); unplaced.pop_back()) {
+            Glide& glide = glides[unplaced.back()];
+            const Slot parent = slot_of(glide.parent);
+            glide.placed = steps;
+            glide.drawn = parent == no_slot
+                              ? glide.own
+                              : between(glides[parent].drawn, glide.own, static_cast<float>(glides[parent].weight));
+        }
+    }
+
+    void begin(NodeId node, double weight) {
+        const VertexTree& tree = drawn.tree();
+        if (slot_of_node.empty()) slot_of_node.assign(tree.interior_count(), no_slot);
+        slot_of_node[node] = static_cast<Slot>(glides.size());
+        glides.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
+        tree.for_each_child(node, [&](NodeId child) { glides.back().children.push_back(at_rest(tree, child)); });
+    }
+
+    void end(NodeId node) {
+        const Slot slot = slot_of_node[node];
+        slot_of_node[node] = no_slot;
+        if (slot + 1 < glides.size()) {
+            glides[slot] = std::move(glides.back());
+            slot_of_node[glides[slot].own.node] = slot;
+        }
+        glides.pop_back();
+    }
+
+    std::uint64_t byte_size() const noexcept {
+        std::uint64_t children = 0;
+        for (const Glide& glide : glides) children += glide.children.capacity();
+        return drawn.byte_size() + sizeof(Glide) * glides.capacity() + sizeof(MovedVertex) * children +
+               sizeof(Slot) * slot_of_node.capacity() + sizeof(MovedVertex) * moved.capacity() +
+               sizeof(FoldChange) * found.capacity() + sizeof(NodeId) * arrived_nodes.capacity() +
+               sizeof(Slot) * unplaced.capacity();
+    }
 
     Slot slot_of(NodeId node) const { return slot_of_node.empty() || node == no_node ? no_slot : slot_of_node[node]; }
     bool is_gliding(NodeId node) const { return slot_of(node) != no_slot; }
-    void begin(NodeId node, double weight);
-    void end(NodeId node);
-    void place(Slot slot);
-    std::uint64_t byte_size() const noexcept;
 
-    GeomorphOptions options;
+    double glide_s, jump_share;
     Cut drawn_cut;
     CutState& drawn;            // of that cut
     std::uint64_t revision = 0; // of the followed cut, when it was last taken up
@@ -92,15 +218,14 @@ Geomorph::~Geomorph() = default;
 const Cut& Geomorph::drawn() const noexcept { return state_->drawn_cut; }
 std::span<const MovedVertex> Geomorph::moved() const noexcept { return state_->moved; }
 bool Geomorph::is_gliding() const noexcept { return !state_->glides.empty(); }
-double Geomorph::seconds() const noexcept { return state_->options.seconds; }
+double Geomorph::seconds() const noexcept { return state_->glide_s; }
 std::uint64_t Geomorph::byte_size() const noexcept { return state_->byte_size(); }
 
-Result<Geomorph> Geomorph::create(const VertexTree& tree, const GeomorphOptions& options) {
-    if (!(options.seconds >= 0) || !std::isfinite(options.seconds))
+Result<Geomorph> Geomorph::create(const VertexTree& tree, double seconds, double jump_share) {
+    if (!(seconds >= 0) || !std::isfinite(seconds))
         return invalid_argument("The time of a geomorph must be 0 or more seconds, and finite.");
-    if (!(options.jump_share >= 0))
-        return invalid_argument("The share of triangles that makes a jump must be 0 or more.");
-    return Geomorph(std::make_unique<State>(tree, options));
+    if (!(jump_share >= 0)) return invalid_argument("The share of triangles that makes a jump must be 0 or more.");
+    return Geomorph(std::make_unique<State>(tree, seconds, jump_share));
 }
 
 Result<void> Geomorph::step(const Cut& cut, double seconds) {
@@ -110,153 +235,6 @@ Result<void> Geomorph::step(const Cut& cut, double seconds) {
         return invalid_argument("The cut belongs to another tree than the geomorph's; make a geomorph for that tree.");
     state_->step(CutState::of(cut), seconds);
     return {};
-}
-
-void Geomorph::State::step(const CutState& cut, double seconds) {
-    const bool is_first = revision == 0;
-    const auto changes = changes_of(cut);
-    revision = cut.revision();
-    if (is_first || is_jump(cut, changes)) {
-        become(cut);
-        return;
-    }
-    AdjustStats unused;
-    drawn.begin_changes();
-    pass(seconds);
-    take_up(cut, changes);
-    end_glides();
-    drawn.end_changes(unused);
-    move_vertices();
-}
-
-// What leads from the cut at the last step, or from the drawn one, to this cut; parents unfold before their children.
-std::span<const FoldChange> Geomorph::State::changes_of(const CutState& cut) {
-    if (cut.revision() == revision) return {};
-    if (cut.revision() == revision + 1) return cut.changes();
-    found.clear();
-    for (std::size_t word = 0; word < cut.unfolded().size(); ++word) {
-        for (std::uint64_t bits = cut.unfolded()[word] ^ drawn.unfolded()[word]; bits; bits &= bits - 1) {
-            const int bit = std::countr_zero(bits);
-            const bool folded = (drawn.unfolded()[word] >> bit) & 1;
-            found.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(bit)), folded});
-        }
-    }
-    return found;
-}
-
-bool Geomorph::State::is_jump(const CutState& cut, std::span<const FoldChange> changes) const {
-    if (changes.size() <= fewest_of_a_jump) return false;
-    const auto first = unchecked_links(cut.tree()).first_triangle;
-    std::uint64_t triangles = 0;
-    for (const FoldChange& change : changes) triangles += first[change.node + 1] - first[change.node];
-    const double shown = std::max(cut.triangle_count(), drawn.triangle_count());
-    return static_cast<double>(triangles) > options.jump_share * shown;
-}
-
-void Geomorph::State::become(const CutState& cut) {
-    for (const Glide& glide : glides) slot_of_node[glide.own.node] = no_slot;
-    glides.clear();
-    moved.clear();
-    AdjustStats unused;
-    drawn.change_to({cut.unfolded().begin(), cut.unfolded().end()}, unused);
-}
-
-void Geomorph::State::pass(double seconds) {
-    if (glides.empty()) return;
-    const double share = seconds < options.seconds ? seconds / options.seconds : 1;
-    for (Glide& glide : glides)
-        glide.weight = glide.unfolds ? std::min(glide.weight + share, 1.0) : std::max(glide.weight - share, 0.0);
-}
-
-// A node may have changed more than once: only what it is now counts.
-void Geomorph::State::take_up(const CutState& cut, std::span<const FoldChange> changes) {
-    for (const auto [node, folded] : changes) {
-        const bool is_drawn_unfolded = drawn.is_unfolded_interior(node);
-        if (cut.is_unfolded_interior(node)) {
-            if (is_drawn_unfolded) continue;
-            drawn.apply_unfold(node);
-            begin(node, 0);
-        } else if (is_drawn_unfolded && !is_gliding(node)) {
-            begin(node, 1);
-        }
-    }
-    for (Glide& glide : glides) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
-}
-
-// A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner;
-// where rounding says otherwise, the parent waits for it.
-void Geomorph::State::end_glides() {
-    arrived_nodes.clear();
-    const bool at_once = !(options.seconds > 0);
-    for (const Glide& glide : glides)
-        if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived))
-            arrived_nodes.push_back(glide.own.node);
-    std::sort(arrived_nodes.begin(), arrived_nodes.end(), std::greater<>()); // children first
-    for (const NodeId node : arrived_nodes) {
-        if (!glides[slot_of_node[node]].unfolds) {
-            bool is_flat = true;
-            for (const MovedVertex& child : glides[slot_of_node[node]].children)
-                is_flat &= !drawn.is_unfolded(child.node);
-            if (!is_flat) continue;
-            drawn.apply_fold(node);
-        }
-        end(node);
-    }
-}
-
-void Geomorph::State::move_vertices() {
-    moved.clear();
-    ++steps;
-    for (Slot slot = 0; slot < glides.size(); ++slot) {
-        place(slot);
-        const Glide& glide = glides[slot];
-        const float share = static_cast<float>(glide.weight);
-        for (const MovedVertex& child : glide.children) // those of a node that is unfolded are active, or unfolded, too
-            if (!drawn.is_unfolded(child.node)) moved.push_back(between(glide.drawn, child, share));
-    }
-}
-
-// Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without
-// recursion, for trees may be as deep as they have vertices.
-void Geomorph::State::place(Slot slot) {
-    unplaced.clear();
-    for (; slot != no_slot && glides[slot].placed != steps; slot = slot_of(glides[slot].parent))
-        unplaced.push_back(slot);
-    for (; !unplaced.empty(); unplaced.pop_back()) {
-        Glide& glide = glides[unplaced.back()];
-        const Slot parent = slot_of(glide.parent);
-        glide.placed = steps;
-        glide.drawn = parent == no_slot
-                          ? glide.own
-                          : between(glides[parent].drawn, glide.own, static_cast<float>(glides[parent].weight));
-    }
-}
-
-void Geomorph::State::begin(NodeId node, double weight) {
-    const VertexTree& tree = drawn.tree();
-    if (slot_of_node.empty()) slot_of_node.assign(tree.interior_count(), no_slot);
-    slot_of_node[node] = static_cast<Slot>(glides.size());
-    glides.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
-    tree.for_each_child(node, [&](NodeId child) { glides.back().children.push_back(at_rest(tree, child)); });
-}
-
-void Geomorph::State::end(NodeId node) {
-    const Slot slot = slot_of_node[node];
-    slot_of_node[node] = no_slot;
-    if (slot + 1 < glides.size()) {
-        glides[slot] = std::move(glides.back());
-        slot_of_node[glides[slot].own.node] = slot;
-    }
-    glides.pop_back();
-}
-
-std::uint64_t Geomorph::State::byte_size() const noexcept {
-    std::uint64_t children = 0;
-    for (const Glide& glide : glides) children += glide.children.capacity();
-    return drawn.byte_size() + sizeof(Glide) * glides.capacity() + sizeof(MovedVertex) * children +
-           sizeof(Slot) * slot_of_node.capacity() + sizeof(MovedVertex) * moved.capacity() +
-           sizeof(FoldChange) * found.capacity() + sizeof(NodeId) * arrived_nodes.capacity() +
-           sizeof(Slot) * unplaced.capacity();
 }
 
 } // namespace unseen::vdtree

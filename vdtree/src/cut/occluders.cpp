@@ -5,9 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -232,12 +229,12 @@ private:
 
 } // namespace
 
-std::vector<Sphere> inner_spheres(const VertexTree& tree, const InnerSphereOptions& options) {
-    if (tree.closedness() == Closedness::open || options.count <= 0) return {};
+std::vector<Sphere> inner_spheres(const VertexTree& tree, int count, int cells) {
+    if (tree.closedness() == Closedness::open || count <= 0) return {};
     const auto sound = SoundTree::of(tree);
     if (!sound) return {};
-    Grid grid(*sound, std::clamp(options.cells, fewest_cells, most_cells) + 2 * border);
-    return grid.is_empty() ? std::vector<Sphere>{} : grid.spheres(options.count);
+    Grid grid(*sound, std::clamp(cells, fewest_cells, most_cells) + 2 * border);
+    return grid.is_empty() ? std::vector<Sphere>{} : grid.spheres(count);
 }
 
 } // namespace unseen::vdtree

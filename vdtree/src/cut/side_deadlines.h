@@ -4,54 +4,100 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "cut/kernel/deadline_kernel.h"
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 
 // A deadline for every slot of every block, and the earliest ones of each block: of the slots whose verdict is to unfold,
 // and of the others. The clock starts at 0 and may run to the deadline, which may be infinite. An unused clock has no
-// blocks.
+// blocks, and nothing happens to it.
 class SideDeadlines {
 public:
-    static constexpr float never = std::numeric_limits<float>::infinity();
-
     void use(bool is_used) noexcept { is_used_ = is_used; } // only while there are no blocks
     bool is_used() const noexcept { return is_used_; }
 
-    void clear(); // the clock starts anew
-    void reserve(std::size_t blocks);
-    void push_back(); // a block without deadlines
-    void reset_earliest(std::size_t block) { earliest_unfolded_[block] = earliest_folded_[block] = never; }
+    // The clock starts anew.
+    void clear() {
+        slots_.clear();
+        earliest_unfolded_.clear();
+        earliest_folded_.clear();
+        set_clock(0);
+    }
+    void reserve(std::size_t blocks) {
+        if (!is_used_) return;
+        slots_.reserve(blocks);
+        earliest_unfolded_.reserve(whole_registers(blocks));
+        earliest_folded_.reserve(whole_registers(blocks));
+    }
+    // A block without deadlines.
+    void push_back() {
+        if (!is_used_) return;
+        slots_.emplace_back();
+        std::ranges::fill(slots_.back().slots, never_due);
+        earliest_unfolded_.resize(whole_registers(slots_.size()), never_due);
+        earliest_folded_.resize(whole_registers(slots_.size()), never_due);
+    }
+    void reset_earliest(std::size_t block) {
+        if (is_used_) earliest_unfolded_[block] = earliest_folded_[block] = never_due;
+    }
 
     // `slack`: what there is left from now on; 0 or more.
     void set(std::size_t block, std::size_t place, bool is_unfolded, float slack) {
+        if (!is_used_) return;
         const float due = (clock_.early + slack) * just_less;
         slots_[block].slots[place] = due;
         float& earliest = (is_unfolded ? earliest_unfolded_ : earliest_folded_)[block];
         earliest = std::min(earliest, due);
     }
     float left(std::size_t block, std::size_t place) const {
-        return std::max(slots_[block].slots[place] - clock_.early, 0.0f);
+        return is_used_ ? std::max(slots_[block].slots[place] - clock_.early, 0.0f) : 0.0f;
     }
-    void remove(std::size_t block, std::size_t place) { slots_[block].slots[place] = never; }
-    void prefetch(std::size_t block) const { vdtree::prefetch(&slots_[block]); }
+    void remove(std::size_t block, std::size_t place) {
+        if (is_used_) slots_[block].slots[place] = never_due;
+    }
+    void prefetch(std::size_t block) const {
+        if (is_used_) vdtree::prefetch(&slots_[block]);
+    }
 
     void advance(double motion) { set_clock(now_ + motion); }
     // Sets the clock back to 0 where it has run beyond `longest`, so that deadlines in floats stay fine enough.
-    void restart(double longest);
+    void restart(double longest) {
+        if (!(now_ > longest)) return;
+        const auto set_back = [&](float& due) { due = std::max(due - clock_.early, 0.0f) * just_less; };
+        for (BlockSlots& dues : slots_) std::ranges::for_each(dues.slots, set_back);
+        std::ranges::for_each(earliest_unfolded_, set_back);
+        std::ranges::for_each(earliest_folded_, set_back);
+        set_clock(0);
+    }
     const KernelClock& clock() const noexcept { return clock_; }
     // By block; for those who can prove later ones. Slots keep their own: they are handed over when the block's has
     // come.
     float* earliest_unfolded() noexcept { return earliest_unfolded_.data(); }
 
-    void find_due_blocks(std::vector<std::uint32_t>& blocks) const; // in order, in place of what was there
+    // In order, in place of what was there.
+    void find_due_blocks(std::vector<std::uint32_t>& blocks) const {
+        blocks.clear();
+        const auto is_due = [&](std::size_t block) {
+            return (earliest_unfolded_[block] <= clock_.late) | (earliest_folded_[block] <= clock_.late);
+        };
+        constexpr std::size_t run = 8; // blocks looked at together: mostly none is due
+        for (std::size_t first = 0; first < earliest_folded_.size(); first += run) {
+            bool any = false;
+            for (std::size_t i = 0; i < run; ++i) any |= is_due(first + i);
+            if (!any) continue;
+            for (std::size_t block = first; block < first + run; ++block)
+                if (is_due(block)) blocks.push_back(static_cast<std::uint32_t>(block));
+        }
+    }
     // Makes the block's slots that are due the facing clock's: due at once by that one, and not any more by this.
     // `unfolded`: a bit a slot. Returns whether there are any.
-    bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues);
+    bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues) {
+        return deadline_kernel.hand_over(clock_.late, unfolded, slots_[block].slots, dues.facing,
+                                         earliest_unfolded_[block], earliest_folded_[block]);
+    }
 
     std::uint64_t byte_size() const noexcept { return (sizeof(BlockSlots) + 2 * sizeof(float)) * slots_.capacity(); }
 
@@ -59,7 +105,10 @@ private:
     struct alignas(64) BlockSlots {
         float slots[block_slots];
     };
-    void set_clock(double now);
+    void set_clock(double now) {
+        now_ = now;
+        clock_ = kernel_clock(now);
+    }
 
     bool is_used_ = false;
     double now_ = 0;

@@ -392,9 +392,7 @@ Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t nod
                                      std::vector<Attribute>& attributes) {
     for (const Section& s : sections_) {
         if (s.domain == part_of_tree) continue;
-        Attribute a{{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count},
-                    nullptr,
-                    {}};
+        Attribute a{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count};
         if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty())
             return fail(fault);
         for (const Attribute& before : attributes)

@@ -1,9 +1,7 @@
 #include <unseen/vdtree/internal/baked_light.h>
 
-#include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <vector>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -12,7 +10,6 @@
 #include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
-#include <unseen/vdtree/lighting.h>
 
 namespace unseen::vdtree {
 

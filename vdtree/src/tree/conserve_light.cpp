@@ -1,19 +1,10 @@
 #include <unseen/vdtree/internal/conserve_light.h>
 
-#include <algorithm>
 #include <cmath>
-#include <memory>
 #include <numeric>
-#include <span>
 #include <utility>
-#include <vector>
-
-#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/fold_sequence.h>
-#include <unseen/vdtree/internal/packed_range.h>
-#include <unseen/vdtree/internal/scaled_geometry.h>
-#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

@@ -1,8 +1,5 @@
 #include "tree/directions.h"
 
-#include <bit>
-#include <cstring>
-
 #include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {

@@ -1,7 +1,6 @@
 // A set of normals while a tree is being built: its mask, and its slabs in a form whose union is a maximum of bytes.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -12,7 +11,6 @@
 #include <glm/vec3.hpp>
 
 #include <unseen/vdtree/internal/normal_mask.h>
-#include <unseen/vdtree/internal/slab_axes.h>
 
 namespace unseen::vdtree {
 

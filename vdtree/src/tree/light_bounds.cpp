@@ -1,13 +1,9 @@
 // What the vertices of rings have in normals and albedos.
-#include <unseen/vdtree/lighting.h>
 
-#include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <utility>
 
 #include <glm/geometric.hpp>
 

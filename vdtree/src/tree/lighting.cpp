@@ -1,15 +1,11 @@
 #include <unseen/vdtree/lighting.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include <glm/geometric.hpp>
-
 #include "tree/unchecked_links.h"
-#include "tree/unit_vector.h"
+#include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
-#include <unseen/vdtree/internal/spot_share.h>
+#include <unseen/vdtree/internal/vectors.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
@@ -32,17 +28,16 @@ constexpr double brightest = 1e12; // relative luminance
 constexpr double radians_per_log_intensity = 8;
 
 Error invalid(const std::string& field, const std::string& must) {
-    return {ErrorCode::invalid_argument, field + " must " + must + "."};
+    return invalid_argument(field + " must " + must + ".");
 }
 
 Result<void> validate(const LightSource& light, const std::string& name) {
     using Kind = LightSource::Kind;
     if (!(light.intensity >= 0 && light.intensity <= brightest))
         return invalid(name + ".intensity", "be a number from 0 to 1e12");
-    const bool has_direction = light.kind != Kind::point, has_position = light.kind != Kind::directional;
-    if (has_direction && !(std::abs(glm::length(light.direction) - 1) <= unit_rounding))
+    if (light.kind != Kind::point && !(std::abs(glm::length(light.direction) - 1) <= unit_rounding))
         return invalid(name + ".direction", "have a length, and be finite");
-    if (!has_position) return {};
+    if (light.kind == Kind::directional) return {};
     if (!(glm::length(light.position) <= farthest))
         return invalid(name + ".position", "be finite, and at most 1e18 mesh units away");
     if (!(light.distance > 0 && light.distance <= farthest))
@@ -119,11 +114,9 @@ bool is_inside(const VertexTree& tree, glm::dvec3 point) {
 
 Result<void> validate(const Lighting& lighting) {
     if (lighting.lights.size() > most_lights)
-        return Error{ErrorCode::invalid_argument, "lights: there are " + std::to_string(lighting.lights.size()) +
-                                                      ", but at most " + std::to_string(most_lights) +
-                                                      " can be drawn."};
-    for (const auto& [name, value] :
-         {std::pair("ambient", lighting.ambient), std::pair("material.specular", lighting.specular)})
+        return invalid_argument("lights: there are " + std::to_string(lighting.lights.size()) + ", but at most " +
+                                std::to_string(most_lights) + " can be drawn.");
+    for (const auto& [name, value] : {std::pair("ambient", lighting.ambient), {"material.specular", lighting.specular}})
         if (!(value >= 0 && value <= 1)) return invalid(name, "be from 0 to 1");
     if (!(lighting.shininess >= 1 && lighting.shininess <= most_shininess))
         return invalid("material.shininess", "be from 1 to 1024");
@@ -133,19 +126,16 @@ Result<void> validate(const Lighting& lighting) {
         sum += lighting.lights[i].intensity;
     }
     if (const std::size_t casting = shadow_lights(lighting); casting > most_shadow_lights)
-        return Error{ErrorCode::invalid_argument,
-                     "lights: " + std::to_string(casting) + " of them cast shadows, but at most " +
-                         std::to_string(most_shadow_lights) + " can: let the weaker ones cast none."};
+        return invalid_argument("lights: " + std::to_string(casting) + " of them cast shadows, but at most " +
+                                std::to_string(most_shadow_lights) + " can: let the weaker ones cast none.");
     if (!(sum > 0))
-        return Error{
-            ErrorCode::invalid_argument,
-            "The scene is black: ambient and lights[].intensity are all 0. Give one of them a positive value."};
+        return invalid_argument(
+            "The scene is black: ambient and lights[].intensity are all 0. Give one of them a positive value.");
     return {};
 }
 
 std::size_t shadow_lights(const Lighting& lighting) {
-    return static_cast<std::size_t>(std::count_if(lighting.lights.begin(), lighting.lights.end(),
-                                                  [](const LightSource& light) { return light.casts_shadow; }));
+    return static_cast<std::size_t>(std::ranges::count(lighting.lights, true, &LightSource::casts_shadow));
 }
 
 Result<void> check_lights(const VertexTree& tree, const Lighting& lighting) {
@@ -158,11 +148,10 @@ Result<void> check_lights(const VertexTree& tree, const Lighting& lighting) {
         const std::string field = "lights[" + std::to_string(i) + "].position";
         if (glm::length(light.position - glm::dvec3(around.centre)) > radius * (1 + 2 * least_light_distance)) continue;
         if (nearest_vertex_distance(tree, light.position) <= radius * least_light_distance)
-            return Error{ErrorCode::invalid_argument,
-                         field + " is at a vertex of the model: move the light away from the surface."};
+            return invalid_argument(field + " is at a vertex of the model: move the light away from the surface.");
         if (tree.closedness() != Closedness::open && is_inside(tree, light.position))
-            return Error{ErrorCode::invalid_argument,
-                         field + " is inside of the model, whose surface is closed: move the light out of it."};
+            return invalid_argument(field +
+                                    " is inside of the model, whose surface is closed: move the light out of it.");
     }
     return {};
 }

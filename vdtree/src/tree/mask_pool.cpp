@@ -1,11 +1,8 @@
 #include "tree/mask_pool.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <utility>
 
-#include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {

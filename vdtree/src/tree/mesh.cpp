@@ -2,8 +2,9 @@
 #include <unseen/vdtree/mesh.h>
 
 #include <algorithm>
+#include <utility>
 
-#include <unseen/vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {
 
@@ -11,27 +12,17 @@ namespace {
 
 Error invalid(const std::string& what) { return {ErrorCode::malformed_data, what}; }
 
-Result<void> check_length(const char* name, std::size_t length, std::size_t vertices) {
-    if (length == 0 || length == vertices) return {};
-    return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
-                   " vertices; give one for each vertex or none.");
-}
-
 Result<void> check_ranges(const MeshView& mesh) {
     std::uint64_t previous_first = 0;
     for (std::size_t i = 0; i < mesh.ranges.size(); ++i) {
         const MeshRange& range = mesh.ranges[i];
         const std::uint64_t triangles = mesh.triangles.size();
         // Not first + count: that sum can wrap around.
-        if (range.first_triangle > triangles || range.triangle_count > triangles - range.first_triangle) {
-            return invalid("Range " + std::to_string(i) + " ('" + range.name +
-                           "') of the mesh ends after the last of " + std::to_string(triangles) +
-                           " triangles; shorten it.");
-        }
-        if (range.first_triangle < previous_first) {
-            return invalid("Range " + std::to_string(i) + " ('" + range.name +
-                           "') of the mesh starts before the range in front of it; order them by first triangle.");
-        }
+        const std::string which = "Range " + std::to_string(i) + " ('" + range.name + "') of the mesh ";
+        if (range.first_triangle > triangles || range.triangle_count > triangles - range.first_triangle)
+            return invalid(which + "ends after the last of " + std::to_string(triangles) + " triangles; shorten it.");
+        if (range.first_triangle < previous_first)
+            return invalid(which + "starts before the range in front of it; order them by first triangle.");
         previous_first = range.first_triangle;
     }
     return {};
@@ -41,28 +32,24 @@ Result<void> check_ranges(const MeshView& mesh) {
 
 Result<void> validate(const MeshView& mesh) {
     const std::size_t vertices = mesh.positions.size();
-    for (std::size_t i = 0; i < vertices; ++i) {
-        if (!is_finite(mesh.positions[i])) {
+    for (std::size_t i = 0; i < vertices; ++i)
+        if (!is_finite(mesh.positions[i]))
             return invalid("Vertex " + std::to_string(i) +
                            " of the mesh has a NaN or infinite coordinate; remove it or give it a place.");
-        }
-    }
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        for (const Index corner : mesh.triangles[i]) {
-            if (corner >= vertices) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        for (const Index corner : mesh.triangles[i])
+            if (corner >= vertices)
                 return invalid("Triangle " + std::to_string(i) + " of the mesh uses vertex " + std::to_string(corner) +
                                ", but there are only " + std::to_string(vertices) + "; correct its indices.");
-            }
-        }
-    }
-    if (Result<void> checked = check_length("normals", mesh.normals.size(), vertices); !checked) return checked;
-    if (Result<void> checked = check_length("colours", mesh.colours.size(), vertices); !checked) return checked;
-    if (Result<void> checked = check_length("UVs", mesh.uvs.size(), vertices); !checked) return checked;
+    for (const auto& [name, length] :
+         {std::pair("normals", mesh.normals.size()), {"colours", mesh.colours.size()}, {"UVs", mesh.uvs.size()}})
+        if (length != 0 && length != vertices)
+            return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
+                           " vertices; give one for each vertex or none.");
     if (Result<void> checked = validate(mesh.texture); !checked) return checked;
-    if (!mesh.texture.empty() && mesh.uvs.empty()) {
+    if (!mesh.texture.empty() && mesh.uvs.empty())
         return invalid(
             "The mesh has a texture but no UVs, which say where it lies; give one for each vertex or no texture.");
-    }
     return check_ranges(mesh);
 }
 

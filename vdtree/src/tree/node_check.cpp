@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
-#include <utility>
-#include <vector>
 
 #include <tbb/parallel_reduce.h>
 
@@ -16,10 +13,14 @@ namespace unseen::vdtree {
 
 namespace {
 
-bool is_finite(const float* values, int count) {
-    for (int i = 0; i < count; ++i)
-        if (!std::isfinite(values[i])) return false;
-    return true;
+bool are_finite(std::span<const float> values) {
+    return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
+}
+// Of a struct of floats.
+template <class T>
+bool has_finite_floats(const T& value) {
+    static_assert(sizeof(T) % sizeof(float) == 0);
+    return are_finite({reinterpret_cast<const float*>(&value), sizeof(T) / sizeof(float)});
 }
 
 constexpr const char* links_fault = "contradicts its neighbours in the tree.";
@@ -72,16 +73,6 @@ bool vanishes(Triangle t, Index begin, Index end, std::span<const Index> child_s
     return pairs > 0;
 }
 
-template <class T>
-bool all_finite(const Array<T>& values) {
-    static_assert(sizeof(T) % sizeof(float) == 0);
-    const float* p = reinterpret_cast<const float*>(values.data());
-    const std::size_t n = values.size() * sizeof(T) / sizeof(float);
-    for (std::size_t i = 0; i < n; ++i)
-        if (!std::isfinite(p[i])) return false;
-    return true;
-}
-
 } // namespace
 
 const char* fault_in_root(const TreeGeometry& g) noexcept {
@@ -121,47 +112,45 @@ const char* fault_in_links(const TreeGeometry& g, NodeId node) {
 }
 
 const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept {
-    const bool drawable = is_finite(&g.positions[node].x, 3) &&
-                          (g.colours.empty() || is_finite(&g.colours[node].x, 4)) &&
-                          (g.uvs.empty() || is_finite(&g.uvs[node].x, 2));
-    if (!drawable) return "has a value that is not finite.";
+    if (!has_finite_floats(g.positions[node]) || (!g.colours.empty() && !has_finite_floats(g.colours[node])) ||
+        (!g.uvs.empty() && !has_finite_floats(g.uvs[node])))
+        return "has a value that is not finite.";
     if (node >= g.bounds.size()) return nullptr;
-    for (const Sphere* s : {&g.bounds[node].ring, &g.support_spheres[node]})
-        if (!(is_finite(&s->centre.x, 3) && s->radius >= 0 && std::isfinite(s->radius)))
-            return "has a bounding sphere that is none.";
+    for (const Sphere& sphere : {g.bounds[node].ring, g.support_spheres[node]})
+        if (!has_finite_floats(sphere) || sphere.radius < 0) return "has a bounding sphere that is none.";
     return nullptr;
 }
 
 std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
-    const std::pair<bool, const char*> finite[] = {{all_finite(g.positions), "positions"},
-                                                   {all_finite(g.colours), "colours"},
-                                                   {all_finite(g.uvs), "uvs"},
-                                                   {all_finite(g.support_spheres), "support_spheres"},
-                                                   {all_finite(g.displacement), "displacement"}};
-    for (const auto& [holds, name] : finite)
+    const auto all_finite = [](const auto& values) {
+        return std::ranges::all_of(values, [](const auto& value) { return has_finite_floats(value); });
+    };
+    for (const auto& [holds, name] : {std::pair(all_finite(g.positions), "positions"),
+                                      {all_finite(g.colours), "colours"},
+                                      {all_finite(g.uvs), "uvs"},
+                                      {all_finite(g.support_spheres), "support_spheres"},
+                                      {all_finite(g.displacement), "displacement"}})
         if (!holds) return "Section " + std::string(name) + " has a value that is not finite.";
     for (const NodeBounds& b : g.bounds) {
-        const glm::dvec3 centre = b.ring.centre;
-        if (!std::isfinite(centre.x + centre.y + centre.z + b.ring.radius))
-            return "Section bounds has a value that is not finite.";
-        if (!(b.ring.radius >= 0)) return "A bounding sphere has a negative radius.";
+        if (!has_finite_floats(b.ring)) return "Section bounds has a value that is not finite.";
+        if (b.ring.radius < 0) return "A bounding sphere has a negative radius.";
     }
     for (const Sphere& s : g.support_spheres)
         if (!(s.radius >= 0)) return "A bounding sphere has a negative radius.";
     for (const std::uint32_t at : g.mask_at)
         if (at >= g.mask_records.size() - most_mask_bytes) return "A mask begins behind the last record.";
-    for (const auto* ranges : {&l.support_range, &l.ring_range})
-        for (const PackedRange& r : *ranges)
-            if (!(r.lo <= r.hi)) return "A luminance range ends before it begins.";
-    for (const PackedRange& r : g.ring_texture)
-        if (!(r.lo <= r.hi)) return "A range of the texture's luminance ends before it begins.";
-    for (const float moved : g.displacement)
-        if (!(moved >= 0)) return "A displacement is negative.";
+    const auto ends_early = [](const PackedRange& range) { return range.hi < range.lo; };
+    if (std::ranges::any_of(l.support_range, ends_early) || std::ranges::any_of(l.ring_range, ends_early))
+        return "A luminance range ends before it begins.";
+    if (std::ranges::any_of(g.ring_texture, ends_early))
+        return "A range of the texture's luminance ends before it begins.";
+    if (std::ranges::any_of(g.displacement, [](float moved) { return moved < 0; }))
+        return "A displacement is negative.";
     // Users index their own arrays with these.
-    for (const Index v : g.source_vertices)
-        if (v >= g.source_vertices.size()) return "A source vertex is out of range.";
-    for (const Index t : g.source_triangles)
-        if (t >= g.triangles.size() + g.dropped_triangles) return "A source triangle is out of range.";
+    if (std::ranges::any_of(g.source_vertices, [&](Index v) { return v >= g.source_vertices.size(); }))
+        return "A source vertex is out of range.";
+    if (std::ranges::any_of(g.source_triangles, [&](Index t) { return t >= g.triangles.size() + g.dropped_triangles; }))
+        return "A source triangle is out of range.";
     return {};
 }
 

@@ -1,8 +1,6 @@
 #include <unseen/vdtree/internal/normal_mask.h>
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <numbers>
 
 #include <glm/geometric.hpp>

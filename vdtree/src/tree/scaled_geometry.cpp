@@ -1,4 +1,4 @@
-#include <unseen/vdtree/internal/scaled_geometry.h>
+#include <unseen/vdtree/internal/fold_sequence.h>
 
 #include <algorithm>
 #include <cmath>

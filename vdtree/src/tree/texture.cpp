@@ -1,11 +1,7 @@
 // Pyramids of the least, the largest and the mean luminance of textures.
-#include <unseen/vdtree/mesh.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <numbers>
-#include <string>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
@@ -33,22 +29,14 @@ constexpr std::int64_t most_cells = 16;
 // Beyond this, floats cannot tell texels apart.
 constexpr double farthest_coordinate = 1 << 23; // texels
 
-Unorm16 rounded_down(double y) {
+PackedRange decoded_range(double y) {
+    constexpr double largest = Unorm16::largest;
     const double slack = decoding_slack * std::max(y, 1.0 / 16);
-    return {static_cast<std::uint16_t>(
-        std::clamp(std::floor((y - slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
+    const auto packed = [&](double units) {
+        return Unorm16{static_cast<std::uint16_t>(std::clamp(units, 0.0, largest))};
+    };
+    return {packed(std::floor((y - slack) * largest)), packed(std::ceil((y + slack) * largest))};
 }
-Unorm16 rounded_up(double y) {
-    const double slack = decoding_slack * std::max(y, 1.0 / 16);
-    return {static_cast<std::uint16_t>(
-        std::clamp(std::ceil((y + slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
-}
-
-TexturePyramid::Range unite(TexturePyramid::Range a, TexturePyramid::Range b) {
-    return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)};
-}
-
-constexpr TexturePyramid::Range empty_range{{Unorm16::largest}, {0}};
 
 } // namespace
 
@@ -97,7 +85,7 @@ TexturePyramid::TexturePyramid(const TextureView& texture)
     parallel_loop(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
         for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
             const double luminance = linear_luminance(texture.texels[i]);
-            base.ranges[i] = {rounded_down(luminance), rounded_up(luminance)};
+            base.ranges[i] = decoded_range(luminance);
             base.means[i] = static_cast<float>(luminance);
         }
     });
@@ -109,7 +97,7 @@ TexturePyramid::TexturePyramid(const TextureView& texture)
         coarse.means.resize(coarse.ranges.size());
         parallel_loop(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
             for (std::uint32_t x = 0; x < coarse.width; ++x) {
-                Range range = empty_range;
+                PackedRange range = empty_range;
                 double sum = 0;
                 int count = 0;
                 for (std::uint32_t fy = 2 * y; fy < std::min(2 * y + 2, fine.height); ++fy) {
@@ -153,7 +141,7 @@ TexturePyramid::Cells TexturePyramid::texels_of(double lo, double hi, std::uint3
     return wrapped_end < n ? Cells{first_texel, wrapped_end, -1} : Cells{first_texel, n - 1, wrapped_end - n};
 }
 
-TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
+PackedRange TexturePyramid::range(const UvBox& box) const {
     if (box.is_empty()) return levels_.back().ranges[0];
     const Cells u = texels_of(static_cast<double>(box.lo.x), static_cast<double>(box.hi.x), width_, wrap_u_);
     const Cells v = texels_of(static_cast<double>(box.lo.y), static_cast<double>(box.hi.y), height_, wrap_v_);
@@ -161,14 +149,14 @@ TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
         std::size_t k = 0;
         while (std::max((x1 >> k) - (x0 >> k), (y1 >> k) - (y0 >> k)) >= most_cells) ++k;
         const Level& level = levels_[k];
-        Range range = empty_range;
+        PackedRange range = empty_range;
         for (std::int64_t y = y0 >> k; y <= y1 >> k; ++y)
             for (std::int64_t x = x0 >> k; x <= x1 >> k; ++x)
                 range =
                     unite(range, level.ranges[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)]);
         return range;
     };
-    Range range = look(u.first, u.last, v.first, v.last);
+    PackedRange range = look(u.first, u.last, v.first, v.last);
     if (u.second_last >= 0) range = unite(range, look(0, u.second_last, v.first, v.last));
     if (v.second_last >= 0) range = unite(range, look(u.first, u.last, 0, v.second_last));
     if (u.second_last >= 0 && v.second_last >= 0) range = unite(range, look(0, u.second_last, 0, v.second_last));

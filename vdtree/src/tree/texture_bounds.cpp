@@ -1,10 +1,8 @@
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
-#include <unseen/vdtree/internal/texture_pyramid.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace unseen::vdtree {
 
@@ -60,10 +58,7 @@ std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreePar
     const std::vector<UvBox> boxes = bound_footprints(g, parts);
     const TexturePyramid pyramid(g.texture_view());
     std::vector<PackedRange> ranges(boxes.size());
-    parallel_loop(std::size_t{0}, boxes.size(), [&](std::size_t node) {
-        const TexturePyramid::Range range = pyramid.range(boxes[node]);
-        ranges[node] = {range.lo, range.hi};
-    });
+    parallel_loop(std::size_t{0}, boxes.size(), [&](std::size_t node) { ranges[node] = pyramid.range(boxes[node]); });
     return ranges;
 }
 

@@ -2,12 +2,10 @@
 #include <unseen/vdtree/internal/texture_fit.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/texture_bounds.h>
-#include <unseen/vdtree/internal/texture_pyramid.h>
 
 namespace unseen::vdtree {
 

@@ -1,4 +1,3 @@
-#include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 
 #include <algorithm>

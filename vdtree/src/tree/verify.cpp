@@ -1,16 +1,12 @@
 // Checks everything that a vertex tree promises.
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
 #include <optional>
-#include <string>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
-#include <unseen/vdtree/internal/texture_pyramid.h>
-#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
@@ -145,15 +141,13 @@ private:
     PackedRange texture_of(std::initializer_list<NodeId> nodes) const {
         UvBox box;
         for (const NodeId node : nodes) box.include(g_.uvs[node]);
-        const TexturePyramid::Range range = pyramid_->range(box);
-        return {range.lo, range.hi};
+        return pyramid_->range(box);
     }
     PackedRange shade_of(std::initializer_list<NodeId> nodes) const {
-        PackedRange range{{Unorm16::largest}, {0}};
+        PackedRange range = empty_range;
         for (const NodeId node : nodes) {
             const Unorm16 y = l_.luminance[node];
-            const PackedRange shade = g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y);
-            range = {std::min(range.lo, shade.lo), std::max(range.hi, shade.hi)};
+            range = unite(range, g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y));
         }
         return range;
     }

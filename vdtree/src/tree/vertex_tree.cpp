@@ -1,30 +1,19 @@
-#include <unseen/vdtree/colour.h>
-#include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/internal/vertex_tree_data.h>
+#include <unseen/vdtree/vertex_tree.h>
 
 #include <algorithm>
-#include <cmath>
-#include <string>
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/colour.h>
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/texture_bounds.h>
+
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
-#include <unseen/vdtree/internal/normal_mask.h>
-#include <unseen/vdtree/internal/packed_range.h>
-#include <unseen/vdtree/internal/texture_bounds.h>
-#include <unseen/vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 
 namespace {
-
-template <class T>
-std::uint64_t bytes_of(const Array<T>& a) {
-    return a.bytes();
-}
-
-constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
 
 PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
 
@@ -333,10 +322,9 @@ Result<SoundTree> SoundTree::of(const VertexTree& tree) {
 
 namespace {
 
-// The data of a tree whose luminance is found anew. There is nothing left to check.
-Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit,
-                                                            bool textured,
-                                                            const FunctionRef<float(NodeId)>* given = nullptr) {
+// A tree whose luminance is found anew. There is nothing left to check.
+Result<VertexTree> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured,
+                               const FunctionRef<float(NodeId)>* given = nullptr) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     auto data = std::make_shared<VertexTree::Data>();
@@ -345,30 +333,24 @@ Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tr
     parts.assign_triangles(sound->first_triangle(), sound->triangles());
     data->light =
         std::make_shared<TreeLuminance>(derive_luminance(*data->geometry, parts, light, prelit, textured, given));
-    return std::shared_ptr<const VertexTree::Data>(std::move(data));
+    return VertexTree(std::move(data));
 }
 
 } // namespace
 
 Result<VertexTree> VertexTree::relit(const Light& light) const {
-    auto data = shaded_anew(*this, light, false, data_->light->textured);
-    if (!data) return data.error();
-    return VertexTree(std::move(*data));
+    return shaded_anew(*this, light, false, data_->light->textured);
 }
 
 Result<VertexTree> VertexTree::shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture) const {
-    auto data = shaded_anew(*this, light(), true, keeps_texture && data_->light->textured, &luminance);
-    if (!data) return data.error();
-    return VertexTree(std::move(*data));
+    return shaded_anew(*this, light(), true, keeps_texture && data_->light->textured, &luminance);
 }
 
 Result<VertexTree> VertexTree::untextured() const {
-    auto data = shaded_anew(*this, light(), is_prelit() && !colours().empty(), false);
-    if (!data) return data.error();
-    return VertexTree(std::move(*data));
+    return shaded_anew(*this, light(), is_prelit() && !colours().empty(), false);
 }
 
-std::string fault_in_attribute(const AttributeInfo& a, std::size_t interior_count, std::size_t node_count) {
+std::string fault_in_attribute(const Attribute& a, std::size_t interior_count, std::size_t node_count) {
     const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
     if (a.name.empty() || a.name.size() > longest_attribute_name ||
         !std::all_of(a.name.begin(), a.name.end(), is_plain))
@@ -377,16 +359,10 @@ std::string fault_in_attribute(const AttributeInfo& a, std::size_t interior_coun
     if (!(component == 1 || component == 2 || component == 4 || component == 8) || a.element_bytes == 0 ||
         a.element_bytes % component != 0)
         return "Attribute " + a.name + " has values that are no numbers of 1, 2, 4 or 8 bytes.";
-    switch (a.domain) {
-    case AttributeDomain::tree: return {};
-    case AttributeDomain::interior_node:
-        if (a.count == interior_count) return {};
-        break;
-    case AttributeDomain::node:
-        if (a.count == node_count) return {};
-        break;
-    default: return "Attribute " + a.name + " is of nothing that a tree has.";
-    }
+    if (a.domain == AttributeDomain::tree) return {};
+    if (a.domain != AttributeDomain::interior_node && a.domain != AttributeDomain::node)
+        return "Attribute " + a.name + " is of nothing that a tree has.";
+    if (a.count == (a.domain == AttributeDomain::node ? node_count : interior_count)) return {};
     return "Attribute " + a.name + " has " + std::to_string(a.count) + " values, not one for each node.";
 }
 
@@ -397,18 +373,16 @@ std::span<const std::byte> VertexTree::attribute_bytes(std::string_view name, st
     return {};
 }
 
-std::vector<AttributeInfo> VertexTree::attributes() const {
-    return {data_->attributes.begin(), data_->attributes.end()};
-}
+std::span<const Attribute> VertexTree::attributes() const noexcept { return data_->attributes; }
 
 Result<VertexTree> VertexTree::with_attribute(Attribute attribute) const {
     if (const std::string fault = fault_in_attribute(attribute, interior_count(), node_count()); !fault.empty())
-        return Error{ErrorCode::invalid_argument, fault};
+        return invalid_argument(fault);
     auto data = std::make_shared<Data>(*data_);
     std::erase_if(data->attributes, [&](const Attribute& a) { return a.name == attribute.name; });
     if (data->attributes.size() == most_attributes)
-        return Error{ErrorCode::invalid_argument, "A tree has at most " + std::to_string(most_attributes) +
-                                                      " attributes; there is no room for " + attribute.name + "."};
+        return invalid_argument("A tree has at most " + std::to_string(most_attributes) +
+                                " attributes; there is no room for " + attribute.name + ".");
     data->attributes.push_back(std::move(attribute));
     return VertexTree(std::move(data));
 }
@@ -416,15 +390,14 @@ Result<VertexTree> VertexTree::with_attribute(Attribute attribute) const {
 std::uint64_t VertexTree::byte_size() const noexcept {
     std::uint64_t attributes = 0;
     for (const Attribute& a : data_->attributes) attributes += a.bytes.size();
+    const auto bytes_of = [](const auto&... arrays) { return (std::uint64_t{arrays.bytes()} + ...); };
     const TreeGeometry& g = *data_->geometry;
     const TreeLuminance& l = *data_->light;
-    return attributes + bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) +
-           bytes_of(g.uvs) + bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) +
-           bytes_of(g.first_triangle) + bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) +
-           bytes_of(g.mask_records) + bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
-           bytes_of(g.source_vertices) + bytes_of(g.document) + bytes_of(g.texels) + bytes_of(g.ring_texture) +
-           g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
-           bytes_of(l.ring_range) + bytes_of(l.adaptation);
+    return attributes + g.ranges.capacity() * sizeof(MeshRange) +
+           bytes_of(g.parents, g.positions, g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end, g.subtree_end,
+                    g.first_triangle, g.bounds, g.support_spheres, g.mask_at, g.mask_records, g.displacement,
+                    g.triangles, g.source_triangles, g.source_vertices, g.document, g.texels, g.ring_texture) +
+           bytes_of(l.luminance, l.support_range, l.ring_range, l.adaptation);
 }
 
 } // namespace unseen::vdtree

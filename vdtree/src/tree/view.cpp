@@ -1,16 +1,13 @@
 #include <unseen/vdtree/view.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <string>
 
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include "tree/unit_vector.h"
 #include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/internal/finite.h>
+#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {
 
@@ -29,15 +26,12 @@ constexpr double pixel_rounding = 1e-5;
 // Below this share of the largest entry, one that must not be 0 is.
 constexpr double least_share = 1e-12;
 
-bool is_finite(const glm::dmat4& matrix) {
-    for (int column = 0; column < 4; ++column)
-        for (int row = 0; row < 4; ++row)
-            if (!std::isfinite(matrix[column][row])) return false;
-    return true;
+bool has_finite_entries(const glm::dmat4& matrix) {
+    return std::all_of(&matrix[0][0], &matrix[0][0] + 16, [](double entry) { return std::isfinite(entry); });
 }
 
 Result<void> check_view_matrix(const glm::dmat4& m) {
-    if (!is_finite(m)) return invalid_argument("The view matrix must be finite.");
+    if (!has_finite_entries(m)) return invalid_argument("The view matrix must be finite.");
     const glm::dmat3 turn(m);
     if (std::abs(m[0][3]) > matrix_rounding || std::abs(m[1][3]) > matrix_rounding ||
         std::abs(m[2][3]) > matrix_rounding || std::abs(m[3][3] - 1) > matrix_rounding)
@@ -87,7 +81,7 @@ Result<View> view_from_matrices(const glm::dmat4& view_from_world, const glm::dm
                                 int height) {
     if (const auto valid = check_view_matrix(view_from_world); !valid) return valid.error();
     glm::dmat4 clip = clip_from_view;
-    if (!is_finite(clip)) return invalid_argument("The projection matrix must be finite.");
+    if (!has_finite_entries(clip)) return invalid_argument("The projection matrix must be finite.");
     const bool is_perspective = std::abs(clip[2][3]) > std::abs(clip[3][3]);
     const double w = std::abs(is_perspective ? clip[2][3] : clip[3][3]);
     if (!(w > 0)) return invalid_argument("The projection matrix is singular.");
@@ -155,19 +149,6 @@ Result<void> validate_perspective(const View& view, const char* what) {
     return validate(view);
 }
 
-Result<void> validate_centred(const View& view, const char* what) {
-    if (view.shift != glm::dvec2(0))
-        return invalid_argument(std::string(what) +
-                                " needs a view through the middle of its window: the shift must be 0.");
-    return validate_perspective(view, what);
-}
-
-WindowPlane window_plane(const View& view) {
-    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
-    const glm::dvec2 half(half_up * view.width / view.height, half_up);
-    return {view.shift * half, half};
-}
-
 glm::dvec2 axis_px(const View& view) {
     return {0.5 * view.width * (1 - view.shift.x), 0.5 * view.height * (1 + view.shift.y)};
 }
@@ -175,7 +156,16 @@ glm::dvec2 axis_px(const View& view) {
 CameraFrame camera_frame(const View& view) {
     const glm::dvec3 back = unit(view.eye - view.target);
     const glm::dvec3 right = unit(glm::cross(unit(view.up), back));
-    return {right, glm::cross(back, right), back};
+    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const glm::dvec2 half(half_up * view.width / view.height, half_up);
+    return {right, glm::cross(back, right), back, view.shift * half, half};
+}
+
+std::vector<glm::dvec3> inward_of_window(const View& view) {
+    const auto [right, up, back, middle, half] = camera_frame(view);
+    if (view.orthographic_height) return {right, -right, up, -up};
+    const glm::dvec2 low = half - middle, high = half + middle; // left and down; right and up
+    return {-back, right - low.x * back, -right - high.x * back, up - low.y * back, -up - high.y * back};
 }
 
 View frame_sphere(glm::dvec3 centre, double radius, glm::dvec3 direction, double fill, const View& window) {

@@ -1,5 +1,5 @@
-// Fold criteria: which nodes a view may fold. The criteria of Unseen are in distance form: fold if the eye is far enough
-// away. That lets a cut follow a moving eye at a cost that goes with what changes.
+// Fold criteria: which nodes a view may fold. They are in distance form, fold if the eye is far enough away, so that a cut
+// can follow a moving eye at a cost that goes with what changes.
 //
 // A node is unfolded while
 //     |eye - c| - R < D(node, silhouette, eccentricity) / threshold,
@@ -7,11 +7,10 @@
 // or while the class's least cost is above the threshold. c and R are its ring's (or support's) sphere. For silhouettes
 // D is the larger of that and their own length * switch_distance.
 //
-// The class says how visible a fold of a given extent is. A node has one class for when its ring faces the eye from one
-// side, and another for when it is, or may be, a silhouette. Spheres and lengths nest, and classes grow up the tree. So D
-// is at least its children's for equal arguments, and a parent's arguments are never the better ones: a cut made by such
-// tests is closed upward. The same numbers bound how far the eye may move before a test can change, so no node is tested
-// before its time.
+// The class says how visible a fold of a given extent is: one class for when a node's ring faces the eye from one side,
+// and another for when it may be a silhouette. Spheres and lengths nest, and classes grow up the tree, so D is at least
+// the children's, and cuts made by such tests are closed upward. The same numbers bound how far the eye may move before a
+// test can change, so no node is tested before its time.
 #pragma once
 
 #include <cstdint>
@@ -31,32 +30,15 @@
 
 namespace unseen::vdtree {
 
-class LightBounds;
-
-// ---- criteria in distance form
-
 // Which row of the table of switch distances a node uses.
 struct FoldClass {
     std::uint16_t interior = 0;   // if the whole ring faces the eye, or faces away
     std::uint16_t silhouette = 0; // if the ring is, or may be, an outline, or has an irregular edge
 };
 
-// A linear map from relative luminance to a unit of the criterion's own.
-struct AbsoluteScale {
-    double offset = 0; // the value of 0; 0 or more
-    double span = 1;   // what 1 adds; above 0
+struct LitClasses; // for lights that may move; only the library makes these
 
-    double of(double relative) const { return offset + span * relative; }
-};
-
-// Classes for trees under lights that may move: interior ones follow from the range of luminances that the viewpoint's
-// lighting gives to a node's vertices, adapted to the brightest of these. Only the library lays out their table's rows.
-struct LitClasses {
-    std::shared_ptr<const LightBounds> bounds; // of the tree
-    AbsoluteScale scale;
-    std::uint16_t silhouette = 0; // the class of all outlines
-};
-
+// Copies are cheap and share their values.
 class DistanceCriterion {
 public:
     enum class Spheres : std::uint8_t { ring, support };
@@ -73,7 +55,7 @@ public:
         // Same shape: no fold of this class costs less, however far away. Empty: 0 for all.
         std::vector<float> least_cost = {};
         // Under lights, in place of `classes`; switch distances must grow with contrasts and luminances.
-        std::optional<LitClasses> lit = {};
+        std::shared_ptr<const LitClasses> lit = {};
         std::size_t eccentricity_bins = 1;
         double bin_degrees = 1; // bin b holds b * bin_degrees up to the next; the last one everything beyond
     };
@@ -82,43 +64,32 @@ public:
     static constexpr float always_visible = std::numeric_limits<float>::max();
 
     // Fails if sizes do not fit the tree, a class has no row, a length or switch distance is NaN, a length is negative or
-    // infinite, or a scale is invalid. A child whose switch distance exceeds its parent's, as in a tree from a damaged
-    // file, is safe (it folds with the parent) but costs time: see is_monotone().
+    // infinite, or a scale is invalid. A child whose switch distance exceeds its parent's costs time: see is_monotone().
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
 
-    const Parts& parts() const noexcept { return parts_; }
-    NodeId interior_count() const noexcept { return interior_count_; } // of the tree that it was made for
-    bool uses_silhouettes() const noexcept { return uses_silhouettes_; }
+    const Parts& parts() const noexcept { return values_->parts; }
+    NodeId interior_count() const noexcept { return values_->interior_count; } // of the tree that it was made for
+    bool uses_silhouettes() const noexcept { return values_->uses_silhouettes; }
     // Whether no node's switch distance exceeds its parent's. Then a cut watches only its border; else every node above
     // it, too.
-    bool is_monotone() const noexcept { return is_monotone_; }
-    bool uses_gaze() const noexcept { return parts_.eccentricity_bins > 1; }
-    std::uint64_t id() const noexcept { return id_; }                     // identifies these values; copies share it
-    std::uint64_t object_id() const noexcept { return object_id_.value; } // identifies this object; copies have another
+    bool is_monotone() const noexcept { return values_->is_monotone; }
+    bool uses_gaze() const noexcept { return parts().eccentricity_bins > 1; }
+    bool is_copy_of(const DistanceCriterion& other) const noexcept { return values_ == other.values_; }
 
 private:
-    struct ObjectId {
-        ObjectId() noexcept;
-        ObjectId(const ObjectId&) noexcept : ObjectId() {}
-        ObjectId& operator=(const ObjectId&) noexcept {
-            value = ObjectId().value;
-            return *this;
-        }
-        std::uint64_t value;
+    struct Values {
+        Parts parts;
+        NodeId interior_count;
+        bool uses_silhouettes, is_monotone;
     };
+    explicit DistanceCriterion(std::shared_ptr<const Values> values) : values_(std::move(values)) {}
 
-    explicit DistanceCriterion(Parts parts);
-
-    Parts parts_;
-    NodeId interior_count_ = 0;
-    bool uses_silhouettes_ = false, is_monotone_ = false;
-    std::uint64_t id_;
-    ObjectId object_id_;
+    std::shared_ptr<const Values> values_;
 };
 
 // A copy of the criterion under which some nodes never fold: not facing away, outside all frusta, or behind occluders.
-// `kept`: one bit a node in whole words, lowest first; if a node is kept, its parent must be. With lights, do not use it
-// for viewpoints that show nothing at all: there, only outlines keep their nodes. Fails if sizes do not fit the tree.
+// `kept`: one bit a node in whole words, lowest first; if a node is kept, its parent must be. With lights, only for
+// viewpoints that show something. Fails if sizes do not fit the tree.
 Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,
                                   std::span<const std::uint64_t> kept);
 
@@ -138,10 +109,8 @@ struct Plane {
     double offset = 0;                 // mesh units
 };
 
-// The convex region that a view shows, or the light of a shadow.
-struct Frustum {
-    std::vector<Plane> planes;
-};
+// The convex region that a view shows, or the light of a shadow: inside of all planes.
+using Frustum = std::vector<Plane>;
 
 // The eye's plane and the window's four sides; no far plane. An orthographic view has the four sides only.
 Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement = {});
@@ -149,9 +118,8 @@ Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& p
 // The eye that a cut is made for, in the tree's frame (relative to its origin, mesh units).
 struct Viewpoint {
     glm::dvec3 eye = glm::dvec3(0);
-    // The cut is valid for all eyes within this distance (mesh units) of `eye`: it keeps what any of them needs. For a
-    // stereo pair, half of the distance between the eyes, with `eye` in the middle. Costs triangles: everything counts as
-    // that much nearer, and as an outline if it may be one from there.
+    // The cut is valid for all eyes within this distance (mesh units) of `eye`, such as a stereo pair around it. Costs
+    // triangles: everything counts as that much nearer, and as an outline if it may be one from there.
     double eye_spread = 0;
     std::optional<glm::dvec3> gaze = {}; // unit direction from the eye; default: everything counts as foveal
     std::vector<Frustum> frusta = {};    // nodes outside all of them fold; empty: no node is outside
@@ -163,14 +131,13 @@ struct Viewpoint {
 
 // The viewpoint of a view; if `window_only`, nodes outside the window fold.
 //
-// An orthographic view is replaced by eyes 2000 window heights away from the tree's far side, spread over the whole tree.
-// So nothing counts as smaller than it is drawn, and nothing counts as facing the eyes unless it does.
+// An orthographic view is replaced by eyes 2000 window heights away from the tree's far side, spread over the whole tree:
+// nothing counts as smaller than it is drawn, or as facing the eyes unless it does.
 Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement = {},
                        bool window_only = true);
-// One viewpoint for both views of a stereo pair: midway between their eyes, with half of their distance as spread. Nodes
-// outside both windows fold if `window_only`. One criterion serves both if they share field and window; otherwise make it
-// for the one with more pixels per degree. Fails if a view is invalid, only one is orthographic, or their orthographic
-// heights differ.
+// One viewpoint for both views of a stereo pair: midway between their eyes, with half of their distance as spread. Make the
+// criterion for the view with more pixels per degree. Fails if a view is invalid, only one is orthographic, or their
+// orthographic heights differ.
 Result<Viewpoint> viewpoint_of_pair(const VertexTree& tree, const View& left, const View& right,
                                     const Similarity& placement = {}, bool window_only = true);
 
@@ -181,34 +148,19 @@ glm::dvec3 eye_in_tree(const VertexTree& tree, const View& view, const Similarit
 // eye of viewpoint_of().
 double pixels_per_radian(const View& view);
 
-struct InnerSphereOptions {
-    int count = 8; // the largest spheres are kept; each costs a nanosecond or less in every test
-    int cells =
-        96; // of a grid along the tree's longest side, 8 to 512: spheres stay out of cells that the surface touches
-};
-
-// Spheres inside a closed surface that nowhere touch it: every line from outside into one crosses the surface first. For
-// Viewpoint::occluders, with the eye outside the tree's bounding sphere. Where surfaces intersect themselves, inside is
-// where their winding number is not 0. Empty for open surfaces, if VertexTree::check() fails, and if nothing fits in.
-// Cost: some 0.1 s, and 50 ns a triangle; up to a dozen bytes for every cell meanwhile.
-std::vector<Sphere> inner_spheres(const VertexTree& tree, const InnerSphereOptions& options = {});
+// The `count` largest spheres inside a closed surface (where its winding number is not 0) that stay out of the cells it
+// touches, of a grid of `cells` (8 to 512) along the tree's longest side. For Viewpoint::occluders, with the eye outside
+// the tree's bounding sphere; each costs a nanosecond or less in every test. Empty for open surfaces, if
+// VertexTree::check() fails, and if nothing fits in. Cost: some 0.1 s, and 50 ns a triangle; up to a dozen bytes a cell.
+std::vector<Sphere> inner_spheres(const VertexTree& tree, int count = 8, int cells = 96);
 
 // ---- criteria of the caller's own
 
 // For Cut::adjust(): writes the fold cost of each interior node in `nodes`, 0 or more. A node folds if its cost is at most
-// 1; NaN unfolds it. Costs must not fall from a node to its parent. Called in batches on the thread that adjusts the cut;
-// must not throw. Refers to the caller's object during the call.
+// 1; NaN unfolds it. Costs must not fall from a node to its parent. Called in batches on the calling thread; must not throw.
 using FoldCriterion = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs)>;
 
-// Costs from here on are infinite: no finite distance hides the fold. They differ so that budgets have an order.
-inline constexpr float least_unbounded_cost = 1e30f;
-inline bool is_unbounded(float cost) noexcept { return !(cost < least_unbounded_cost); }
-inline float unbounded_cost(float order) noexcept { return least_unbounded_cost * (1 + order); }
-
-// For Cut::adjust(): writes for each interior node whether its ring is visible. Nodes that are out fold at no cost. All
-// children of a node that is out must be out, and all children of one that is wholly in must be wholly in.
-enum class RingVisibility : std::uint8_t { out, partly, wholly_in };
-using VisibilityTest =
-    Callback<void(const VertexTree&, std::span<const NodeId> nodes, std::span<RingVisibility> visible)>;
+// Such costs count as infinite: no finite distance hides the fold. They may differ, so that budgets have an order.
+inline bool is_unbounded(float cost) noexcept { return !(cost < 1e30f); }
 
 } // namespace unseen::vdtree

@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <unseen/vdtree/criteria.h>
@@ -17,11 +16,6 @@
 namespace unseen::vdtree {
 
 class CutState;
-
-struct AdjustOptions {
-    VisibilityTest visibility = {};            // default: everything is visible
-    std::optional<Index> triangle_budget = {}; // best effort: the largest number of triangles
-};
 
 struct AdjustStats {
     std::uint64_t node_tests = 0; // fold costs computed
@@ -42,15 +36,13 @@ struct FollowOptions {
     // The largest number of triangles. Nodes unfold in descending cost, ties by node number, down to cost 0.
     std::optional<Index> triangle_budget = {};
     bool fill_budget = false; // go on at cost 0 while triangles are left
-    // 1 gives the best cut within the budget in every frame: its largest fold cost is the least possible. Up to 2, the
-    // largest fold cost may exceed the least by this factor; then a frame costs what changes, and slow motions do not
-    // flicker.
+    // 1 gives the best cut within the budget in every frame, whose largest fold cost is the least possible. Up to 2, it may
+    // exceed the least by this factor; then a frame costs what changes, and slow motions do not flicker.
     float hysteresis = 1;
 
-    // Time limit, as close as the clock allows; a few tests and changes are always done. The rest is kept for the next
-    // calls, worst folds first. Results then depend on the machine's speed. Two steps cannot be interrupted: replacing
-    // the whole cut after a jump, and rebuilding the watch list in the next call. A budget without hysteresis starts
-    // anew in every call.
+    // Time limit, as close as the clock allows; a few tests and changes are always done, and the rest is kept for the next
+    // calls, worst folds first. Two steps cannot be interrupted: replacing the whole cut after a jump, and rebuilding the
+    // watch list in the next call. A budget without hysteresis starts anew in every call.
     std::optional<double> milliseconds = {};
 
     // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented (outward
@@ -96,12 +88,11 @@ public:
     //   Without a budget, nodes of cost 1 and less fold, top-down: a node below a folded one is folded.
     //   With a budget, nodes unfold in descending cost, ties by node number, while the triangles stay within the budget
     //   and the cost is above 0. Among all cuts within the budget, this one has the least largest cost.
-    AdjustStats adjust(const FoldCriterion& criterion, const AdjustOptions& options = {});
+    AdjustStats adjust(const FoldCriterion& criterion, std::optional<Index> triangle_budget = {});
 
     // Makes the cut of a criterion in distance form: nodes with a cost above the threshold unfold, top-down. The result
-    // does not depend on the state before, but the time does: it goes with what changes, and a view that stands still
-    // costs nothing. Another criterion, or a jump of the viewpoint, tests every node in use once. Fails, and changes
-    // nothing, if
+    // does not depend on the state before, but the time goes with what changes: another criterion, or a jump of the
+    // viewpoint, tests every node in use once. Fails, and changes nothing, if
     //   the criterion was made for a tree with another number of interior nodes,
     //   the eye is not finite, or more than 1e18 mesh units from the tree's origin,
     //   the gaze or a plane's normal is not of unit length (within a thousandth), or a plane's offset is not finite,
@@ -137,26 +128,22 @@ private:
     const NodeId* proxies_;  // by leaf: the active node that stands for it; lies in the state, too
 };
 
-// One object of a scene whose objects share a budget. Refers to the cut and the criterion.
+// One object of a scene whose objects share a budget.
 struct SceneObject {
-    SceneObject(Cut& cut_, const DistanceCriterion& criterion_, Viewpoint viewpoint_, bool cull_back_faces_ = false)
-        : cut(cut_), criterion(criterion_), viewpoint(std::move(viewpoint_)), cull_back_faces(cull_back_faces_) {}
-    SceneObject(Cut& cut, DistanceCriterion&& criterion, Viewpoint viewpoint, bool cull_back_faces = false) = delete;
-
     Cut& cut;
-    const DistanceCriterion& criterion;
+    DistanceCriterion criterion;
     Viewpoint viewpoint; // in the object's own frame
     bool cull_back_faces = false;
 };
 
-// Makes the best cuts of several objects within one triangle budget: unfolds in descending cost over all of them, ties by
-// the earlier object and then by node number, down to cost 0. Returns one entry for each object; max_fold_cost is the
-// scene's. Fails, and changes nothing, if Cut::follow() would fail, or if a cut occurs twice.
+// Makes the best cuts of several objects within one triangle budget: unfolds in descending cost, ties by object and then by
+// node number, down to cost 0. One entry an object; max_fold_cost is the scene's. Fails, and changes nothing, if
+// Cut::follow() would fail, or if a cut occurs twice.
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
 
-// The interior nodes that the criterion unfolds from a viewpoint, each tested by itself, whatever is above it: one bit a
-// node, lowest first. Uses the threshold and back faces of the options only. Fails like Cut::follow(). Bits of damaged
-// nodes (see VertexTree::is_sound) are meaningless. Cost: some ten nanoseconds a node.
+// The interior nodes that the criterion unfolds, each tested by itself, whatever is above it: one bit a node, lowest first.
+// Uses the threshold and back faces of the options only. Fails like Cut::follow(). Bits of damaged nodes (see
+// VertexTree::is_sound) are meaningless. Cost: some ten nanoseconds a node.
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion,
                                                    const Viewpoint& viewpoint, const FollowOptions& options = {});
 // Fold costs by interior node: the threshold from which on the node folds. 0 for invisible nodes; infinite if the fold is

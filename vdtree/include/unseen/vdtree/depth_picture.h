@@ -15,38 +15,14 @@
 
 namespace unseen::vdtree {
 
-// The part of the window that some points cover, and the nearest of them. The footprint of several points contains that of
-// every point between them.
-struct Footprint {
-    double left = 1e300, top = 1e300, right = -1e300, bottom = -1e300; // pixels
-    double nearest = 1e300; // along the view's axis, world units; 0 or less beside and behind the eye
-
-    void add(const Footprint& other) noexcept;
-};
-
-// Projects points of the world onto a view's window.
-class Projector {
-public:
-    explicit Projector(const View& view); // precondition: valid, and perspective
-    Footprint operator()(glm::dvec3 point) const noexcept;
-
-private:
-    glm::dvec3 eye_;
-    CameraFrame camera_;
-    double middle_x_, middle_y_, focal_px_; // where the line of sight meets the window, and tangents in pixels
-};
-
-// By interior node: the footprint of its ring before and after the fold, and of all nodes below it. It holds as long as the
-// neighbours are unfolded, or folded under the same rule. Fails if VertexTree::check() fails, and for orthographic views.
-// Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
-Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view);
+struct Footprint; // the part of a window that a node covers
 
 // Copies are cheap and share their data; any number of threads may ask at once.
 class DepthPicture {
 public:
-    // `depth`: by pixel of the view's window, row-major from the top left, the farthest depth that any sample of the pixel
-    // shows, along the view's axis in world units; infinite if it may show the background. Fails on an invalid view,
-    // another number of pixels, and depths that are NaN or not above 0. Cost: some nanoseconds and 6 bytes a pixel.
+    // `depth`: by pixel, row-major from the top left, the farthest depth that any sample of it shows, along the view's axis
+    // in world units; infinite for the background. Fails on an invalid view, another number of pixels, and depths that are
+    // NaN or not above 0. Cost: some nanoseconds and 6 bytes a pixel.
     static Result<DepthPicture> create(const View& view, std::span<const float> depth);
 
     const View& view() const noexcept { return levels_->view; }
@@ -70,8 +46,8 @@ private:
     std::shared_ptr<const Levels> levels_;
 };
 
-// The interior nodes whose footprints the picture hides, one bit a node, lowest first. Fails like find_footprints(). Cost:
-// some 50 ns a triangle, and 40 bytes a node meanwhile.
+// The interior nodes that the picture hides, before and after their folds, with all below them; one bit a node, lowest
+// first. Fails if VertexTree::check() fails. Cost: some 50 ns a triangle, and 40 bytes a node meanwhile.
 Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
                                                const DepthPicture& picture);
 

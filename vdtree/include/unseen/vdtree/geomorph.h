@@ -1,17 +1,14 @@
 // Geomorphs: vertices glide between a proxy and its children over a set time, so that a cut changes without popping.
 //
-// A geomorph keeps a second cut, the *drawn* one, behind a followed cut. If the followed cut unfolds a node, the drawn cut
-// unfolds it at once, and the children glide from their proxy's place to their own. If the followed cut folds a node, the
-// children glide to the proxy first, and then the drawn cut folds it. A change that is reverted meanwhile turns the
-// children around. Every changing node has a weight w that runs from 0 to 1 while it unfolds and back while it folds. A
-// child is drawn at
+// A geomorph keeps a second cut, the *drawn* one, behind a followed cut. Unfolds are made in it at once, and the children
+// glide from their proxy's place to their own; for folds, the children glide to the proxy first. A change that is reverted
+// meanwhile turns them around. Every changing node has a weight w from 0 (folded) to 1 (unfolded), and a child is drawn at
 //     (1 - w) * place(node) + w * own place,
-// where the node itself may be gliding, too. So every point of the drawn surface moves continuously: a step moves it by at
-// most the share (time step / glide time) of the way between a child and its proxy, for each gliding node above it. Once
-// the followed cut has stood still for a glide's time, both cuts are equal.
+// where the node itself may be gliding, too. So every point of the drawn surface moves continuously. Once the followed cut
+// has stood still for a glide's time, both cuts are equal.
 //
-// The drawn cut is always a valid cut, without cracks. Its triangles are those of the followed cut, and those that folds
-// have removed within a glide's time: a triangle budget holds for the followed cut only.
+// The drawn cut is always a valid cut, without cracks. It has the triangles of the followed cut, and those that folds have
+// removed within a glide's time: a triangle budget holds for the followed cut only.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +21,6 @@
 #include <unseen/vdtree/cut.h>
 
 namespace unseen::vdtree {
-
-struct GeomorphOptions {
-    double seconds = 0.25; // a glide's time; 0: the drawn cut is the followed one
-
-    // A step is a jump if it is the first, or if more than this share of the triangles come or go by more than 64 folds and
-    // unfolds. A jump ends all glides: the drawn cut becomes the followed one. Infinite: only the first step is a jump.
-    double jump_share = 0.25;
-};
 
 // A gliding vertex: values to draw in place of the tree's own.
 struct MovedVertex {
@@ -49,14 +38,14 @@ public:
     Geomorph& operator=(Geomorph&&) noexcept;
     ~Geomorph();
 
-    // Keeps the tree's data. Fails if an option is negative or NaN, or the time is infinite.
-    static Result<Geomorph> create(const VertexTree& tree, const GeomorphOptions& options = {});
+    // `seconds`: a glide's time; 0: the drawn cut is the followed one. A step is a jump if it is the first, or if more than
+    // `jump_share` of the triangles come or go by more than 64 folds and unfolds. A jump ends all glides: the drawn cut
+    // becomes the followed one. Keeps the tree's data. Fails if an argument is negative or NaN, or the time is infinite.
+    static Result<Geomorph> create(const VertexTree& tree, double seconds = 0.25, double jump_share = 0.25);
 
-    // Advances the glides by `seconds`, then takes up the followed cut's changes since the last step; glides that begin now
-    // have not moved yet. Pass the same cut in every step; another one counts as a change of it. Fails, and changes
+    // Advances the glides by `seconds`, then takes up the followed cut's changes since the last step. Fails, and changes
     // nothing, if the time is negative or not finite, or the cut is of another tree. Cost: that of the changes and of the
-    // gliding vertices. If the cut was changed more than once since the last step, or otherwise than by follow() and
-    // adjust(), also one bit a node of the tree.
+    // gliding vertices, and one bit a node of the tree if the cut was changed more than once, or by hand.
     Result<void> step(const Cut& cut, double seconds);
 
     const Cut& drawn() const noexcept;

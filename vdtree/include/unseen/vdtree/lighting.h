@@ -4,10 +4,10 @@
 // relative luminance of a vertex at x with the normal n and the albedo a, lit from the directions l and seen from v, is
 //     ambient a + sum over lights of E max(0, n.l) (a + specular (shininess + 8) / 8 max(0, n.h)^shininess),
 //     h = (l + v) / |l + v|,
-// clipped at 1, the display's white. E is the light's intensity. Point and spot lights multiply it by (distance /
-// |position - x|)^2, and spots also by a smooth step of the cosine of the angle from their axis: 0 at the outer angle,
-// 1 at the inner one. A vertex without a normal gets the ambient light alone. Luminance is interpolated linearly between
-// vertices. Shadows are not part of the formula: the renderer takes away the share of each light that is hidden.
+// clipped at 1, the display's white. E is the light's intensity; for point and spot lights times (distance /
+// |position - x|)^2, and for spots also times a smooth step of the cosine of the angle from their axis: 0 at the outer
+// angle, 1 at the inner one. A vertex without a normal gets the ambient light alone. Shadows are not part of the formula:
+// the renderer takes away the share of each light that is hidden.
 #pragma once
 
 #include <cstdint>

@@ -21,15 +21,13 @@ Result<void> prepare_tree_file(const std::filesystem::path& file);
 Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& progress = {});
 
 // Opens a tree without reading it: its arrays are views of the file, which the system reads page by page as cuts use them,
-// and shares between processes. The header, the section table, the facts, the ranges and the root are checked at once. A
-// node's links, and its children's values, are checked when is_sound() is first asked about it. VertexTree::check()
-// checks everything except the checksums of pages; algorithms that walk a whole tree call it. So no file can cause reads
-// out of bounds. But values that neither check covers, such as the numbers in source_vertices(), may be anything, and a
-// wrong value within its range goes unnoticed: for files of unknown origin use read_tree(), or verify().
+// and shares between processes. Header, section table, facts, ranges and root are checked at once; a node's links and its
+// children's values when is_sound() is first asked about it; everything except the checksums of pages by
+// VertexTree::check(), which algorithms that walk a whole tree call. So no file can cause reads out of bounds, but a wrong
+// value within its range goes unnoticed: for files of unknown origin use read_tree(), or verify().
 //
 // Do not write to the file or truncate it in place while it is mapped: reading a missing page ends the process (SIGBUS).
-// Programs that replace a file by renaming, such as write_tree(), do no harm: the old file lives as long as the tree and
-// every tree relit from it.
+// Replacing it by renaming, as write_tree() does, is harmless.
 Result<VertexTree> map_tree(const std::filesystem::path& file);
 
 // Whether the file starts like a tree.

@@ -46,8 +46,7 @@ inline constexpr NodeId no_node = 0xffffffffu;
 
 // ---- values that the tree stores
 
-// A number from 0 to 1 in 16 bits: value / 65535. As luminance, a step is a twentieth of the least step of an 8-bit sRGB
-// display, so drawing and judging are exact for the stored values.
+// A number from 0 to 1 in 16 bits: value / 65535. As luminance, a step is a twentieth of an 8-bit sRGB display's least.
 struct Unorm16 {
     static constexpr int largest = 65535;
     std::uint16_t value = 0;
@@ -94,6 +93,11 @@ struct PackedRange {
     operator LuminanceRange() const noexcept { return {lo, hi}; }
     bool operator==(const PackedRange&) const = default;
 };
+inline constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
+// By values: a minimum of references would be loaded from memory after an unpredictable branch.
+inline PackedRange unite(PackedRange a, PackedRange b) noexcept {
+    return {{a.lo.value < b.lo.value ? a.lo.value : b.lo.value}, {a.hi.value > b.hi.value ? a.hi.value : b.hi.value}};
+}
 
 // Bounds of a set of directions, in 14 bytes: the least and the largest coordinate along seven axes, in 1/127, rounded
 // outward. Unions are exact, so nothing is lost up the tree.
@@ -124,8 +128,8 @@ struct NormalSlabs {
     bool operator==(const NormalSlabs&) const = default;
 };
 
-// The cells that a set of directions lies in: 8 x 8 cells of equal angle on each of a cube's six faces, one bit each. After
-// Luebke and Hallen 2001, section 3.3, and Zhang and Hoff 1997.
+// The cells that a set of directions lies in, one bit each: 8 x 8 cells of equal angle on each of a cube's six faces (Zhang
+// and Hoff 1997; Luebke and Hallen 2001, section 3.3).
 struct NormalMask {
     std::array<std::uint64_t, 6> faces{};
 
@@ -195,16 +199,13 @@ constexpr bool is_attribute_value() {
     return std::is_trivially_copyable_v<T> && alignof(T) <= 16 && sizeof(T) % attribute_component_bytes<T>() == 0;
 }
 
-struct AttributeInfo {
+struct Attribute {
     std::string name; // 1 to 20 printable ASCII characters without spaces
     AttributeDomain domain = AttributeDomain::tree;
     std::uint32_t element_bytes = 1, component_bytes = 1;
-    std::size_t count = 0; // of values
-};
-
-struct Attribute : AttributeInfo {
-    std::shared_ptr<const void> owner; // of the bytes
-    std::span<const std::byte> bytes;  // aligned to 16 bytes at least
+    std::size_t count = 0;                  // of values
+    std::shared_ptr<const void> owner = {}; // of the bytes
+    std::span<const std::byte> bytes = {};  // aligned to 16 bytes at least
 };
 
 // ---- the tree
@@ -223,17 +224,15 @@ public:
     bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
 
-    // Whether an interior node can be unfolded: its links, its triangles, and its children's positions and bounds are
-    // valid. Always true except for trees from map_tree(), whose nodes are checked when first asked about, from the root
-    // down. A damaged node must stay folded, and for_each_child() gives it no children. Until this has been asked, a
-    // mapped node's values may be anything; only for_each_child() and SoundTree follow its links safely. Cost: one bit;
-    // the first time, the node's children and triangles.
+    // Whether an interior node can be unfolded: its links, triangles, and children's positions and bounds are valid. Always
+    // true except for trees from map_tree(), whose nodes are checked when first asked about, from the root down; until
+    // then a node's values may be anything. A damaged node must stay folded, and for_each_child() gives it no children.
+    // Cost: one bit; the first time, the node's children and triangles.
     bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
     NodeId first_damaged() const noexcept; // the first node for which is_sound() was false, or no_node
 
-    // For trees from map_tree(): checks all that read_tree() checks, except for the checksums of pages. The error names
-    // a damaged node or section. Cost: the first time one pass over the whole file, in parallel; nothing once it has
-    // succeeded, and for other trees.
+    // For trees from map_tree(): checks what read_tree() checks, except for the checksums of pages. The error names a
+    // damaged node or section. Cost: one parallel pass over the file, once.
     Result<void> check() const;
 
     // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
@@ -275,43 +274,37 @@ public:
     const Light& light() const noexcept;
     bool is_prelit() const noexcept; // luminance comes from the colours and the texture alone
 
-    // The same tree under another light: luminance and its bounds are computed anew, attributes are dropped, everything
-    // else is shared. The colours and the texture of a pre-lit mesh then count as reflectance. Fails if check() fails.
-    // Cost: one pass over the triangles and the nodes.
+    // The same tree under another light: luminance and its bounds are computed anew, attributes are dropped, all else is
+    // shared. Colours and texture of a pre-lit mesh then count as reflectance. Fails if check() fails. Cost: one pass over
+    // triangles and nodes.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same with the caller's own relative luminances of leaves and proxies, clamped to 0..1; NaN counts as 0. The
-    // result is pre-lit and has no texture, unless `keeps_texture`, which multiplies the luminances by it. The callback
-    // is called from several threads. Fails and costs like relit().
+    // The same with the caller's own relative luminances of leaves and proxies, clamped to 0..1 (NaN: 0), times the texture
+    // if `keeps_texture`. The result is pre-lit. The callback is called from several threads.
     Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture = false) const;
 
-    // The same tree without its texture, under its own light. Vertices without colours get the default albedo, lit.
-    // Attributes are dropped. Fails and costs like relit().
+    // The same without the texture, under its own light. Vertices without colours get the default albedo, lit.
     Result<VertexTree> untextured() const;
 
-    // An attribute's values. Empty if there is no attribute of that name or its sizes are not those of T. Valid as long
-    // as some handle has the attribute. Values from files are unchecked, in a SoundTree too: the owner of a name checks
-    // each value where it uses it.
+    // An attribute's values; empty if there is none of that name whose sizes are those of T. Valid as long as some handle
+    // has the attribute. Values from files are unchecked, in a SoundTree too: the owner of a name checks each.
     template <class T>
     std::span<const T> attribute(std::string_view name) const noexcept {
         static_assert(is_attribute_value<T>());
         const auto bytes = attribute_bytes(name, sizeof(T), attribute_component_bytes<T>());
         return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
     }
-    std::vector<AttributeInfo> attributes() const;
+    std::span<const Attribute> attributes() const noexcept;
 
-    // Another handle that has this attribute, replacing one of the same name, and shares all else. relit(), shaded(),
-    // untextured() and conserve_light() drop all attributes, because those were measured under another light. Files keep
-    // every attribute, also under unknown names. Fails if the name is invalid (see AttributeInfo), if the number of
-    // values does not fit the domain, or if the tree has most_attributes already. Cost: none.
+    // Another handle that has this attribute, replacing one of the same name, and shares all else. relit() and its like
+    // drop attributes, which were measured under another light. Files keep them, under unknown names too. Fails if the name
+    // is invalid (see Attribute), the number of values does not fit the domain, or the tree has most_attributes already.
     template <class T>
     Result<VertexTree> with_attribute(std::string_view name, AttributeDomain domain, std::vector<T> values) const {
         static_assert(is_attribute_value<T>());
         const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
-        return with_attribute(
-            Attribute{{std::string(name), domain, sizeof(T), attribute_component_bytes<T>(), kept->size()},
-                      kept,
-                      std::as_bytes(std::span(*kept))});
+        return with_attribute({std::string(name), domain, sizeof(T), attribute_component_bytes<T>(), kept->size(), kept,
+                               std::as_bytes(std::span(*kept))});
     }
 
     // Bytes of all arrays. A mapped tree's are resident only where they were used.
@@ -339,12 +332,13 @@ private:
         std::span<const NodeId> parents, subtree_end;
         std::span<const Index> first_leaf, leaf_end, first_triangle;
         std::span<const Triangle> triangles;
+
+        Index triangles_of(NodeId node) const noexcept { return first_triangle[node + 1] - first_triangle[node]; }
     };
     Links links_;
 };
 
-// A handle to a tree that has been checked as a whole. Algorithms that walk a whole tree take one of these, so that no
-// file can lead them out of bounds.
+// A handle to a tree that has been checked as a whole, so that no file can lead a walk through it out of bounds.
 class SoundTree : public VertexTree {
 public:
     // Fails if VertexTree::check() fails, and costs as much: nothing for trees that were built or read.
@@ -364,9 +358,9 @@ private:
     explicit SoundTree(VertexTree tree) : VertexTree(std::move(tree)) {}
 };
 
-// Checks everything that the tree promises: spheres, slabs, intervals and displacements contain what they should and
-// nest, and every triangle vanishes at its node. Displacements are compared with the first 4096 leaves of a node.
-// Attributes are not checked. The error names the first offender. Cost: leaves times depth.
+// Checks what the tree promises, except for attributes: spheres, slabs, intervals and displacements (of a node's first
+// 4096 leaves) contain what they should and nest, and triangles vanish at their nodes. The error names the first offender.
+// Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 
 template <class F>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
@@ -51,24 +52,22 @@ Result<View> view_from_matrices(const glm::dmat4& view_from_world, const glm::dm
 // Values must be finite, the eye apart from the target, `up` not along the line of sight, the field in (0, 180), the window
 // 1 to 32768 pixels a side, and the view not both orthographic and shifted.
 Result<void> validate(const View& view);
-// The same, and the view must be perspective, or have its line of sight through the window's middle. `what` is the subject
-// of the error's sentence, such as "An occlusion map".
+// The same, and the view must be perspective. `what` is the subject of the error's sentence, such as "A depth picture".
 Result<void> validate_perspective(const View& view, const char* what);
-Result<void> validate_centred(const View& view, const char* what);
 
-// The window of a perspective view on the plane at distance 1 before the eye, right and up from the line of sight.
-struct WindowPlane {
-    glm::dvec2 middle, half; // half: half of the window's width and height
-};
-WindowPlane window_plane(const View& view);
 // The point of the window on the line of sight, in pixels from the top left.
 glm::dvec2 axis_px(const View& view);
 
-// The camera's orthonormal frame in the world. `back` points from the target to the eye.
+// The camera's orthonormal frame in the world, and the window of a perspective view on the plane at distance 1 before the
+// eye, right and up from the line of sight.
 struct CameraFrame {
-    glm::dvec3 right, up, back;
+    glm::dvec3 right, up, back;     // back: from the target to the eye
+    glm::dvec2 window, half_window; // its middle; half of its width and height
 };
 CameraFrame camera_frame(const View& view);
+// Vectors of any length at right angles to the window's sides, pointing inward: left, right, bottom, top. In perspective
+// the direction of the view comes first.
+std::vector<glm::dvec3> inward_of_window(const View& view);
 
 // A view of a sphere's centre from `direction` (towards the eye), in which its outline takes the share `fill` of the
 // window's height: distance = radius / sin(atan(fill tan(fov / 2))). Field and size come from `window`; an orthographic

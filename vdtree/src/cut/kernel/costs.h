@@ -31,9 +31,8 @@ UNSEEN_INLINE Cost as_seen(const Mask& is_silhouette, const Mask& is_away, const
     return is_away ? Cost{} : is_silhouette ? silhouette : interior;
 }
 
-UNSEEN_INLINE void find_bounds_listed(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost,
-                                      float* seen) {
+void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost, float* seen) noexcept {
     const Listed listed{arrays, nodes.data(), nodes.size() - 1};
     for (std::size_t i = 0; i < nodes.size(); i += width) {
         listed.prefetch(i);
@@ -56,8 +55,8 @@ UNSEEN_INLINE void find_bounds_listed(const KernelView& view, const NodeArrays& 
 }
 
 // Like decide_all().
-UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                                     std::span<const NodeId> nodes, const NodeCosts& out) {
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                std::span<const NodeId> nodes, const NodeCosts& out) noexcept {
     constexpr std::size_t piece = 256;
     const Listed listed{arrays, nodes.data(), nodes.size() - 1};
     for (std::size_t start = 0; start < nodes.size(); start += piece) {

@@ -19,74 +19,49 @@
 
 namespace unseen::vdtree {
 
-// Spheres around the centres of some nodes each, and what the eye's way has made of them.
-struct BlockSpheres {
+inline constexpr std::size_t block_slots = 16;
+inline constexpr float never_due = std::numeric_limits<float>::infinity();
+
+// Arrays by block are filled up to whole registers with blocks that are never due.
+inline constexpr std::size_t whole_registers(std::size_t blocks) { return (blocks + 7) / 8 * 8; }
+
+// By block: a sphere around the centres of its nodes, what the eye's way has made of it, and its earliest deadlines.
+struct BlockArrays {
     std::vector<float> x, y, z, radius;
     std::vector<float> distance; // of the sphere's centre from the eye
     std::vector<float> error;    // how much more than `distance` a node's distance may have changed, in all
+    std::vector<float> recede, approach, facing; // for distances that grow, or shrink; and for the facing clock
 
-    void push_back() {
-        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->push_back(0);
+    template <class F>
+    void for_each(F&& f) {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) f(*values, 0.0f);
+        for (auto* values : {&recede, &approach, &facing}) f(*values, never_due);
     }
-    void clear() noexcept {
-        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->clear();
-    }
-    void reserve(std::size_t blocks) {
-        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->reserve(blocks);
-    }
-    void set(std::size_t block, const glm::vec3& centre, float r, float d) noexcept {
+    void set_sphere(std::size_t block, const glm::vec3& centre, float r, float d) noexcept {
         x[block] = centre.x, y[block] = centre.y, z[block] = centre.z;
         radius[block] = r, distance[block] = d, error[block] = 0;
     }
-    glm::vec3 centre(std::size_t block) const noexcept { return {x[block], y[block], z[block]}; }
-    std::uint64_t byte_size() const noexcept { return 6 * sizeof(float) * x.capacity(); }
-};
-// The eye goes by `path` to a new place.
-void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept;
-
-inline float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
-inline float rounded_up(double clock) {
-    return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity());
-}
-// A clock in floats: not later than it is, and not earlier.
-struct KernelClock {
-    float early = 0, late = std::numeric_limits<float>::min();
-};
-inline KernelClock kernel_clock(double now) { return {rounded_down(now), rounded_up(now)}; }
-// Defers deadlines by planes, one a block, that have come although the block is wholly inside a frustum: to when the
-// centre of one of its nodes may be less than `margin` inside: more than the rounding of any node's test, and of this.
-void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
-                 float* deadlines) noexcept;
-
-// When distances that grow, or shrink, and the facing clock may change something.
-struct EarliestDeadlines {
-    std::vector<float> recede, approach, facing;
-
-    void push_back(float value) {
-        for (auto* values : {&recede, &approach, &facing}) values->push_back(value);
-    }
-    void clear() noexcept {
-        for (auto* values : {&recede, &approach, &facing}) values->clear();
-    }
-    void reserve(std::size_t blocks) {
-        for (auto* values : {&recede, &approach, &facing}) values->reserve(blocks);
-    }
-    void set(std::size_t block, float receding, float approaching, float turning) noexcept {
+    void set_earliest(std::size_t block, float receding, float approaching, float turning) noexcept {
         recede[block] = receding, approach[block] = approaching, facing[block] = turning;
     }
-    std::uint64_t byte_size() const noexcept { return 3 * sizeof(float) * recede.capacity(); }
+    glm::vec3 centre(std::size_t block) const noexcept { return {x[block], y[block], z[block]}; }
+    std::uint64_t byte_size() const noexcept { return 9 * sizeof(float) * x.capacity(); }
 };
+
 // The deadlines of a block's slots; of slots that are not used: infinite.
-inline constexpr std::size_t block_slots = 16;
 struct alignas(64) SlotDeadlines {
     float position[block_slots];
     float facing[block_slots];
 };
-// Looks at the slots of some blocks: tells those that are due, in order, and sets the blocks' deadlines to the earliest
-// of the others. `due` has room for block_slots a block. Returns how many are due.
-std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
-                           const SlotDeadlines* dues, const std::uint16_t* unfolded, const BlockSpheres& spheres,
-                           EarliestDeadlines& deadlines, std::uint32_t* due) noexcept;
+
+// A clock in floats: not later than it is, and not earlier.
+struct KernelClock {
+    float early = 0, late = std::numeric_limits<float>::min();
+};
+inline float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), never_due); }
+inline KernelClock kernel_clock(double now) {
+    return {now > 0 ? std::nextafter(static_cast<float>(now), 0.0f) : 0.0f, rounded_up(now)};
+}
 
 // The deadlines of up to sixteen slots that were tested.
 struct DeadlineBatch {
@@ -101,10 +76,29 @@ struct DeadlineBatch {
 inline constexpr float sum_rounding = 4e-6f;
 // Times a number: at least a unit in the last place less.
 inline constexpr float just_less = 1 - std::numeric_limits<float>::epsilon();
-void find_deadlines(const TestBatch& tested, DeadlineBatch& dues) noexcept;
 
-// One bit a block: a deadline has come.
-void find_due_blocks(float position_clock, float facing_clock, const BlockSpheres& spheres,
-                     const EarliestDeadlines& deadlines, std::uint64_t* due) noexcept;
+struct DeadlineKernel {
+    // The eye goes by `path` to a new place.
+    void (*move_blocks)(const float (&eye_high)[3], const float (&eye_low)[3], float path,
+                        BlockArrays& blocks) noexcept;
+    // Defers deadlines by planes, one a block, that have come although the block is wholly inside a frustum: to when the
+    // centre of one of its nodes may be less than `margin` inside: more than the rounding of any node's test, and of this.
+    void (*keep_inside)(const KernelView& view, float margin, const KernelClock& clock, const BlockArrays& blocks,
+                        float* deadlines) noexcept;
+    // Looks at the slots of some blocks: tells those that are due, in order, and sets the blocks' deadlines to the
+    // earliest of the others. `due` has room for block_slots a block. Returns how many are due.
+    std::size_t (*look_at_blocks)(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
+                                  const SlotDeadlines* dues, const std::uint16_t* unfolded, BlockArrays& blocks,
+                                  std::uint32_t* due) noexcept;
+    void (*find_deadlines)(const TestBatch& tested, DeadlineBatch& dues) noexcept;
+    // Makes those of a block's slots that are due by another clock due at once by the facing clock, and no more by that one,
+    // and finds the earliest of the others: those that are unfolded, a bit a slot, and the rest. Returns whether any was.
+    bool (*hand_over)(float clock, std::uint32_t unfolded, float* deadlines, float* facing, float& earliest_unfolded,
+                      float& earliest_folded) noexcept;
+    // One bit a block: a deadline has come.
+    void (*find_due_blocks)(float position_clock, float facing_clock, const BlockArrays& blocks,
+                            std::uint64_t* due) noexcept;
+};
+extern const DeadlineKernel deadline_kernel;
 
 } // namespace unseen::vdtree

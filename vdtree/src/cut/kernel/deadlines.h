@@ -8,60 +8,36 @@ UNSEEN_INLINE Floats error_of(const Floats& before, const Floats& after, const F
     return ((between > 0) & (turned < most)) ? turned : most;
 }
 
-UNSEEN_INLINE void move_all(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
-    const auto move = [&](const float* x, const float* y, const float* z, const float* r, float* distance,
-                          float* error) UNSEEN_INLINE_LAMBDA {
-        const Floats ex = (eye_high[0] - load(x)) + eye_low[0], ey = (eye_high[1] - load(y)) + eye_low[1],
-                     ez = (eye_high[2] - load(z)) + eye_low[2];
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockArrays& blocks) noexcept {
+    for (std::size_t i = 0; i < blocks.x.size(); i += width) {
+        const Floats ex = (eye_high[0] - load(&blocks.x[i])) + eye_low[0],
+                     ey = (eye_high[1] - load(&blocks.y[i])) + eye_low[1],
+                     ez = (eye_high[2] - load(&blocks.z[i])) + eye_low[2];
         const Floats after = root_of(ex * ex + ey * ey + ez * ez);
-        const Floats more = error_of(load(distance), after, load(r), path);
+        const Floats more = error_of(load(&blocks.distance[i]), after, load(&blocks.radius[i]), path);
         constexpr float up = 1 + 5e-7f; // small steps must not be lost in the sum's rounding
-        store(error, (load(error) + more) * up);
-        store(distance, after);
-    };
-    const std::size_t count = spheres.x.size();
-    std::size_t i = 0;
-    for (; i + width <= count; i += width)
-        move(&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], &spheres.distance[i], &spheres.error[i]);
-    if (i == count) return;
-    float rest[6][width] = {};
-    std::vector<float>* const values[6] = {&spheres.x,      &spheres.y,        &spheres.z,
-                                           &spheres.radius, &spheres.distance, &spheres.error};
-    for (std::size_t v = 0; v < 6; ++v)
-        std::copy(values[v]->begin() + static_cast<std::ptrdiff_t>(i), values[v]->end(), rest[v]);
-    move(rest[0], rest[1], rest[2], rest[3], rest[4], rest[5]);
-    for (std::size_t v = 4; v < 6; ++v)
-        std::copy_n(rest[v], count - i, values[v]->begin() + static_cast<std::ptrdiff_t>(i));
+        store(&blocks.error[i], (load(&blocks.error[i]) + more) * up);
+        store(&blocks.distance[i], after);
+    }
 }
 
-UNSEEN_INLINE void defer_inside(const KernelView& view, float margin, const KernelClock& clock,
-                                const BlockSpheres& spheres, float* deadlines) {
-    const auto keep = [&](const float* x, const float* y, const float* z, const float* radius,
-                          float* deadline) UNSEEN_INLINE_LAMBDA {
-        const Floats before = load(deadline);
-        if (!any(before <= clock.late)) return;
-        const Floats to_eye[3] = {(view.eye_high[0] - load(x)) + view.eye_low[0],
-                                  (view.eye_high[1] - load(y)) + view.eye_low[1],
-                                  (view.eye_high[2] - load(z)) + view.eye_low[2]};
-        const Floats slack = height(view, to_eye) - load(radius) - margin;
-        store(deadline, ((before <= clock.late) & (slack > 0)) ? (clock.early + slack) * just_less : before);
-    };
-    const std::size_t count = spheres.x.size();
-    std::size_t i = 0;
-    for (; i + width <= count; i += width)
-        keep(&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], deadlines + i);
-    if (i == count) return;
-    float rest[5][width] = {};
-    const float* const values[5] = {&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], deadlines + i};
-    for (std::size_t v = 0; v < 5; ++v) std::copy_n(values[v], count - i, rest[v]);
-    keep(rest[0], rest[1], rest[2], rest[3], rest[4]);
-    std::copy_n(rest[4], count - i, deadlines + i);
+void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockArrays& blocks,
+                 float* deadlines) noexcept {
+    for (std::size_t i = 0; i < blocks.x.size(); i += width) {
+        const Floats before = load(deadlines + i);
+        if (!any(before <= clock.late)) continue;
+        const Floats to_eye[3] = {(view.eye_high[0] - load(&blocks.x[i])) + view.eye_low[0],
+                                  (view.eye_high[1] - load(&blocks.y[i])) + view.eye_low[1],
+                                  (view.eye_high[2] - load(&blocks.z[i])) + view.eye_low[2]};
+        const Floats slack = height(view, to_eye) - load(&blocks.radius[i]) - margin;
+        store(deadlines + i, ((before <= clock.late) & (slack > 0)) ? (clock.early + slack) * just_less : before);
+    }
 }
 
-UNSEEN_INLINE std::size_t look_at(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
-                                  const SlotDeadlines* dues, const std::uint16_t* unfolded, const BlockSpheres& spheres,
-                                  EarliestDeadlines& deadlines, std::uint32_t* due) {
-    const Floats never = all(std::numeric_limits<float>::infinity());
+std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
+                           const SlotDeadlines* dues, const std::uint16_t* unfolded, BlockArrays& blocks,
+                           std::uint32_t* due) noexcept {
+    const Floats none = all(never_due);
     constexpr std::uint32_t none_due = 1u << block_slots; // keeps a count of zeros defined
     std::size_t count = 0;
     for (std::size_t at = 0; at < which.size(); ++at) {
@@ -71,20 +47,20 @@ UNSEEN_INLINE std::size_t look_at(std::span<const std::uint32_t> which, float po
             prefetch(dues[which[at + ahead]].facing);
         }
         const std::uint32_t block = which[at];
-        const float passed = spheres.error[block] + position_clock;
-        const Floats recede = all(passed + spheres.distance[block]), approach = all(passed - spheres.distance[block]);
-        Floats next_recede = never, next_approach = never, next_facing = never;
+        const float passed = blocks.error[block] + position_clock;
+        const Floats recede = all(passed + blocks.distance[block]), approach = all(passed - blocks.distance[block]);
+        Floats next_recede = none, next_approach = none, next_facing = none;
         std::uint32_t bits = 0;
         for (std::size_t i = 0; i < block_slots; i += width) {
             const Floats position = load(dues[block].position + i), facing = load(dues[block].facing + i);
             const Ints recedes = mask_of(unfolded[block], i);
             const Ints is_due = (position <= (recedes ? recede : approach)) | (facing <= facing_clock);
             bits |= bits_of(is_due) << i;
-            next_recede = min_of(next_recede, ~is_due & recedes ? position : never);
-            next_approach = min_of(next_approach, is_due | recedes ? never : position);
-            next_facing = min_of(next_facing, is_due ? never : facing);
+            next_recede = min_of(next_recede, ~is_due & recedes ? position : none);
+            next_approach = min_of(next_approach, is_due | recedes ? none : position);
+            next_facing = min_of(next_facing, is_due ? none : facing);
         }
-        deadlines.set(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
+        blocks.set_earliest(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
         // The number of due slots is unpredictable, so branch-free: a few places are always written, and the next block
         // overwrites the surplus.
         const std::uint32_t first = block * static_cast<std::uint32_t>(block_slots);
@@ -99,7 +75,7 @@ UNSEEN_INLINE std::size_t look_at(std::span<const std::uint32_t> which, float po
     return count;
 }
 
-UNSEEN_INLINE void deadlines_of(const TestBatch& tested, DeadlineBatch& dues) {
+void find_deadlines(const TestBatch& tested, DeadlineBatch& dues) noexcept {
     const Floats none = all(0);
     for (std::size_t i = 0; i < kernel_lanes; i += width) {
         const auto unfolded = mask_of(tested.unfolded, i);
@@ -112,25 +88,33 @@ UNSEEN_INLINE void deadlines_of(const TestBatch& tested, DeadlineBatch& dues) {
     }
 }
 
-UNSEEN_INLINE void due_blocks_of(float position, float facing, const BlockSpheres& spheres,
-                                 const EarliestDeadlines& deadlines, std::uint64_t* due) {
-    const std::size_t count = spheres.x.size();
-    for (std::size_t first = 0; first < count; first += 64) {
+bool hand_over(float clock, std::uint32_t unfolded, float* deadlines, float* facing, float& earliest_unfolded,
+               float& earliest_folded) noexcept {
+    const Floats none = all(never_due);
+    Floats of_unfolded = none, of_folded = none;
+    bool any_due = false;
+    for (std::size_t i = 0; i < block_slots; i += width) {
+        const Floats due = load(deadlines + i);
+        const Ints is_due = due <= clock, unfolds = mask_of(unfolded, i);
+        any_due |= any(is_due);
+        store(facing + i, is_due ? -none : load(facing + i));
+        store(deadlines + i, is_due ? none : due);
+        of_unfolded = min_of(of_unfolded, is_due | ~unfolds ? none : due);
+        of_folded = min_of(of_folded, is_due | unfolds ? none : due);
+    }
+    earliest_unfolded = least_of(of_unfolded);
+    earliest_folded = least_of(of_folded);
+    return any_due;
+}
+
+void find_due_blocks(float position, float facing, const BlockArrays& blocks, std::uint64_t* due) noexcept {
+    for (std::size_t first = 0; first < blocks.x.size(); first += 64) {
         std::uint64_t bits = 0;
-        const std::size_t end = std::min(first + 64, count);
-        std::size_t i = first;
-        for (; i + width <= end; i += width) {
-            const auto distance = load(&spheres.distance[i]), passed = load(&spheres.error[i]) + position;
-            const auto is_due = (load(&deadlines.recede[i]) <= passed + distance) |
-                                (load(&deadlines.approach[i]) <= passed - distance) |
-                                (load(&deadlines.facing[i]) <= facing);
+        for (std::size_t i = first; i < std::min(first + 64, blocks.x.size()); i += width) {
+            const auto distance = load(&blocks.distance[i]), passed = load(&blocks.error[i]) + position;
+            const auto is_due = (load(&blocks.recede[i]) <= passed + distance) |
+                                (load(&blocks.approach[i]) <= passed - distance) | (load(&blocks.facing[i]) <= facing);
             bits |= std::uint64_t{bits_of(is_due)} << (i - first);
-        }
-        for (; i < end; ++i) {
-            const float distance = spheres.distance[i], passed = spheres.error[i] + position;
-            const bool is_due = deadlines.recede[i] <= passed + distance ||
-                                deadlines.approach[i] <= passed - distance || deadlines.facing[i] <= facing;
-            bits |= std::uint64_t{is_due} << (i - first);
         }
         due[first / 64] = bits;
     }

@@ -66,7 +66,7 @@ UNSEEN_INLINE void for_each_asked(const KernelView& view, const NodeArrays& arra
     }
 }
 
-// Those of a piece of the nodes whose facing matters are looked at together, so that all lanes are of use.
+// Of each piece of the nodes, those whose facing matters are looked at together, so that all lanes are of use.
 template <class NodeAt>
 UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, std::size_t count, NodeAt node_at,
                               std::uint64_t* unfolded) {
@@ -106,12 +106,13 @@ UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, 
     }
 }
 
-UNSEEN_INLINE void decide_listed(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
-                                 std::uint64_t* unfolded) {
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
+            std::uint64_t* unfolded) noexcept {
     decide_all(view, arrays, nodes.size(), Listed{arrays, nodes.data(), nodes.size() - 1}, unfolded);
 }
-UNSEEN_INLINE void decide_run(const KernelView& view, const NodeArrays& arrays, NodeId start, std::size_t count,
-                              std::uint64_t* unfolded) {
+
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId start, std::size_t count,
+                  std::uint64_t* unfolded) noexcept {
     struct Range {
         std::size_t start;
         UNSEEN_INLINE std::size_t operator()(std::size_t i) const { return start + i; }
@@ -123,5 +124,5 @@ UNSEEN_INLINE void decide_run(const KernelView& view, const NodeArrays& arrays, 
     if (whole == count) return;
     NodeId rest[64];
     for (std::size_t i = 0; i < count - whole; ++i) rest[i] = static_cast<NodeId>(start + whole + i);
-    decide_listed(view, arrays, std::span(rest, count - whole), unfolded + whole / 64);
+    decide(view, arrays, std::span(rest, count - whole), unfolded + whole / 64);
 }

@@ -1,20 +1,18 @@
 // What rings face: how far the eye may move while everything in a ring still faces it, or still faces away.
 //
 // The directions of a ring's triangles lie in slabs (NormalSlabs), a least and a largest coordinate along seven axes.
-// Any three independent slabs make a parallelepiped P around the directions; the box of x, y and z and the twelve with
-// a diagonal in place of one of these are tried. P proves that everything faces the eye, from every point of the ring's
-// sphere, where
+// Any three independent slabs make a parallelepiped P around the directions; tried are the box of x, y and z and the
+// twelve with a diagonal in place of one of these. P proves that everything faces the eye, from all of the ring's sphere, if
 //
 //     min over x in P of x . (eye - centre)  >  radius * reach,      reach: the longest vector in P;
 //
 // over reach, the difference of both sides is the way that the eye may go meanwhile. Likewise with the maximum for
-// facing away. A node without a proof has no ancestor with one: an ancestor's P contains the node's, so its reach is no
-// less, and moving the centre by the difference of the radii changes x . (eye - centre) by at most reach times that.
+// facing away. A node without a proof has no ancestor with one, for an ancestor's P and sphere contain the node's.
 
 constexpr float slab_units = 127;            // of NormalSlabs in 1
 constexpr float sqrt3 = 1.7320508075688772f; // of the diagonals' coordinates
-// 1 / sqrt(s) from below, for squares s of lengths in units of slabs: tangents at 1.2 and 2, and what it is at the
-// longest vector that any parallelepiped holds: a diagonal's replaced coordinate of up to sqrt(3) + 2, and two of 1.
+// 1 / sqrt(s) from below, for squares s of lengths in units of slabs: tangents at 1.2 and 2, and its value at the longest
+// vector that any parallelepiped holds (a diagonal's replaced coordinate of up to sqrt(3) + 2, and two of 1).
 struct Tangent {
     float at_0, slope;
 };

@@ -1,9 +1,6 @@
-// The arithmetic of fold tests, many nodes at once: where their spheres are, seen from the eye, what their rings face,
-// and what follows from both: verdicts, slacks and costs. FoldTester is the way to it for everybody else.
-//
-// Everything is computed in registers of four or eight nodes, from one source: kernel_measure.h (distances, angles,
-// heights), kernel_facing.h (what rings face), kernel_decide.h (verdicts), kernel_slacks.h (for how long they hold) and
-// kernel_costs.h. Same bits on every processor.
+// The arithmetic of fold tests, in registers of four or eight nodes, with the same bits on every processor: measure.h
+// (distances, angles, heights), facing.h (what rings face), decide.h (verdicts), slacks.h (for how long they hold) and
+// costs.h. FoldTester is the way to it for everybody else.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +9,15 @@
 #include <vector>
 
 #include <unseen/vdtree/criteria.h>
-#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
 // Mesh units; replaces 0 where a division or an infinite switch distance would give NaN.
 inline constexpr float least_length = 1e-30f;
-// Mesh units: an outline of this length, beyond every eye times any switch distance, marks what keeping() keeps. Frusta
-// and occluders do not fold it. In a mesh that is as large by itself, they fold nothing so.
+// Mesh units: an outline of this length, beyond every eye times any switch distance, marks what keeping() keeps: frusta and
+// occluders do not fold it.
 inline constexpr float kept_length = 1e30f;
 
 // What all nodes are measured from, and by.
@@ -65,31 +62,25 @@ struct NodeArrays {
     const NormalSlabs* facing = nullptr;                           // null: those of the bounds
     const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
 };
-
-// Only whether nodes unfold, bit for bit as the tests with slacks below find it: one bit a node, the first node's
-// lowest, of as many whole words as that takes. Cost: some nanoseconds a node where these are neighbours, and memory's
-// latency overlaps where not.
-void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
-            std::uint64_t* unfolded) noexcept;
-void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
-                  std::uint64_t* unfolded) noexcept;
+UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {
+    prefetch(arrays.bounds + node);
+    if (arrays.support) prefetch(arrays.support + node);
+    if (arrays.classes) prefetch(arrays.classes + node);
+    if (arrays.facing) prefetch(arrays.facing + node);
+    if (arrays.lengths) prefetch(arrays.lengths + node);
+    if (arrays.silhouette_lengths) prefetch(arrays.silhouette_lengths + node);
+}
 
 // What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
 struct CostTables {
     const float *switch_distance = nullptr, *least_cost = nullptr;
 };
 // The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the
-// view's. `view` must ask for the facing of everybody.
+// view's.
 struct NodeCosts {
-    float *cost, *seen_cost; // by place in `nodes`
-    std::uint64_t* unfolded; // like decide()'s
+    float *cost, *seen_cost; // by place in a list of nodes
+    std::uint64_t* unfolded; // a bit a node
 };
-void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                std::span<const NodeId> nodes, const NodeCosts& costs) noexcept;
-// At least what both costs of a node are, whatever it faces, or, where it would cost more than `no_silhouette_over` as
-// a silhouette, as none.
-void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost, float* seen_cost) noexcept;
 
 // What a test reads of a node, in one cache line.
 struct alignas(64) FoldCandidate {
@@ -105,21 +96,28 @@ struct alignas(64) FoldCandidate {
 };
 static_assert(sizeof(FoldCandidate) == 64);
 
-// Verdicts on up to sixteen candidates, with their slacks (see Verdict in fold_tester.h); a bit a lane.
+// What a test found. It holds while each clock (see Motion in fold_tester.h) has advanced by less than its slack: mesh
+// units, 0 or more.
+struct Verdict {
+    float position_slack = 0;
+    float facing_slack = 0;
+    float plane_slack = 0; // without planes: huge
+    float light_slack = 0; // without lights that move: huge
+    bool unfolded = false;
+};
+
+// Verdicts on up to sixteen candidates.
 struct TestBatch {
     alignas(64) float position_slack[kernel_lanes], facing_slack[kernel_lanes];
-    alignas(64) float plane_slack[kernel_lanes]; // without planes: huge
-    alignas(64) float light_slack[kernel_lanes]; // where there are lights
-    std::uint32_t unfolded = 0;
-};
-// Without lights.
-void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept;
+    alignas(64) float plane_slack[kernel_lanes], light_slack[kernel_lanes];
+    std::uint32_t unfolded = 0; // a bit a lane
 
-// The same in steps, for those that do something in between (lights): find_verdicts(), then find_slacks() or
-// find_costs().
-//
-// Up to sixteen nodes, and what their verdicts are made of; see Measures and Verdicts in kernel_measure.h and
-// kernel_decide.h.
+    Verdict operator[](std::size_t lane) const noexcept {
+        return {position_slack[lane], facing_slack[lane], plane_slack[lane], light_slack[lane],
+                ((unfolded >> lane) & 1) != 0};
+    }
+};
+// Up to sixteen nodes, and what their verdicts are made of; see Measures and Verdicts in measure.h and decide.h.
 struct FoldBatch {
     alignas(64) float radius[kernel_lanes], length[kernel_lanes], silhouette_length[kernel_lanes];
     alignas(64) std::int32_t interior_row[kernel_lanes], silhouette_row[kernel_lanes];
@@ -130,11 +128,32 @@ struct FoldBatch {
     // A bit a lane.
     std::uint32_t is_inside = 0, is_near = 0, unfolded = 0, is_silhouette = 0, by_silhouette = 0, is_away = 0;
 };
-void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes, FoldBatch& batch) noexcept;
-void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept;
-// `view` must have asked for the facing of everybody. Sixteen costs each.
-void find_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
-                float* seen_cost) noexcept;
+
+// The functions of the kernel, for the widest registers there are.
+struct FoldKernel {
+    void (*test)(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept;
+    // The same in steps, for lights, which do something in between: verdicts, then slacks, or sixteen costs each.
+    void (*find_verdicts)(const KernelView& view, std::span<const FoldCandidate* const> lanes,
+                          FoldBatch& batch) noexcept;
+    void (*find_slacks)(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept;
+    void (*find_batch_costs)(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
+                             float* seen_cost) noexcept;
+    // Only whether nodes unfold, as the tests with slacks find it: one bit a node in whole words, the first node's lowest.
+    // Cost: some nanoseconds a node where these are neighbours, and memory's latency overlaps where not.
+    void (*decide)(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
+                   std::uint64_t* unfolded) noexcept;
+    void (*decide_range)(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
+                         std::uint64_t* unfolded) noexcept;
+    // Here and in find_batch_costs(), `view` must ask for the facing of everybody.
+    void (*find_costs)(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                       std::span<const NodeId> nodes, const NodeCosts& costs) noexcept;
+    // At least what both costs of a node are, whatever it faces, or, where it would cost more than `no_silhouette_over`
+    // as a silhouette, as none.
+    void (*find_cost_bounds)(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                             std::span<const NodeId> nodes, float no_silhouette_over, float* cost,
+                             float* seen_cost) noexcept;
+};
+extern const FoldKernel fold_kernel;
 
 // Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this
 // share of the distance and the radius.

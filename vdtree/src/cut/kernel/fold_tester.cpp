@@ -1,14 +1,14 @@
 #include "cut/kernel/fold_tester.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <numbers>
 #include <numeric>
 
 #include <glm/geometric.hpp>
 
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/node_bits.h>
+
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 
@@ -16,11 +16,17 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
+std::array<const FoldCandidate*, kernel_lanes> lanes_of(std::span<const FoldCandidate> batch) {
+    std::array<const FoldCandidate*, kernel_lanes> lanes{};
+    for (std::size_t i = 0; i < batch.size(); ++i) lanes[i] = &batch[i];
+    return lanes;
+}
+
 } // namespace
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces,
                        float threshold, bool least_costs)
-    : criterion_(criterion) {
+    : CostSource(tree), criterion_(criterion) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     const auto data_of = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
     arrays_ = {tree.bounds().data(),
@@ -61,7 +67,7 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
     view_.first_plane.clear();
     for (const Frustum& frustum : viewpoint.frusta) {
         view_.first_plane.push_back(view_.planes.size());
-        for (const Plane& plane : frustum.planes) {
+        for (const Plane& plane : frustum) {
             const glm::vec3 n(plane.normal);
             view_.planes.push_back(
                 {{n.x, n.y, n.z}, static_cast<float>(glm::dot(plane.normal, viewpoint.eye) + plane.offset)});
@@ -94,12 +100,7 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
 }
 
 void FoldTester::prefetch(NodeId node) const {
-    vdtree::prefetch(arrays_.bounds + node);
-    if (arrays_.support) vdtree::prefetch(arrays_.support + node);
-    if (arrays_.classes) vdtree::prefetch(arrays_.classes + node);
-    if (arrays_.facing) vdtree::prefetch(arrays_.facing + node);
-    if (arrays_.lengths) vdtree::prefetch(arrays_.lengths + node);
-    if (arrays_.silhouette_lengths) vdtree::prefetch(arrays_.silhouette_lengths + node);
+    prefetch_node(arrays_, node);
     if (lit_) lit_->prefetch(node);
 }
 
@@ -111,30 +112,24 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const
         vdtree::prefetch(&candidates[which[i]]);
     std::array<const FoldCandidate*, kernel_lanes> lanes;
     for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
-    if (!has_moving_lights()) return vdtree::test(view_, {lanes.data(), count}, tested);
-    for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
-        lit_->prefetch(candidates[which[i]].node);
-    test_lit({lanes.data(), count}, tested);
+    if (has_moving_lights())
+        for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
+            lit_->prefetch(candidates[which[i]].node);
+    test({lanes.data(), count}, tested);
 }
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const {
-    std::array<const FoldCandidate*, kernel_lanes> lanes;
+    TestBatch tested;
     for (std::size_t first = 0; first < candidates.size(); first += kernel_lanes) {
-        const std::size_t count = std::min(kernel_lanes, candidates.size() - first);
-        for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[first + i];
-        TestBatch tested;
-        if (has_moving_lights()) test_lit({lanes.data(), count}, tested);
-        else vdtree::test(view_, {lanes.data(), count}, tested);
-        for (std::size_t i = 0; i < count; ++i)
-            verdicts[first + i] = {tested.position_slack[i], tested.facing_slack[i], tested.plane_slack[i],
-                                   has_moving_lights() ? tested.light_slack[i] : infinity,
-                                   ((tested.unfolded >> i) & 1) != 0};
+        const auto batch = candidates.subspan(first, std::min(kernel_lanes, candidates.size() - first));
+        test(Lanes(lanes_of(batch)).first(batch.size()), tested);
+        for (std::size_t i = 0; i < batch.size(); ++i) verdicts[first + i] = tested[i];
     }
 }
 
 void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
-    if (!lit_) return vdtree::decide(view_, arrays_, nodes, unfolded);
-    std::fill_n(unfolded, (nodes.size() + 63) / 64, 0);
+    if (!lit_) return fold_kernel.decide(view_, arrays_, nodes, unfolded);
+    std::fill_n(unfolded, words_for(nodes.size()), 0);
     static_assert(64 % kernel_lanes == 0);
     for_each_batch(view_, nodes, [&](std::size_t first, std::size_t count, const FoldBatch& batch) {
         const std::uint64_t used = (std::uint64_t{1} << count) - 1;
@@ -143,18 +138,18 @@ void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) 
 }
 
 void FoldTester::decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
-    if (!lit_) return vdtree::decide_range(view_, arrays_, first, count, unfolded);
+    if (!lit_) return fold_kernel.decide_range(view_, arrays_, first, count, unfolded);
     std::vector<NodeId> nodes(count);
     std::iota(nodes.begin(), nodes.end(), first);
     decide(nodes, unfolded);
 }
 
 void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const {
-    if (!lit_) return vdtree::find_costs(costs_view_, arrays_, cost_tables(), nodes, costs);
-    std::fill_n(costs.unfolded, (nodes.size() + 63) / 64, 0);
+    if (!lit_) return fold_kernel.find_costs(costs_view_, arrays_, cost_tables(), nodes, costs);
+    std::fill_n(costs.unfolded, words_for(nodes.size()), 0);
     for_each_batch(costs_view_, nodes, [&](std::size_t first, std::size_t count, const FoldBatch& batch) {
         alignas(64) float cost[kernel_lanes], seen_cost[kernel_lanes];
-        vdtree::find_costs(costs_view_, cost_tables(), batch, cost, seen_cost);
+        fold_kernel.find_batch_costs(costs_view_, cost_tables(), batch, cost, seen_cost);
         std::copy_n(cost, count, costs.cost + first);
         std::copy_n(seen_cost, count, costs.seen_cost + first);
         const std::uint64_t used = (std::uint64_t{1} << count) - 1;
@@ -169,14 +164,14 @@ CostTables FoldTester::cost_tables() const {
 
 void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
                                   float* seen_cost) const {
-    vdtree::find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost,
-                             seen_cost);
+    fold_kernel.find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost,
+                                 seen_cost);
 }
 
 void FoldTester::decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
     KernelView view = view_;
     view.inverse_threshold = 1 / threshold;
-    vdtree::decide(view, arrays_, nodes, unfolded);
+    fold_kernel.decide(view, arrays_, nodes, unfolded);
 }
 
 // ---- with lights
@@ -185,8 +180,7 @@ void FoldTester::decide_at(float threshold, std::span<const NodeId> nodes, std::
 template <class F>
 void FoldTester::for_each_batch(const KernelView& view, std::span<const NodeId> nodes, F&& f) const {
     std::array<FoldCandidate, kernel_lanes> candidates;
-    std::array<const FoldCandidate*, kernel_lanes> lanes;
-    for (std::size_t i = 0; i < kernel_lanes; ++i) lanes[i] = &candidates[i];
+    const auto lanes = lanes_of(candidates);
     for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes) {
         // Nodes lie anywhere in a large tree: the next ones are on their way while these are tested.
         constexpr std::size_t ahead = kernel_lanes;
@@ -196,23 +190,26 @@ void FoldTester::for_each_batch(const KernelView& view, std::span<const NodeId> 
         for (std::size_t i = 0; i < count; ++i) candidates[i] = candidate(nodes[first + i]);
         LitFindings lit;
         FoldBatch batch;
-        find_lit_verdicts(view, {lanes.data(), count}, lit, batch);
+        find_lit_verdicts(view, Lanes(lanes).first(count), lit, batch);
         f(first, count, batch);
     }
 }
 
-template <class Candidate>
-void FoldTester::find_lit_rows(Candidate&& candidate, std::size_t count, LitFindings& lit) const {
+void FoldTester::find_lit_rows(Lanes lanes, LitFindings& lit) const {
     for (std::size_t i = 0; i < kernel_lanes; ++i) { // unused lanes repeat the last
-        const FoldCandidate& of = candidate(std::min(i, count - 1));
+        const FoldCandidate& of = *lanes[std::min(i, lanes.size() - 1)];
         lit_->set(i, of.node, of.ring, lit);
     }
     lit_->find_rows(lit);
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!(candidate(i).flags & translucent_ring)) continue;
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+        if (!(lanes[i]->flags & translucent_ring)) continue;
         lit.translucent |= 1u << i;
         lit.row[i] = lit_->silhouette_row();
     }
+}
+
+FoldClass FoldTester::lit_rows(const LitFindings& lit, std::size_t lane) const {
+    return {static_cast<std::uint16_t>(lit.row[lane]), static_cast<std::uint16_t>(lit_->silhouette_row())};
 }
 
 void FoldTester::find_still_rows(std::span<FoldCandidate> candidates) const {
@@ -220,33 +217,29 @@ void FoldTester::find_still_rows(std::span<FoldCandidate> candidates) const {
     for (std::size_t first = 0; first < candidates.size(); first += kernel_lanes) {
         const auto batch = candidates.subspan(first, std::min(kernel_lanes, candidates.size() - first));
         LitFindings lit;
-        find_lit_rows([&](std::size_t i) -> const FoldCandidate& { return batch[i]; }, batch.size(), lit);
-        for (std::size_t i = 0; i < batch.size(); ++i)
-            batch[i].rows = {static_cast<std::uint16_t>(lit.row[i]),
-                             static_cast<std::uint16_t>(lit_->silhouette_row())};
+        find_lit_rows(Lanes(lanes_of(batch)).first(batch.size()), lit);
+        for (std::size_t i = 0; i < batch.size(); ++i) batch[i].rows = lit_rows(lit, i);
     }
 }
 
 // By the rows that lights give.
 void FoldTester::find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const {
-    find_lit_rows([&](std::size_t i) -> const FoldCandidate& { return *lanes[i]; }, lanes.size(), lit);
-    std::array<FoldCandidate, kernel_lanes> lit_candidates;
-    std::array<const FoldCandidate*, kernel_lanes> lit_lanes;
+    find_lit_rows(lanes, lit);
+    std::array<FoldCandidate, kernel_lanes> candidates;
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-        lit_candidates[i] = *lanes[i];
-        lit_candidates[i].rows = {static_cast<std::uint16_t>(lit.row[i]),
-                                  static_cast<std::uint16_t>(lit_->silhouette_row())};
-        lit_lanes[i] = &lit_candidates[i];
+        candidates[i] = *lanes[i];
+        candidates[i].rows = lit_rows(lit, i);
     }
-    find_verdicts(view, {lit_lanes.data(), lanes.size()}, batch);
+    fold_kernel.find_verdicts(view, Lanes(lanes_of(candidates)).first(lanes.size()), batch);
 }
 
-void FoldTester::test_lit(Lanes lanes, TestBatch& tested) const {
+void FoldTester::test(Lanes lanes, TestBatch& tested) const {
+    if (!has_moving_lights()) return fold_kernel.test(view_, lanes, tested);
     LitFindings lit;
     FoldBatch batch;
     find_lit_verdicts(view_, lanes, lit, batch);
     leave_room_for_lights(lit, batch);
-    find_slacks(view_, batch, tested);
+    fold_kernel.find_slacks(view_, batch, tested);
     std::copy_n(lit.slack, kernel_lanes, tested.light_slack);
 }
 
@@ -321,7 +314,7 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
         motion.position = std::min(motion.position, turned);
     }
     for (std::size_t f = 0; f < from.frusta.size(); ++f) {
-        const auto &before = from.frusta[f].planes, &after = to.frusta[f].planes;
+        const Frustum &before = from.frusta[f], &after = to.frusta[f];
         if (before.size() != after.size()) return jump;
         for (std::size_t p = 0; p < before.size(); ++p) {
             const glm::dvec3 turn = after[p].normal - before[p].normal;

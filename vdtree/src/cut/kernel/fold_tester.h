@@ -9,22 +9,11 @@
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/vertex_tree.h>
 
-#include "cut/cost_source.h"
+#include "cut/budget.h"
 #include "cut/kernel/fold_kernel.h"
 #include "cut/kernel/lit_tester.h"
 
 namespace unseen::vdtree {
-
-// What a test found. The verdict holds while the position clock has advanced by less than `position_slack`, the facing
-// clock by less than `facing_slack`, the planes' by less than `plane_slack` and the lights' by less than `light_slack`
-// (mesh units, 0 or more; see Motion).
-struct Verdict {
-    float position_slack = 0;
-    float facing_slack = 0;
-    float plane_slack = 0; // without planes: huge
-    float light_slack = 0; // without lights it counts for nothing
-    bool unfolded = false;
-};
 
 // How much a move from one viewpoint to another advances the clocks.
 struct Motion {
@@ -40,16 +29,15 @@ public:
     // copy of the criterion's table.
     FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold,
                bool least_costs = true);
-    FoldTester(const FoldTester&) = delete;
-    FoldTester& operator=(const FoldTester&) = delete;
 
+    const DistanceCriterion& criterion() const noexcept { return criterion_; }
     // Only without least costs.
     void set_threshold(float threshold) noexcept {
         view_.inverse_threshold = costs_view_.inverse_threshold = 1 / threshold;
     }
 
-    // `length_per_radian` is what a rotation of the gaze counts as on the
-    // position clock; any positive value will do, and it must be the same for verdicts and motions.
+    // `length_per_radian` is what a rotation of the gaze counts as on the position clock; any positive value will do, and
+    // it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
     // From the current viewpoint.
@@ -77,10 +65,9 @@ public:
     // they unfold. What nodes face is always found out, also where the verdict does not depend on it.
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const override;
     // Bounds: without a look at what faces the eye, at a third of the price. Not with lights.
-    bool has_bounds() const noexcept override { return !has_lights(); }
+    bool has_bounds() const noexcept override { return !lit_; }
     void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
                           float* seen_cost) const override;
-    bool has_lights() const noexcept { return lit_.has_value(); }
     // Whether verdicts are to say how far the lights may move, as by default, or hold for these lights alone. Candidates
     // from before do not count from then on.
     void let_lights_move(bool do_move) noexcept { do_lights_move_ = do_move; }
@@ -95,14 +82,14 @@ private:
 
     template <class F>
     void for_each_batch(const KernelView& view, std::span<const NodeId> nodes, F&& f) const;
+    void test(Lanes lanes, TestBatch& tested) const;
     void find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const;
-    template <class Candidate> // that the place of a lane leads to
-    void find_lit_rows(Candidate&& candidate, std::size_t count, LitFindings& lit) const;
-    void test_lit(Lanes lanes, TestBatch& tested) const;
+    void find_lit_rows(Lanes lanes, LitFindings& lit) const;
+    FoldClass lit_rows(const LitFindings& lit, std::size_t lane) const;
     void leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const;
     CostTables cost_tables() const;
 
-    const DistanceCriterion& criterion_;
+    const DistanceCriterion criterion_;
     NodeArrays arrays_; // of the tree and the criterion
     // The criterion's; infinite if the fold is visible from everywhere.
     std::vector<float> switch_distance_;

@@ -1,8 +1,7 @@
 // Registers of floats and integers, a node a lane: what all of the kernel's arithmetic is written in.
 //
-// This header and the other kernel_*.h are for fold_kernel.cpp alone, which includes them once for each kind of
-// register, in a namespace of its own, where `Vectors` is that kind (simd.h). So they include nothing and have no
-// guard.
+// table.h and what it includes are for fold_kernel.cpp alone, which includes them once for each kind of register, in a
+// namespace of its own, where `Vectors` is that kind (simd.h). So they have no guards.
 
 using Floats = Vectors::Floats;
 using Ints = Vectors::Ints;

@@ -1,11 +1,7 @@
 #include "cut/kernel/lit_kernel.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
@@ -110,13 +106,9 @@ UNSEEN_INLINE float step_of(float cosine, float outer, float inner) {
 //     L = I (n.l)+ (r + k (n.h)+^e),      h = (l + v) / |l + v|,
 //
 // where I is its intensity there, l and v are the directions to the light and to the eye, ()+ is no less than 0, and k
-// and e are the highlight's. Of a node's vertices it is known that their normals are in a cone (and in a box), their
-// albedos in an interval, and their places in a sphere. With the largest and least values of each factor over these,
-//
-//     L <= I_most (n.l)_most (r_most + k (n.h)_most^e),      L >= I_least (n.l)_least (r_least + k (n.h)_least^e).
-//
-// Each factor also has a rate: by how much it changes at most while the lights move by 1 (see light_motion()), for
-// moves up to the cap.
+// and e are the highlight's. A node's vertices have normals in a cone (and in a box), albedos in an interval, and places
+// in a sphere. L is bounded by the largest and least values of each factor over these. Each factor also has a rate: by how
+// much it changes at most while the lights move by 1 (see light_motion()), for moves up to the cap.
 
 // A light as a node's sphere sees it.
 struct Beam {
@@ -215,8 +207,8 @@ UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, float lea
                        beam.fade_rate * largest_albedo;
     const float full = rise + beam.growth * beam.least * least_albedo * moves +
                        beam.least_rate * beam.least * least_albedo + beam.fade_rate * largest_albedo;
-    // Where all of it faces the light, the difference of the extremes of n.l changes by less than 2 sine a radian, or
-    // the spread of the box; where some of it faces away, by the largest alone, and where all of it does, not at all.
+    // Where all of it faces the light, the difference of the extremes of n.l changes by less than 2 sine a radian, or the
+    // spread of the box; where some of it faces away, by the largest alone; and where all of it does, not at all.
     const float turning_rate =
         beam.growth * (beam.least * least_albedo *
                            (std::max(2 * std::max(facing.sine, 0.0f), b.spread[i]) * beam.to.turn + 2 * beam.to.widen) +

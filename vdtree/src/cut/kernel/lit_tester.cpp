@@ -1,9 +1,5 @@
 #include "cut/kernel/lit_tester.h"
 
-#include <cstring>
-
-#include <unseen/vdtree/internal/simd.h>
-
 namespace unseen::vdtree {
 
 // Loops over all lanes are such as compilers make vectors of.
@@ -27,7 +23,7 @@ LitTester::LitTester(const VertexTree& tree, const LitClasses& classes, std::spa
     for (std::size_t i = 0; i < contrasts_.size(); ++i)
         contrasts_[i] = static_cast<float>(ContrastClasses::contrast_of_index(i));
     for (std::size_t i = 0; i < luminances_.size(); ++i)
-        luminances_[i] = static_cast<float>(levels.level_of_index(i) / classes.scale.span);
+        luminances_[i] = static_cast<float>(levels.level(1 + i * ContrastClasses::contrast_count) / classes.scale.span);
     fill_guesses();
 }
 

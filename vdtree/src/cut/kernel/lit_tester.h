@@ -14,7 +14,7 @@
 
 #include "cut/kernel/fold_kernel.h"
 #include "cut/kernel/lit_kernel.h"
-#include "cut/kernel/prefetch.h"
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -11,9 +11,9 @@ static_assert(position_rounding <= test_rounding && facing_rounding <= test_roun
 // Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
 constexpr float angle_rounding = 1e-3f;
 
-// With a gaze, the distance within which a node unfolds depends on its eccentricity, by bins: the node has to stay
-// within (inward = 1), or beyond (-1), the distances of all bins that it may come to. The farther the bins that are
-// looked at, the more the gaze may turn, and the less path is left: the best of a few.
+// With a gaze, the node has to stay within (inward = 1), or beyond (-1), the distances of all bins of eccentricity that it
+// may come to. The farther the bins that are looked at, the more the gaze may turn, and the less path is left: the best
+// of a few.
 //
 // While the clock advances by `path`, the gaze turns by path * turn_per_length, and a point at least `gap` away shifts
 // by asin(step / rest) for each step, the rest of the gap being what longest_path leaves: less than shift_per_gap *
@@ -80,4 +80,5 @@ UNSEEN_INLINE void store(const Slacks& slacks, TestBatch& tested, std::size_t fi
     store(tested.position_slack + first, slacks.position);
     store(tested.facing_slack + first, slacks.facing);
     store(tested.plane_slack + first, slacks.planes);
+    store(tested.light_slack + first, all(huge));
 }

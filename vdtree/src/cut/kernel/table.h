@@ -1,6 +1,22 @@
-// The kernels' functions for this kind of register.
+// All of the kernels' arithmetic in one kind of register, and the tables of their functions.
 
-UNSEEN_INLINE void test_all(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) {
+#include "cut/kernel/lanes.h"
+
+#include "cut/kernel/measure.h"
+
+#include "cut/kernel/facing.h"
+
+#include "cut/kernel/load.h"
+
+#include "cut/kernel/decide.h"
+
+#include "cut/kernel/slacks.h"
+
+#include "cut/kernel/costs.h"
+
+#include "cut/kernel/deadlines.h"
+
+void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept {
     tested.unfolded = 0;
     for (std::size_t first = 0; first < lanes.size(); first += width) {
         const Candidates of = load_candidates(view, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
@@ -13,7 +29,7 @@ UNSEEN_INLINE void test_all(const KernelView& view, std::span<const FoldCandidat
     }
 }
 
-UNSEEN_INLINE void verdicts_of(const KernelView& view, std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
+void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes, FoldBatch& batch) noexcept {
     batch.is_inside = batch.is_near = batch.unfolded = batch.is_silhouette = batch.by_silhouette = batch.is_away = 0;
     for (std::size_t first = 0; first < kernel_lanes; first += width) {
         // Unused lanes repeat the last candidate.
@@ -45,7 +61,7 @@ UNSEEN_INLINE void verdicts_of(const KernelView& view, std::span<const FoldCandi
     }
 }
 
-// What verdicts_of() has stored, as far as slacks and costs are made of it.
+// What find_verdicts() has stored, as far as slacks and costs are made of it.
 UNSEEN_INLINE Nodes stored_nodes(const FoldBatch& batch, std::size_t first) {
     Nodes of{};
     of.radius = load(batch.radius + first);
@@ -64,7 +80,7 @@ UNSEEN_INLINE Measures stored_measures(const FoldBatch& batch, std::size_t first
     return m;
 }
 
-UNSEEN_INLINE void slacks_of_batch(const KernelView& view, const FoldBatch& batch, TestBatch& tested) {
+void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept {
     for (std::size_t first = 0; first < kernel_lanes; first += width) {
         const Verdicts v{mask_of(batch.unfolded, first), mask_of(batch.is_away, first),
                          mask_of(batch.is_silhouette, first), mask_of(batch.by_silhouette, first),
@@ -74,8 +90,8 @@ UNSEEN_INLINE void slacks_of_batch(const KernelView& view, const FoldBatch& batc
     tested.unfolded = batch.unfolded;
 }
 
-UNSEEN_INLINE void costs_of_batch(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
-                                  float* seen_cost) {
+void find_batch_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
+                      float* seen_cost) noexcept {
     for (std::size_t first = 0; first < kernel_lanes; first += width) {
         const Nodes of = stored_nodes(batch, first);
         const Measures m = stored_measures(batch, first);
@@ -88,61 +104,7 @@ UNSEEN_INLINE void costs_of_batch(const KernelView& view, const CostTables& tabl
     }
 }
 
-struct Kernels {
-    static void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept {
-        test_all(view, lanes, tested);
-    }
-    static void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes,
-                              FoldBatch& batch) noexcept {
-        verdicts_of(view, lanes, batch);
-    }
-    static void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept {
-        slacks_of_batch(view, batch, tested);
-    }
-    static void find_batch_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
-                                 float* seen_cost) noexcept {
-        costs_of_batch(view, tables, batch, cost, seen_cost);
-    }
-    static void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
-                       std::uint64_t* unfolded) noexcept {
-        decide_listed(view, arrays, nodes, unfolded);
-    }
-    static void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
-                             std::uint64_t* unfolded) noexcept {
-        decide_run(view, arrays, first, count, unfolded);
-    }
-    static void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                           std::span<const NodeId> nodes, const NodeCosts& costs) noexcept {
-        find_costs_listed(view, arrays, tables, nodes, costs);
-    }
-    static void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                                 std::span<const NodeId> nodes, float no_silhouette_over, float* cost,
-                                 float* seen_cost) noexcept {
-        find_bounds_listed(view, arrays, tables, nodes, no_silhouette_over, cost, seen_cost);
-    }
-    static void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path,
-                            BlockSpheres& spheres) noexcept {
-        move_all(eye_high, eye_low, path, spheres);
-    }
-    static void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
-                            float* deadlines) noexcept {
-        defer_inside(view, margin, clock, spheres, deadlines);
-    }
-    static std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
-                                      const SlotDeadlines* slots, const std::uint16_t* unfolded,
-                                      const BlockSpheres& spheres, EarliestDeadlines& deadlines,
-                                      std::uint32_t* due) noexcept {
-        return look_at(which, position_clock, facing_clock, slots, unfolded, spheres, deadlines, due);
-    }
-    static void find_deadlines(const TestBatch& tested, DeadlineBatch& batch) noexcept { deadlines_of(tested, batch); }
-    static void find_due_blocks(float position_clock, float facing_clock, const BlockSpheres& spheres,
-                                const EarliestDeadlines& deadlines, std::uint64_t* due) noexcept {
-        due_blocks_of(position_clock, facing_clock, spheres, deadlines, due);
-    }
-};
-
-constexpr Kernel table{
-    Kernels::test,           Kernels::find_verdicts, Kernels::find_slacks,    Kernels::find_batch_costs,
-    Kernels::decide,         Kernels::decide_range,  Kernels::find_costs,     Kernels::find_cost_bounds,
-    Kernels::move_blocks,    Kernels::keep_inside,   Kernels::look_at_blocks, Kernels::find_deadlines,
-    Kernels::find_due_blocks};
+constexpr FoldKernel fold_table{test,   find_verdicts, find_slacks, find_batch_costs,
+                                decide, decide_range,  find_costs,  find_cost_bounds};
+constexpr DeadlineKernel deadline_table{move_blocks,    keep_inside, look_at_blocks,
+                                        find_deadlines, hand_over,   find_due_blocks};

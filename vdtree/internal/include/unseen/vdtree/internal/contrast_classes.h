@@ -8,10 +8,27 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 
-#include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/internal/light_bounds.h>
 
 namespace unseen::vdtree {
+
+// A linear map from relative luminance to a unit of the criterion's own.
+struct AbsoluteScale {
+    double offset = 0; // the value of 0; 0 or more
+    double span = 1;   // what 1 adds; above 0
+
+    double of(double relative) const { return offset + span * relative; }
+};
+
+// Of a criterion's interior classes under lights that may move: they follow from the range of luminances that the
+// viewpoint's lighting gives to a node's vertices, adapted to the brightest of these.
+struct LitClasses {
+    std::shared_ptr<const LightBounds> bounds; // of the tree
+    AbsoluteScale scale;
+    std::uint16_t silhouette = 0; // the class of all outlines
+};
 
 // Values on a class's edge stay in it; far below a class's width.
 inline constexpr double class_edge = 1e-7;
@@ -68,11 +85,10 @@ public:
 
     // The largest values of a class other than 0; the level is absolute.
     static double contrast(std::size_t number) { return contrast_of_index((number - 1) % contrast_count); }
-    double level(std::size_t number) const { return level_of_index((number - 1) / contrast_count); }
+    double level(std::size_t number) const { return levels_.value((number - 1) / contrast_count); }
     static double contrast_of_index(std::size_t i) {
         return std::exp2(static_cast<double>(i) / contrasts_per_octave - contrast_octaves) * (1 + 2 * class_edge);
     }
-    double level_of_index(std::size_t i) const { return levels_.value(i); }
 
 private:
     LevelClasses levels_;

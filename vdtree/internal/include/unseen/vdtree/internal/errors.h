@@ -1,7 +1,6 @@
 // Errors by their codes, for `return invalid_argument("...");`.
 #pragma once
 
-#include <string>
 #include <utility>
 
 #include <unseen/vdtree/result.h>

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
@@ -57,5 +58,15 @@ private:
     std::vector<Triangle> corners_;          // nodes that are shown
     std::vector<std::vector<Index>> around_; // by node that is shown
 };
+
+// ---- units
+
+// A power of two that brings a radius to between 1 and 2. 1 for 0 and non-finite radii, and for ordinary ones, whose sixth
+// powers neither over- nor underflow. Lengths times it and back are exact.
+float unit_scale(float radius);
+
+// Positions and spheres times a power of two, relative to the origin. All else is viewed in the given geometry, which
+// it keeps alive; displacements are as they were.
+std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const TreeGeometry>& given, float scale);
 
 } // namespace unseen::vdtree

@@ -1,5 +1,5 @@
 // What judges know of an observer, as numbers: perception makes the tables, and render's passes judge by them on the GPU.
-// perception's judges on the CPU are made of the same numbers and are the reference.
+// perception's judges on the CPU are the reference.
 #pragma once
 
 #include <array>

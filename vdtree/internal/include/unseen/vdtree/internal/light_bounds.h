@@ -1,7 +1,7 @@
 // What lights make of a tree: the luminance of its vertices, and bounds of it by node.
 #pragma once
 
-#include <cstdint>
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -16,11 +16,16 @@ namespace unseen::vdtree {
 
 std::size_t shadow_lights(const Lighting& lighting); // how many lights cast shadows
 
+// The share of a spot's light within the inner angle, by the cosine of the angle from the axis.
+inline double spot_share(const LightSource& spot, double cosine) {
+    const double t = std::clamp((cosine - spot.outer_cosine) / (spot.inner_cosine - spot.outer_cosine), 0.0, 1.0);
+    return t * t * (3 - 2 * t);
+}
+
 // Relative luminance of a vertex. `normal`: unit or zero.
 double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 normal, double albedo, glm::dvec3 eye);
 
-// The luminance of a node's colour under white light. Without colours: default_albedo, or 1 if there is a texture, which
-// multiplies it.
+// The luminance of a node's colour under white light. Without colours: default_albedo, or 1 with a texture.
 float albedo_of(const VertexTree& tree, NodeId node);
 
 // Normals and albedos of the vertices that a fold may show: those of the ring, and the proxies of the subtree.
@@ -48,11 +53,10 @@ public:
     // Fails if VertexTree::check() fails. Cost: about 1 us a triangle, in parallel.
     static Result<LightBounds> measure(const VertexTree& tree);
 
-    // Includes further vertices, such as no_node for "anything may be here and at all nodes above". `vertices` calls its
-    // argument for each of them, any number of times and from several threads, but not for one node at the same time.
+    // Includes further vertices; no_node: anything may be here and at all nodes above. `vertices` calls its argument for each
+    // of them, from several threads, but not for one node at the same time. Spheres of the `radii` (mesh units, one an
+    // interior node) around the rings' centres contain the rings and all further vertices.
     using FurtherVertex = FunctionRef<void(NodeId node, NodeId vertex)>;
-    // `radii`: by interior node, mesh units; spheres of these radii around the rings' centres contain the rings and all
-    // further vertices. Precondition: one for each interior node.
     static Result<LightBounds> measure(const VertexTree& tree, std::vector<float> radii,
                                        const FunctionRef<void(const FurtherVertex&)>& vertices);
 
@@ -70,13 +74,12 @@ private:
     std::vector<float> radii_;
 };
 
-// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone, whichever of the
-// shadow-casting lights are hidden from it. Cost: some ten nanoseconds a light.
+// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone, whichever lights that
+// cast shadows are hidden from it. Cost: some ten nanoseconds a light.
 LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const Sphere& sphere, glm::dvec3 eye);
 
-// How far lights have moved, as an angle in radians. Directions count by their angle, positions in radii of the tree, and
-// intensities by eight times their logarithm. With highlights, the eye counts like a light. Infinite if anything else
-// differs.
+// How far lights have moved, in radians: directions by their angle, positions in radii of the tree, intensities by eight
+// times their logarithm. With highlights, the eye counts like a light. Infinite if anything else differs.
 double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to,
                     glm::dvec3 eye_to);
 

@@ -1,7 +1,9 @@
 // Cells of normal masks, and the sides from which an eye sees the triangles of a mask or of slabs.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
@@ -40,6 +42,36 @@ Facing facing(const NormalSlabs& slabs, const Mask& mask, glm::vec3 to_eye, floa
     if (by_slabs != Facing::mixed) return by_slabs;
     if constexpr (std::is_same_v<Mask, NormalMask>) return facing(mask, to_eye, distance, radius);
     else return facing(mask(), to_eye, distance, radius);
+}
+
+// ---- slabs
+
+// Coordinates of a direction along the slabs' axes, in NormalSlabs' order.
+template <class Float>
+using SlabCoordinates = std::array<Float, NormalSlabs::axis_count>;
+template <class Float>
+SlabCoordinates<Float> along_slab_axes(Float x, Float y, Float z) noexcept {
+    constexpr auto inverse_sqrt3 = static_cast<Float>(0.57735026918962576451); // the diagonals' coordinates
+    return {x,
+            y,
+            z,
+            (x + y + z) * inverse_sqrt3,
+            (-x + y + z) * inverse_sqrt3,
+            (x - y + z) * inverse_sqrt3,
+            (x + y - z) * inverse_sqrt3};
+}
+// Slabs from one to the other, rounded outward; `margin` (units, 1/127) covers the rounding of the coordinates.
+template <class Float>
+NormalSlabs slabs_between(const SlabCoordinates<Float>& low, const SlabCoordinates<Float>& high,
+                          Float margin) noexcept {
+    constexpr Float units = 127;
+    NormalSlabs slabs;
+    for (std::size_t i = 0; i < low.size(); ++i) {
+        // The margin must not lead beyond the ends: 128 is no std::int8_t.
+        slabs.lo[i] = static_cast<std::int8_t>(std::max(std::floor(low[i] * units - margin), -units));
+        slabs.hi[i] = static_cast<std::int8_t>(std::min(std::ceil(high[i] * units + margin), units));
+    }
+    return slabs;
 }
 
 } // namespace unseen::vdtree

@@ -1,8 +1,7 @@
 // Loops of many threads, by oneTBB.
 //
 // The thread sanitizer does not see how TBB's tasks wait for each other, for the library is not built for it. It is told
-// here: what was done before a loop comes before its tasks, and what they do before what follows the loop. Nothing of that
-// is left in other builds.
+// here: what was done before a loop comes before its tasks, and what they do before what follows the loop.
 #pragma once
 
 #include <utility>
@@ -23,38 +22,35 @@ namespace unseen {
 // Made before tasks begin, and ended when all have ended; each task holds a Task.
 class TaskOrder {
 public:
-#ifdef __SANITIZE_THREAD__
-    TaskOrder() { __tsan_release(&begin_); }
-    ~TaskOrder() { __tsan_acquire(&end_); }
-#else
-    TaskOrder() {} // not trivial: unused ones are no mistake
-    ~TaskOrder() {}
-#endif
+    TaskOrder() { release(&begin_); }
+    ~TaskOrder() { acquire(&end_); }
     TaskOrder(const TaskOrder&) = delete;
     TaskOrder& operator=(const TaskOrder&) = delete;
 
     class Task {
     public:
-#ifdef __SANITIZE_THREAD__
-        explicit Task(const TaskOrder& order) : order_(order) { __tsan_acquire(&order_.begin_); }
-        ~Task() { __tsan_release(&order_.end_); }
-#else
-        explicit Task(const TaskOrder&) {}
-        ~Task() {}
-#endif
+        explicit Task(const TaskOrder& order) : order_(order) { acquire(&order_.begin_); }
+        ~Task() { release(&order_.end_); }
         Task(const Task&) = delete;
         Task& operator=(const Task&) = delete;
 
-#ifdef __SANITIZE_THREAD__
     private:
         const TaskOrder& order_;
-#endif
     };
 
-#ifdef __SANITIZE_THREAD__
 private:
-    mutable char begin_, end_; // their addresses count, and nobody reads them
+    static void acquire([[maybe_unused]] void* address) {
+#ifdef __SANITIZE_THREAD__
+        __tsan_acquire(address);
 #endif
+    }
+    static void release([[maybe_unused]] void* address) {
+#ifdef __SANITIZE_THREAD__
+        __tsan_release(address);
+#endif
+    }
+
+    mutable char begin_, end_; // their addresses count, and nobody reads them
 };
 
 // A loop's body, as a task runs it.

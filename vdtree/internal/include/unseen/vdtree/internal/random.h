@@ -1,20 +1,25 @@
 // Pseudo-random numbers that are the same with every compiler and standard library, for runs that must repeat.
+// Distributions are made here: those of <random> differ between libraries.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 
-#include <unseen/vdtree/internal/split_mix64.h>
-
 namespace unseen {
 
-// Distributions are made here: those of <random> differ between libraries.
 class Random {
 public:
-    explicit Random(std::uint64_t seed) : generator_(seed) {}
+    explicit Random(std::uint64_t seed) : state_(seed) {}
 
-    std::uint64_t bits() { return generator_.next(); }
+    // SplitMix64 (Steele, Lea and Flood 2014).
+    std::uint64_t bits() {
+        state_ += 0x9e3779b97f4a7c15u;
+        std::uint64_t z = state_;
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+        z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+        return z ^ (z >> 31);
+    }
 
     // In [0, 1), a multiple of 2^-53.
     double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
@@ -33,7 +38,7 @@ public:
     }
 
 private:
-    SplitMix64 generator_;
+    std::uint64_t state_;
 };
 
 // A generator of its own for the `index`-th item of a run, so that a run can be taken up anywhere.

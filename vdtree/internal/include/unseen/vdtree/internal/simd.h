@@ -1,17 +1,10 @@
-// The one layer for SIMD: what the rest of the library knows of compilers and processors.
-//
-// There are two ways to use it.
-// - Loops over arrays are left to the compiler. Such a function is UNSEEN_INLINE, and is called by two others: a plain
-//   one, and one marked UNSEEN_AVX2; has_avx2() chooses between them.
+// The one layer for SIMD, by the vectors that GCC and Clang share. There are two ways to use it.
+// - Loops over arrays are left to the compiler: an UNSEEN_INLINE function is called by a plain one and by one marked
+//   UNSEEN_AVX2; has_avx2() chooses between these.
 // - Arithmetic on registers is written once, on `Vectors`, in headers that are included once for each kind of register:
 //   see fold_kernel.cpp.
-// Vectors are the extension that GCC and Clang share.
-//
-// Every way gives the same bits on every processor: files that use this are compiled without contraction to fused
-// operations, square roots are rounded correctly, and there are no approximations.
-//
-// Highway 1.0.3 (Debian 12) gives the same bits, too, but it has no SSE2, and took 1.2 to 1.5 times as long for
-// distance tests of nodes anywhere in a tree: lookups in tables are collected lane by lane here.
+// Same bits on every processor: nothing is contracted to fused operations, square roots are rounded correctly, and there
+// are no approximations. (Highway 1.0.3 took 1.2 to 1.5 times as long for distance tests of nodes anywhere in a tree.)
 #pragma once
 
 #include <algorithm>
@@ -45,6 +38,14 @@ inline bool has_avx2() noexcept {
     return __builtin_cpu_supports("avx2");
 #else
     return false;
+#endif
+}
+
+// Brings memory nearer that is going to be read soon. Always inlined: GCC leaves a call out, as one without an effect, if
+// it comes from a function that is compiled for another processor.
+UNSEEN_INLINE void prefetch([[maybe_unused]] const void* what) noexcept {
+#if defined(__GNUC__)
+    __builtin_prefetch(what);
 #endif
 }
 

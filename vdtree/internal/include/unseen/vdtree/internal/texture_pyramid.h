@@ -44,18 +44,13 @@ struct UvBox {
 // The least and the largest luminance of a texture, and its mean, over areas of all sizes: for each of its mip levels.
 class TexturePyramid {
 public:
-    struct Range {
-        Unorm16 lo, hi; // rounded outward
-        bool operator==(const Range&) const = default;
-    };
-
     // Precondition: a valid texture that is not empty. Cost: a pass over the texels; 11 bytes of memory for each.
     explicit TexturePyramid(const TextureView& texture);
 
     // Contains what bilinear filtering can return for coordinates in the box, which may reach beyond 0..1: the range of
     // the texels there, and of others nearer than a seventh of its longer side. A box within another has a range within
     // the other's. Coarser mip levels mix texels as far away as a pixel is wide. Cost: up to some hundred look-ups.
-    Range range(const UvBox& box) const;
+    PackedRange range(const UvBox& box) const;
 
     // About the mean luminance over an area of this width (texture coordinates, 0 or more) around a point: bilinear in the
     // nearest level.
@@ -64,7 +59,7 @@ public:
 private:
     struct Level {
         std::uint32_t width, height;
-        std::vector<Range> ranges;
+        std::vector<PackedRange> ranges; // rounded outward
         std::vector<float> means;
     };
     struct Cells { // along one axis: [first, last], and perhaps another run from 0 on

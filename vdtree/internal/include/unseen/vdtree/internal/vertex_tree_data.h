@@ -8,12 +8,41 @@
 
 #include <unseen/vdtree/vertex_tree.h>
 
-#include <unseen/vdtree/internal/array.h>
-
 namespace unseen::vdtree {
 
 template <class T>
 using Vector = std::vector<T>;
+
+// A finished array of a tree: its own memory, or a view of a mapped file, which must outlive it.
+template <class T>
+class Array {
+public:
+    using value_type = T;
+
+    Array() = default;
+    Array(std::vector<T>&& values) : owned_(std::move(values)), view_(owned_) {}
+    explicit Array(std::span<const T> view) : view_(view) {}
+    Array(Array&& other) noexcept : owned_(std::move(other.owned_)), view_(std::exchange(other.view_, {})) {}
+    Array& operator=(Array&& other) noexcept {
+        owned_ = std::move(other.owned_);
+        view_ = std::exchange(other.view_, {});
+        return *this;
+    }
+
+    const T& operator[](std::size_t i) const noexcept { return view_[i]; }
+    const T* data() const noexcept { return view_.data(); }
+    std::size_t size() const noexcept { return view_.size(); }
+    bool empty() const noexcept { return view_.empty(); }
+    auto begin() const noexcept { return view_.begin(); }
+    auto end() const noexcept { return view_.end(); }
+
+    // What is allocated, or what is mapped.
+    std::size_t bytes() const noexcept { return owned_.empty() ? view_.size_bytes() : owned_.capacity() * sizeof(T); }
+
+private:
+    std::vector<T> owned_;
+    std::span<const T> view_;
+};
 
 struct TextureFacts {
     std::uint32_t width, height;
@@ -101,7 +130,7 @@ struct VertexTree::Data {
 };
 
 // Why an attribute cannot belong to a tree with this many nodes, as a sentence; empty if it can.
-std::string fault_in_attribute(const AttributeInfo& attribute, std::size_t interior_count, std::size_t node_count);
+std::string fault_in_attribute(const Attribute& attribute, std::size_t interior_count, std::size_t node_count);
 
 // In memory of its own, whatever the given arrays view.
 TreeLuminance copy_of(const TreeLuminance& light);

@@ -1,0 +1,38 @@
+// What nodes cover of a window.
+#pragma once
+
+#include <vector>
+
+#include <unseen/vdtree/vertex_tree.h>
+#include <unseen/vdtree/view.h>
+
+namespace unseen::vdtree {
+
+// The part of the window that some points cover, and the nearest of them. The footprint of several points contains that of
+// every point between them.
+struct Footprint {
+    double left = 1e300, top = 1e300, right = -1e300, bottom = -1e300; // pixels
+    double nearest = 1e300; // along the view's axis, world units; 0 or less beside and behind the eye
+
+    void add(const Footprint& other) noexcept;
+};
+
+// Projects points of the world onto a view's window.
+class Projector {
+public:
+    explicit Projector(const View& view); // precondition: valid, and perspective
+    Footprint operator()(glm::dvec3 point) const noexcept;
+
+private:
+    glm::dvec3 eye_;
+    CameraFrame camera_;
+    glm::dvec2 axis_px_;
+    double focal_px_; // tangents in pixels
+};
+
+// By interior node: the footprint of its ring before and after the fold, and of all nodes below it. It holds as long as the
+// neighbours are unfolded, or folded under the same rule. Fails if VertexTree::check() fails, and for orthographic views.
+// Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
+Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view);
+
+} // namespace unseen::vdtree
