@@ -178,8 +178,7 @@ class Writer {
 public:
     template <class T>
     void add(std::string_view name, std::span<const T> values, std::uint32_t component) {
-        add({{std::string(name), AttributeDomain{part_of_tree}, sizeof(T), component, values.size()},
-             nullptr,
+        add({std::string(name), AttributeDomain{part_of_tree}, sizeof(T), component, values.size(), nullptr,
              std::as_bytes(values)});
     }
     void add(const Attribute& a) {
