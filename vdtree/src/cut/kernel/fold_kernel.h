@@ -9,7 +9,6 @@
 #include <vector>
 
 #include <unseen/vdtree/criteria.h>
-#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 
@@ -62,14 +61,6 @@ struct NodeArrays {
     const NormalSlabs* facing = nullptr;                           // null: those of the bounds
     const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
 };
-UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {
-    prefetch(arrays.bounds + node);
-    if (arrays.support) prefetch(arrays.support + node);
-    if (arrays.classes) prefetch(arrays.classes + node);
-    if (arrays.facing) prefetch(arrays.facing + node);
-    if (arrays.lengths) prefetch(arrays.lengths + node);
-    if (arrays.silhouette_lengths) prefetch(arrays.silhouette_lengths + node);
-}
 
 // What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
 struct CostTables {

@@ -100,7 +100,12 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
 }
 
 void FoldTester::prefetch(NodeId node) const {
-    prefetch_node(arrays_, node);
+    vdtree::prefetch(arrays_.bounds + node);
+    if (arrays_.support) vdtree::prefetch(arrays_.support + node);
+    if (arrays_.classes) vdtree::prefetch(arrays_.classes + node);
+    if (arrays_.facing) vdtree::prefetch(arrays_.facing + node);
+    if (arrays_.lengths) vdtree::prefetch(arrays_.lengths + node);
+    if (arrays_.silhouette_lengths) vdtree::prefetch(arrays_.silhouette_lengths + node);
     if (lit_) lit_->prefetch(node);
 }
 

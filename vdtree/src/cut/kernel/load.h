@@ -62,6 +62,15 @@ UNSEEN_INLINE Candidates load_candidates(const KernelView& view, At at) {
             {{bits(11), bits(12), bits(13), bits(14)}}};
 }
 
+UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {
+    prefetch(arrays.bounds + node);
+    if (arrays.support) prefetch(arrays.support + node);
+    if (arrays.classes) prefetch(arrays.classes + node);
+    if (arrays.facing) prefetch(arrays.facing + node);
+    if (arrays.lengths) prefetch(arrays.lengths + node);
+    if (arrays.silhouette_lengths) prefetch(arrays.silhouette_lengths + node);
+}
+
 // Nodes by their places in a list; beyond its end the last one again.
 struct Listed {
     const NodeArrays& arrays;
