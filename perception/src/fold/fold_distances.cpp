@@ -509,9 +509,9 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, Distanc
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
-    parts.lit =
+    parts.lit = std::make_shared<const vdtree::LitClasses>(
         vdtree::LitClasses{std::move(bounds), scale,
-                           classes.class_of({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
+                           classes.class_of({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))});
     fill_table(parts, classes, screen, csf);
     make_growing(parts);
     return DistanceCriterion::create(tree, std::move(parts));
