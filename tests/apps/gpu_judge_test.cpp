@@ -87,8 +87,7 @@ void expect_alike(const render::Context& context, const Pair& pair, const JudgeO
     EXPECT_EQ(judged->visible_pixels,
               static_cast<std::uint64_t>(std::count_if(v.begin(), v.end(), [](float x) { return !(x < 1); })))
         << what;
-    const auto map = require(gpu->threshold_map());
-    EXPECT_LE(error_of(map->values, cpu_map->values, 0), full_tolerance) << what;
+    EXPECT_LE(error_of(require(gpu->threshold_map())->values, cpu_map->values, 0), full_tolerance) << what;
     EXPECT_EQ(context.take_errors(), "") << what;
 }
 

@@ -55,8 +55,7 @@ TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
         EXPECT_EQ(test["decision"], "keep");
         EXPECT_GE(test["p_pass"], 0);
     }
-    const auto picture = require(unseen::perception::read_image(path("still.png")));
-    EXPECT_EQ(picture->image.width, width);
+    EXPECT_EQ(require(unseen::perception::read_image(path("still.png")))->image.width, width);
     // Luminance for judging, and a summary for people.
     const Outcome judged = render({"--method", "perceptual", "--maps", "rpg99", "-o", "still.pfm"});
     ASSERT_EQ(judged.status, 0) << judged.err;

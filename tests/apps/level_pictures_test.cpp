@@ -87,8 +87,7 @@ TEST_F(PrecomputeTest, GoesOnWhereItWasStoppedAndEndsTheSame) {
     EXPECT_FALSE(std::filesystem::exists(folder / "parts.sel"));
     options.progress = {};
     options.threads = 1;
-    const auto rest = require(precompute_selections(context(), session, folder / "parts.sel", options));
-    EXPECT_EQ(rest->resumed, 4u);
+    EXPECT_EQ(require(precompute_selections(context(), session, folder / "parts.sel", options))->resumed, 4u);
     EXPECT_EQ(bytes_of(folder / "parts.sel"), bytes_of(folder / "whole.sel"));
     EXPECT_EQ(folder.file_count(), 2u) << "what was done until then is gone";
 }

@@ -186,9 +186,8 @@ TEST_F(MaskingTest, BarsMaskWhereTheyAreAtTheirOwnFrequency) {
 
 TEST_F(MaskingTest, RefusesCellsThatAreNone) {
     auto judge = GpuJudge::create(context(), bars(8, 0.5), {});
-    for (const int cell : {0, -3, 65}) {
+    for (const int cell : {0, -3, 65})
         EXPECT_THAT(error_in(judge->passes().map_elevations(cell)), HasSubstr("1 to 64 pixels"));
-    }
     EXPECT_FALSE(judge->passes().read_elevations());
 }
 

@@ -136,8 +136,7 @@ TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
     EXPECT_EQ(read_image(path("orbit.png"))->image.width, 1200);
     EXPECT_EQ(std::distance(fs::directory_iterator(path("frames")), fs::directory_iterator()), 24);
     // A frame is the picture that is drawn of the same view alone, but for the cut, which is a little finer.
-    const auto last = require(read_image(path("frames/023.png")));
-    EXPECT_EQ(last->image.height, 80);
+    EXPECT_EQ(require(read_image(path("frames/023.png")))->image.height, 80);
 }
 
 TEST_F(RenderCommandTest, PathsComeFromFiles) {

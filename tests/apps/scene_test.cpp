@@ -212,8 +212,7 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
     const vdtree::View view = session->default_view();
     EXPECT_EQ(view.eye, glm::dvec3(0, 0, 4));
     EXPECT_NEAR(view.fov_y_degrees, 57.29577951, 1e-6);
-    const auto plan = require(session->plan(view, {}));
-    EXPECT_EQ(plan->fold_test, session::FoldTest::error);
+    EXPECT_EQ(require(session->plan(view, {}))->fold_test, session::FoldTest::error);
 }
 
 TEST_F(SceneTest, FollowsAsItSimplifiesFromScratch) {
@@ -261,8 +260,7 @@ TEST_F(SceneTest, NamesNodesThatCannotBePlaced) {
         load(File(R"({"nodes": [{"mesh": 0, "scale": [1e-12, 1e-12, 1e-12]}, {"mesh": 0}]})").add(body()).glb()))
         << "what is tiny is none the less there";
     ASSERT_TRUE(load(File(all_kinds).add(body()).glb(), LoadAs::automatic));
-    const auto by_content = require(session::Scene::load(path("s.glb")));
-    EXPECT_TRUE(by_content->is_of_file()) << "by default the content decides";
+    EXPECT_TRUE(require(session::Scene::load(path("s.glb")))->is_of_file()) << "by default the content decides";
     for (const char* scale : {"1e-300", "1e200"})
         EXPECT_THAT(complaint(File(std::string(R"({"nodes": [{"mesh": 0}, {"mesh": 0, "name": "leaf", "scale": [)") +
                                    scale + "," + scale + "," + scale + "]}]}")
@@ -278,8 +276,7 @@ TEST_F(SceneTest, ThousandsOfNodesAreQuicklyRead) {
     std::string nodes;
     for (int i = 0; i < 5000; ++i)
         nodes += (i ? "," : "") + std::string(R"({"mesh": 0, "translation": [)") + std::to_string(i) + ", 0, 0]}";
-    const auto scene = require(load(File("{\"nodes\": [" + nodes + "]}").add(shapes::cube(2)).glb()));
-    EXPECT_EQ(scene->objects.size(), 5000u);
+    EXPECT_EQ(require(load(File("{\"nodes\": [" + nodes + "]}").add(shapes::cube(2)).glb()))->objects.size(), 5000u);
 }
 
 TEST_F(SceneTest, NodesMultiplyAFileWithinBounds) {

@@ -72,8 +72,7 @@ TEST(Session, PlansBeforeItMeasures) {
     EXPECT_THAT(hurried->why, HasSubstr("takes long"));
     EXPECT_FALSE(session->plan(view, {.fold_test = FoldTest::error, .may_measure = false}));
 
-    const auto ready = require(session->prepare(view, {}));
-    EXPECT_FALSE(ready->front().measures);
+    EXPECT_FALSE(require(session->prepare(view, {}))->front().measures);
     EXPECT_TRUE(perception::has_fold_measurement(session->tree()));
     EXPECT_EQ(session->plan(view, {.may_measure = false})->fold_test, FoldTest::error);
 }
@@ -300,9 +299,8 @@ TEST(Observer, ACircleAroundTheGazeIsOneOfAngles) {
     const auto middle = session::gaze_circle(display, view, {400, 300}, 1);
     EXPECT_NEAR(middle.front().x - 400, std::tan(std::numbers::pi / 180) * distance_px, 1e-9) << "34 pixels a degree";
     // A part of the circle is beside and behind the viewer, where no screen is.
-    for (const glm::dvec2 px : session::gaze_circle(display, view, {30000, 300}, 40)) {
+    for (const glm::dvec2 px : session::gaze_circle(display, view, {30000, 300}, 40))
         EXPECT_TRUE(std::isfinite(px.x) && std::isfinite(px.y));
-    }
 }
 
 } // namespace session_test

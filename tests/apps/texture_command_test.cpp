@@ -334,9 +334,8 @@ TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
             EXPECT_THAT(complaint({"render", "large.vdt", "-o", "x.png"}),
                         AnyOf(HasSubstr("damaged"), HasSubstr("No OpenGL")));
             // What asks node by node goes as far as nodes are sound.
-            for (const char* const test : {"extent", "displacement"}) {
+            for (const char* const test : {"extent", "displacement"})
                 succeed({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", test, "--pixels", "1"});
-            }
         }
     }
 }

@@ -80,8 +80,7 @@ TEST_F(ViewCommandTest, FollowsKeysAndMouse) {
     EXPECT_EQ(read_text(path("out.txt")), "");
     EXPECT_THAT(errors(), StartsWith("unseen: note: press h in the window to see its keys.\n"));
     EXPECT_THAT(errors(), HasSubstr("wrote 'unseen-"));
-    const auto last = require(unseen::perception::read_image(path("last.png")));
-    EXPECT_EQ(last->image.width, 200);
+    EXPECT_EQ(require(unseen::perception::read_image(path("last.png")))->image.width, 200);
     int pictures = 0;
     for (const std::string& name : files()) pictures += name.ends_with(".png");
     EXPECT_EQ(pictures, 2);

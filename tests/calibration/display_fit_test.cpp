@@ -41,8 +41,7 @@ TEST_F(DisplayFit, APhotometersTableBecomesTheDisplay) {
     // Ambient light is in the photometer's figures already.
     perception::Display lit;
     lit.ambient = perception::Lux(100);
-    const auto less = require(with_photometer(lit, *table));
-    EXPECT_NEAR(perception::black_level(*less).value(), 0.3, 1e-4);
+    EXPECT_NEAR(perception::black_level(*require(with_photometer(lit, *table))).value(), 0.3, 1e-4);
 }
 
 TEST_F(DisplayFit, BadTablesNameTheFileAndTheLine) {

@@ -204,8 +204,7 @@ TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
     expect_same(back->table.samples(), profile.table.samples());
     const auto table = require(read_csf(file));
     expect_same(table->samples(), profile.table.samples());
-    const auto old = require(read_observer(write(small)));
-    EXPECT_TRUE(old->measured.empty());
+    EXPECT_TRUE(require(read_observer(write(small)))->measured.empty());
 }
 
 TEST_F(ObserverProfileTest, SummationGoesThereAndBack) {
@@ -221,8 +220,7 @@ TEST_F(ObserverProfileTest, SummationGoesThereAndBack) {
     const auto table = require(read_csf(file));
     EXPECT_EQ(table->samples().summation, 1.25);
     ASSERT_TRUE(write_csf(folder() / "table.json", *table));
-    const auto again = require(read_csf(folder() / "table.json"));
-    EXPECT_EQ(again->samples().summation, 1.25);
+    EXPECT_EQ(require(read_csf(folder() / "table.json"))->samples().summation, 1.25);
     ASSERT_EQ(back->measured.size(), 2u);
     EXPECT_EQ(back->measured[0].place, profile.measured[0].place);
     EXPECT_EQ(back->measured[1].place, profile.measured[1].place);

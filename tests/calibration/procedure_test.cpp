@@ -357,9 +357,7 @@ TEST_F(ProcedureTest, WhatDoesNotFitTheShapeComesThrough) {
             20 * std::log10(e.sensitivity() / (observer.sensitivity(e.place, plan.luminance) * notch(e.place)));
         squares += error_db * error_db / static_cast<double>(plan.places.size());
         EXPECT_GE(e.answers, 4);
-        if (e.place == GratingPlace{2, 0}) {
-            EXPECT_LT(e.local.mean, -0.05);
-        }
+        if (e.place == GratingPlace{2, 0}) EXPECT_LT(e.local.mean, -0.05);
     }
     EXPECT_LT(std::sqrt(squares), 1.5);
 }

@@ -217,8 +217,7 @@ TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
     const VertexTree tree = checkerboard(
         [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
     for (const bool safe : {false, true}) {
-        const auto criterion = require(criterion_of(tree, view_from(near), {safe, true}, true));
-        EXPECT_TRUE(criterion->is_monotone());
+        EXPECT_TRUE(require(criterion_of(tree, view_from(near), {safe, true}, true))->is_monotone());
     }
 }
 

@@ -239,9 +239,8 @@ TEST(CsfModels, FlickerIsADriftForModelsThatKnowNone) {
                                  CsfModel::mannos_sakrison, CsfModel::rushmeier}) {
         EXPECT_EQ(sensitivity(model, flickering(foveal(4, 50), 8)), sensitivity(model, moving(foveal(4, 50), 2)));
     }
-    for (const CsfModel model : {CsfModel::castle, CsfModel::stela, CsfModel::castle_red_green}) {
+    for (const CsfModel model : {CsfModel::castle, CsfModel::stela, CsfModel::castle_red_green})
         EXPECT_NE(sensitivity(model, flickering(foveal(4, 50), 8)), sensitivity(model, moving(foveal(4, 50), 2)));
-    }
 }
 
 TEST(CsfModels, OutsideOfTheDomainIsNotANumber) {
@@ -329,8 +328,7 @@ TEST(CsfModels, ArcsAreMinutesAndLogarithmsDecimal) {
 
 TEST(CsfModels, HaveDistinctNames) {
     for (const CsfModel model : csf_models) {
-        const auto found = require(csf_model(name(model)));
-        EXPECT_EQ(*found, model);
+        EXPECT_EQ(*require(csf_model(name(model))), model);
     }
     const auto unknown = csf_model("barten");
     ASSERT_FALSE(unknown);

@@ -214,9 +214,8 @@ TEST(CsfTable, MonotoneFormIsTightAboveThePeak) {
         const Place p{std::exp2(random.uniform(-2, 5)), random.uniform(0, 40), std::pow(10, random.uniform(0, 2))};
         double largest = 0; // over this and all higher frequencies, this and all lower luminances
         for (double cdm2 = p.cdm2; cdm2 > 0.3 * p.cdm2; cdm2 *= 0.8) {
-            for (double cpd = p.cpd; cpd < 64; cpd *= 1.01) {
+            for (double cpd = p.cpd; cpd < 64; cpd *= 1.01)
                 largest = std::max(largest, closed_form(CsfModel::castle, {cpd, p.degrees, cdm2}));
-            }
         }
         if (!(largest > 1)) continue;
         EXPECT_NEAR(monotone(table, p) / largest, 1, table_accuracy);
@@ -557,9 +556,8 @@ TEST(CsfTable, OfWhatMovesIsAsFromTheModel) {
     }
     const CsfTable& still = CsfTable::standard();
     EXPECT_EQ(&still.moving(least_velocity)->samples(), &still.samples()) << "the eye is never at rest";
-    for (const double bad : {-1.0, 81.0, not_a_number, infinity}) {
+    for (const double bad : {-1.0, 81.0, not_a_number, infinity})
         EXPECT_THAT(error_in(still.moving(DegreesPerSecond(bad))), HasSubstr("0 to 80 degrees/s"));
-    }
 }
 
 // The factor is above 1 for coarse gratings: the form must hold what is coarser than the peak of stationary ones, and

@@ -179,8 +179,7 @@ TEST(Csf, WiderPatchesAreSeenBetterByTheLawOfArea) {
 
 TEST(Csf, ModelsHaveNames) {
     for (const CsfModel model : models) {
-        const auto found = require(csf_model(name(model)));
-        EXPECT_EQ(*found, model);
+        EXPECT_EQ(*require(csf_model(name(model))), model);
     }
     EXPECT_THAT(error_in(csf_model("castel")),
                 testing::AllOf(testing::HasSubstr("castel"), testing::HasSubstr("castle")));

@@ -57,9 +57,8 @@ TEST(Display, AmbientLightRaisesBlackAndWhiteAlike) {
 TEST(Display, RelativeLuminanceMapsAffinelyAndBack) {
     Display display;
     display.ambient = Lux(250);
-    for (const double relative : {-0.5, 0.0, 0.18, 0.5, 1.0, 3.0}) {
+    for (const double relative : {-0.5, 0.0, 0.18, 0.5, 1.0, 3.0})
         EXPECT_NEAR(to_relative(display, to_luminance(display, relative)), relative, 10 * rounding);
-    }
     const double low = to_luminance(display, 0.2).value(), high = to_luminance(display, 0.6).value();
     EXPECT_NEAR(to_luminance(display, 0.4).value(), (low + high) / 2, 100 * rounding);
 }

@@ -114,9 +114,8 @@ Bytes make_png(const PngVariant& v) {
                  v.interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
     std::array<png_color, 256> palette{};
-    for (unsigned i = 0; i < 256; ++i) {
+    for (unsigned i = 0; i < 256; ++i)
         palette[i] = {static_cast<png_byte>(i), static_cast<png_byte>(255 - i), static_cast<png_byte>(i / 2)};
-    }
     if (v.type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette.data(), 1 << v.bits);
     png_byte alpha = 3;
     png_color_16 clear{};
@@ -264,8 +263,7 @@ TEST_F(ImageFiles, ExrOfHalfAndFloatAndEveryLosslessCompression) {
             const fs::path file =
                 is_half ? make_exr(path("a.exr"), {"Y"}, Imf::HALF, compression, halves, width, height)
                         : make_exr(path("a.exr"), {"depth"}, Imf::FLOAT, compression, floats, width, height);
-            const auto read = require(read_image(file));
-            EXPECT_EQ(read->image.values, floats) << compression;
+            EXPECT_EQ(require(read_image(file))->image.values, floats) << compression;
         }
     }
     const auto colour = require(read_image(

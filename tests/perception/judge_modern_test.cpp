@@ -96,9 +96,8 @@ TEST(JudgeModern, SeesGaborsAtTheirThreshold) {
     int tested = 0;
     for (const double luminance : {5.0, 50.0}) {
         for (const double eccentricity : {0.0, 10.0, 20.0}) {
-            for (const double freq : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0}) {
+            for (const double freq : {0.5, 1.0, 2.0, 4.0, 8.0, 16.0})
                 expect_threshold_within_3_db({freq, 0, luminance, 0, 0}, eccentricity, tested);
-            }
         }
     }
     EXPECT_GE(tested, 28); // the others cannot be seen at any contrast
@@ -226,9 +225,7 @@ std::uint32_t next(std::uint32_t& seed) { return seed = seed * 1664525U + 101390
 
 Image noise(int side, double luminance, double amplitude, std::uint32_t seed) {
     Image image = flat(side, side, 0);
-    for (float& v : image.values) {
-        v = static_cast<float>(luminance * (1 + amplitude * (next(seed) / 2147483648.0 - 1)));
-    }
+    for (float& v : image.values) v = static_cast<float>(luminance * (1 + amplitude * (next(seed) / 2147483648.0 - 1)));
     return image;
 }
 
@@ -386,9 +383,8 @@ TEST(ThresholdMapModern, OnFlatFieldsIsTheClosedForm) {
         for (const double e : {0.0, 7.3, 24.6}) {
             const auto map = require(threshold_map_modern(image, looking_beside_the_corner(e, side)));
             double best = closed_form(default_ppd() / 2, luminance, e);
-            for (int k = 1; k < 8; ++k) {
+            for (int k = 1; k < 8; ++k)
                 best = std::max(best, closed_form(0.3228 * std::exp2(1 - k) * default_ppd() / 2, luminance, e));
-            }
             EXPECT_NEAR(map->at(0, 0) * best / luminance, 1, tolerance) << luminance << " cd/m2, " << e << " degrees";
         }
     }

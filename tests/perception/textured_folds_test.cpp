@@ -121,8 +121,7 @@ TEST(TexturedFolds, OfAWhiteTextureAreThoseOfTheMesh) {
 TEST(TexturedFolds, StayInFiles) {
     const support::TempFolder folder;
     const VertexTree tree = measured(textures::textured_sphere(3, textures::noise(64, 64, 2)));
-    const auto lit = require(LitFolds::measure(tree)->with_attributes(tree));
-    ASSERT_TRUE(write_tree(folder / "tree.vdt", *lit));
+    ASSERT_TRUE(write_tree(folder / "tree.vdt", *require(LitFolds::measure(tree)->with_attributes(tree))));
     const auto read = require(read_tree(folder / "tree.vdt"));
     EXPECT_TRUE(has_fold_measurement(*read));
     EXPECT_TRUE(
@@ -189,8 +188,7 @@ TEST(TexturedFolds, OfOddMeshesAreNumbers) {
         for (const FoldTexture& t : tree->attribute<FoldTexture>(texture_name)) EXPECT_TRUE(is_sound(t));
         vdtree::View view;
         view.eye = {0, 0, 9};
-        const auto criterion = require(error_distances(*tree, view, {}));
-        EXPECT_TRUE(criterion->is_monotone());
+        EXPECT_TRUE(require(error_distances(*tree, view, {}))->is_monotone());
     }
 }
 

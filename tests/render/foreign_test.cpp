@@ -121,8 +121,7 @@ TEST(Adopt, DrawsAsInAContextOfItsOwn) {
     SKIP_WITHOUT(egl);
     const auto adopted = Context::adopt({.make_current = [&] { egl.make_current(); }});
     ASSERT_TRUE(adopted) << adopted.error().message;
-    const auto frame = require(drawn_in(*adopted, scene));
-    EXPECT_EQ(frame->luminance, expected->luminance);
+    EXPECT_EQ(require(drawn_in(*adopted, scene))->luminance, expected->luminance);
     EXPECT_EQ(adopted->take_errors(), "");
 }
 

@@ -537,8 +537,7 @@ TEST_F(RendererTest, FollowsTheCutAsItChanges) {
     EXPECT_GT(difference(*full, *coarse).mean, 1e-3);
     EXPECT_EQ(coarse->luminance, draw(scene, view).luminance) << "as if drawn by a new renderer";
     scene.cut.unfold_all();
-    const auto again = require(renderer->draw(scene.cut, view));
-    EXPECT_EQ(again->luminance, full->luminance);
+    EXPECT_EQ(require(renderer->draw(scene.cut, view))->luminance, full->luminance);
 }
 
 TEST_F(RendererTest, MeasuresTheTimeOfDrawing) {
@@ -555,8 +554,7 @@ TEST_F(RendererTest, SurvivesMovesOfEverything) {
     auto made = require(Renderer::create(context(), scene.tree));
     Renderer renderer = std::move(*made);
     Context elsewhere = std::move(context());
-    const auto frame = require(renderer.draw(scene.cut, frontal_view(8, 8)));
-    EXPECT_NEAR(frame->luminance[0], 0.5, value_tolerance);
+    EXPECT_NEAR(require(renderer.draw(scene.cut, frontal_view(8, 8)))->luminance[0], 0.5, value_tolerance);
     context() = std::move(elsewhere);
     { const Renderer last = std::move(renderer); }
     EXPECT_EQ(context().take_errors(), "");
@@ -568,8 +566,7 @@ TEST_F(RendererTest, OutlivesTheHandleOfItsContext) {
     std::optional<Context> gone = std::move(*other);
     auto renderer = require(Renderer::create(*gone, scene.tree));
     gone.reset();
-    const auto frame = require(renderer->draw(scene.cut, frontal_view(8, 8)));
-    EXPECT_NEAR(frame->luminance[0], 0.5, value_tolerance);
+    EXPECT_NEAR(require(renderer->draw(scene.cut, frontal_view(8, 8)))->luminance[0], 0.5, value_tolerance);
 }
 
 TEST_F(RendererTest, TakesTurnsWithARendererOfAnotherContext) {

@@ -131,8 +131,7 @@ TEST_F(SceneTest, SamplesAreAddedAcrossItems) {
         ASSERT_TRUE(draw(items, {.view = oblique_view(), .point = point}, sum->sample()));
         ASSERT_TRUE(sum->add());
     }
-    const auto by_hand = require(sum->mean());
-    EXPECT_TRUE(std::ranges::equal(*by_hand, drawn));
+    EXPECT_TRUE(std::ranges::equal(*require(sum->mean()), drawn));
 }
 
 TEST_F(SceneTest, OneTreeIsSharedByCutsOfItsOwn) {

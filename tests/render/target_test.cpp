@@ -71,11 +71,9 @@ TEST_F(TargetTest, ReadsDepthOfDepthOnlyTargets) {
     const auto made = require(Target::create(context(), 4, 4, {.colours = {}}));
     const float depth = 0.3f;
     glClearNamedFramebufferfv(made->id(), GL_DEPTH, 0, &depth);
-    const auto read = require(read_depth(*made));
-    EXPECT_THAT(*read, Each(FloatEq(depth)));
+    EXPECT_THAT(*require(read_depth(*made)), Each(FloatEq(depth)));
     EXPECT_FALSE(read_luminance(*made));
-    const auto flat = require(Target::create(context(), 4, 4, {.depth = false}));
-    EXPECT_FALSE(read_depth(*flat));
+    EXPECT_FALSE(read_depth(*require(Target::create(context(), 4, 4, {.depth = false}))));
 }
 
 TEST_F(TargetTest, SamplesAreResolvedBeforeTheyAreRead) {
@@ -86,8 +84,7 @@ TEST_F(TargetTest, SamplesAreResolvedBeforeTheyAreRead) {
     fill(*many, 0, {0.25f, 0.5f, 0.75f, 1});
     EXPECT_THAT(error_in(read_luminance(*many)), HasSubstr("resolved"));
     ASSERT_TRUE(resolve(*many, *one));
-    const auto pixels = require(read_pixels(*one));
-    EXPECT_THAT(*pixels, Each(glm::vec4(0.25f, 0.5f, 0.75f, 1)));
+    EXPECT_THAT(*require(read_pixels(*one)), Each(glm::vec4(0.25f, 0.5f, 0.75f, 1)));
     EXPECT_FALSE(resolve(*many, *smaller));
 }
 

@@ -23,8 +23,7 @@ TEST_F(VisibilityTest, CountsInThresholds) {
     auto passes = require(VisibilityPasses::create(context(), tables(6, 3), reference.texture()));
     ASSERT_TRUE(passes->judge(test.texture()));
     const float v = std::sqrt(2.f) * 0.8f; // a contrast of 0.1, seen 8 times
-    const auto read = require(passes->read_visibility());
-    EXPECT_THAT(*read, Each(FloatNear(v, 1e-5f)));
+    EXPECT_THAT(*require(passes->read_visibility()), Each(FloatNear(v, 1e-5f)));
     const auto summary = require(passes->summary());
     EXPECT_NEAR(summary->largest, v, 1e-5);
     EXPECT_EQ(summary->visible_pixels, 18u);

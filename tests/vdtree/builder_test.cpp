@@ -156,8 +156,7 @@ TEST_P(BuiltTree, IsNumberedDepthFirst) {
 }
 
 TEST_P(BuiltTree, GivesBackTheInputWhenUnfolded) {
-    const auto tree = require(build());
-    EXPECT_EQ(support::fault_when_unfolded(*tree, mesh().view()), "");
+    EXPECT_EQ(support::fault_when_unfolded(*require(build()), mesh().view()), "");
     const Mesh floats = shapes::in_floats(mesh());
     const auto from_floats = require(build_tree(floats.view(), {.clusterer = GetParam().kind}));
     EXPECT_EQ(support::fault_when_unfolded(*from_floats, floats.view()), "");
@@ -667,13 +666,10 @@ TEST(BuildTree, RefusesSizesThatNumbersCannotHold) {
         EXPECT_THAT(error_in(build_tree(shapes::placed(ball, scale).view())), testing::HasSubstr("scale it up"))
             << scale;
     }
-    const auto smallest = require(build_tree(shapes::placed(ball, 1e-36).view()));
-    EXPECT_TRUE(verify(*smallest));
-    for (const double x : {1e15, -1e15, 1e30}) {
+    EXPECT_TRUE(verify(*require(build_tree(shapes::placed(ball, 1e-36).view()))));
+    for (const double x : {1e15, -1e15, 1e30})
         EXPECT_THAT(error_in(build_tree(far(x).view())), testing::HasSubstr("move it nearer to the origin")) << x;
-    }
-    const auto farthest = require(build_tree(far(1e13).view()));
-    EXPECT_TRUE(verify(*farthest));
+    EXPECT_TRUE(verify(*require(build_tree(far(1e13).view()))));
     Mesh wall = shapes::grid(4); // exact there, since one of its coordinates is the same everywhere
     for (glm::dvec3& p : wall.positions) p.z = 1e15;
     EXPECT_TRUE(build_tree(wall.view()));
@@ -758,8 +754,7 @@ TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
         {"nothing but a point", shapes::all_coincident(4), Closedness::open},
     };
     for (const auto& [what, mesh, closedness] : expected) {
-        const auto tree = require(build_tree(mesh.view()));
-        EXPECT_EQ(tree->closedness(), closedness) << what;
+        EXPECT_EQ(require(build_tree(mesh.view()))->closedness(), closedness) << what;
     }
 }
 
@@ -812,8 +807,7 @@ TEST(Relit, EqualsATreeBuiltWithThatLight) {
         EXPECT_EQ(support::difference(*tree->relit(light), *expected), "") << shape;
         EXPECT_EQ(support::difference(*tree->relit(light)->relit(tree->light()), *tree), "") << shape;
     }
-    const auto quadric = require(build_tree(meshes().at("bumpy_sphere").view()));
-    EXPECT_TRUE(verify(*quadric->relit(light)));
+    EXPECT_TRUE(verify(*require(build_tree(meshes().at("bumpy_sphere").view()))->relit(light)));
 }
 
 TEST(BuildTree, LightsColoursUnlessTheyArePrelit) {

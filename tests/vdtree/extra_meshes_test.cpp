@@ -100,8 +100,7 @@ TEST_P(ExtraMesh, BuildsVerifiesAndUnfolds) {
         if (testing::Test::HasFatalFailure()) return;
         const auto tree_file = scratch / "tree.vdt";
         ASSERT_TRUE(write_tree(tree_file, *tree));
-        const auto again = require(read_tree(tree_file));
-        EXPECT_EQ(support::difference(*tree, *again), "");
+        EXPECT_EQ(support::difference(*tree, *require(read_tree(tree_file))), "");
     }
 }
 

@@ -405,9 +405,8 @@ TEST(Polygons, KeepTheAreaOfLargeRandomStars) {
             const double angle = 2.0 * 3.14159265358979 * i / corners, r = radius(random);
             star.push_back({r * std::cos(angle), r * std::sin(angle), 0.0});
         }
-        for (std::size_t i = 0; i < star.size(); ++i) {
+        for (std::size_t i = 0; i < star.size(); ++i)
             expected += glm::cross(star[i], star[(i + 1) % star.size()]).z / 2.0;
-        }
         EXPECT_NEAR(cut_area(star), expected, 1e-12);
     }
 }
@@ -840,8 +839,7 @@ TEST_F(MeshFiles, KeepDoublesInPlyAndObj) {
     const Mesh mesh = random_mesh(false, false);
     for (const std::string name : {"a.ply", "a.obj"}) {
         ASSERT_TRUE(meshio::write_mesh(folder_ / name, mesh.view()));
-        const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / name));
-        EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
+        EXPECT_EQ(require(meshio::read_mesh(folder_ / name))->mesh.positions, mesh.positions) << name;
     }
 }
 
@@ -891,8 +889,7 @@ TEST_F(MeshFiles, NamesCannotBreakTheLinesOfAnObj) {
     Mesh mesh = random_mesh(true, false);
     mesh.ranges = {{"a\nv 1 2\\", MeshRange::Kind::material, 0, 300}};
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<meshio::ReadResult> again = require(meshio::read_mesh(folder_ / "a.obj"));
-    EXPECT_EQ(again->mesh.ranges[0].name, "a_v 1 2_");
+    EXPECT_EQ(require(meshio::read_mesh(folder_ / "a.obj"))->mesh.ranges[0].name, "a_v 1 2_");
 }
 
 TEST_F(MeshFiles, LeaveNothingBehindWhenWritingFails) {

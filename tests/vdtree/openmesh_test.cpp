@@ -143,8 +143,7 @@ TEST(OpenMeshAdapter, PolygonsAreNamed) {
     mesh.add_face({v[0], v[1], v[2], v[3]});
     EXPECT_THAT(error_in(to_mesh(mesh)), HasSubstr("Face 1 has 4 corners"));
     mesh.triangulate();
-    const auto triangulated = require(to_mesh(mesh));
-    EXPECT_EQ(triangulated->mesh.triangles.size(), 3u);
+    EXPECT_EQ(require(to_mesh(mesh))->mesh.triangles.size(), 3u);
 }
 
 TEST(OpenMeshAdapter, EmptyAndBrokenMeshesAreErrors) {

@@ -151,8 +151,7 @@ TEST(SceneFile, LeavesOutMeshesOfLines) {
     json lines = document(R"({"nodes": [{"mesh": 0}]})");
     lines["meshes"][0]["primitives"][0]["mode"] = 1;
     auto file = require(open(lines));
-    const auto none = require(file->mesh(0));
-    EXPECT_FALSE(*none);
+    EXPECT_FALSE(*require(file->mesh(0)));
 }
 
 TEST(SceneFile, KeepsOfAMeshsDocumentWhatItUses) {

@@ -85,15 +85,13 @@ TEST_F(TreeIo, KeepsAnotherLight) {
     const VertexTree tree =
         *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f, .fill = 0.75f});
     ASSERT_TRUE(write_tree(file_, tree));
-    const auto again = require(read_tree(file_));
-    EXPECT_EQ(support::difference(tree, *again), "");
+    EXPECT_EQ(support::difference(tree, *require(read_tree(file_))), "");
 }
 
 TEST_F(TreeIo, TakesSectionsOfSeveralPages) {
     const VertexTree tree = built(shapes::bumpy_sphere(6)); // 41k vertices: bounds alone are more than 1 MB
     std::string bytes = bytes_of(tree);
-    const auto again = require(read_tree(file_));
-    EXPECT_EQ(support::difference(tree, *again), "");
+    EXPECT_EQ(support::difference(tree, *require(read_tree(file_))), "");
     // Damage to the second page of the bounds is found there.
     const auto parsed = TreeFile::parse(bytes);
     for (std::size_t i = 0; i < parsed.sections.size(); ++i) {
@@ -123,8 +121,7 @@ TEST_F(TreeIo, IgnoresSectionsThatItDoesNotKnow) {
     const VertexTree tree = built(shapes::cube(2));
     TreeFile file = TreeFile::parse(bytes_of(tree));
     file.sections.insert(file.sections.begin() + 3, {"from_the_future", 3, 1, "abcdef"});
-    const auto again = require(read_bytes(file.bytes()));
-    EXPECT_EQ(support::difference(tree, *again), "");
+    EXPECT_EQ(support::difference(tree, *require(read_bytes(file.bytes()))), "");
 }
 
 TEST_F(TreeIo, RefusesEveryTruncation) {
