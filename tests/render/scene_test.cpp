@@ -7,6 +7,7 @@
 #include <GL/glcorearb.h>
 
 #include <unseen/render/renderer.h>
+#include <unseen/render/sample_sum.h>
 
 namespace scene_test {
 
