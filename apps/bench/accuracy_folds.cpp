@@ -154,11 +154,12 @@ void add_others(AccuracySubject& subject, int samples, const TreeBytes& bytes, A
         for (const vdtree::Cut& cut : cuts) triangles += cut.triangle_count();
         const double shift_mm = &renderer == &judge.renderer() ? 1e3 * session::largest_shift(subject.session, cuts)
                                                                : std::numeric_limits<double>::quiet_NaN();
-        points.push_back({.name = name,
-                          .values = {median(std::move(times)), verdict.v, triangles,
-                                     static_cast<double>(verdict.visible), static_cast<double>(verdict.second_visible),
-                                     1 - verdict.ssim, shift_mm, preparation_s, of_triangle},
-                          .note = note});
+        points.push_back(
+            {.name = name,
+             .values = {median(std::move(times)), verdict.v, triangles, static_cast<double>(verdict.visible_pixels),
+                        static_cast<double>(verdict.second_visible_pixels), 1 - verdict.ssim, shift_mm, preparation_s,
+                        of_triangle},
+             .note = note});
     };
     const session::Request request{.purpose = session::Purpose::picture};
     const auto imperceptible = require(subject.session.simplify(subject.view, request));

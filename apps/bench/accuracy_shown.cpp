@@ -79,7 +79,7 @@ AccuracyPoints level_points(AccuracySubject& subject) {
         const auto verdict = require(judge.judge(level_cuts(subject.session, control, frame)));
         points.push_back({.name = name,
                           .values = {ms, verdict.v, static_cast<double>(frame.triangles),
-                                     static_cast<double>(verdict.visible), static_cast<double>(bytes) / 1e6},
+                                     static_cast<double>(verdict.visible_pixels), static_cast<double>(bytes) / 1e6},
                           .is_default = points.empty()});
     }
     return points;
@@ -105,9 +105,10 @@ AccuracyPoints gaze_age_points(AccuracySubject& subject) {
         session.set_gaze(gaze);
         const auto made = require(session.simplify(subject.view, picture_request()));
         const auto verdict = require(judge.judge(made.cuts));
-        points.push_back({.name = name,
-                          .values = {made.stats.triangles / all, verdict.v, static_cast<double>(verdict.visible)},
-                          .is_default = !gaze});
+        points.push_back(
+            {.name = name,
+             .values = {made.stats.triangles / all, verdict.v, static_cast<double>(verdict.visible_pixels)},
+             .is_default = !gaze});
     };
     constexpr double degrees_a_frame = 30.0 / 60;
     add("no gaze", {});
@@ -162,7 +163,7 @@ AccuracyPoints measurement_points(AccuracySubject& subject) {
                 judges[i].judge(require(renderer.draw(session::drawn_cuts(made.cuts), views[i], judges[i].drawing()))));
         }
         points.push_back({.name = name,
-                          .values = {seconds, seen[0].v, triangles[0], static_cast<double>(seen[0].visible),
+                          .values = {seconds, seen[0].v, triangles[0], static_cast<double>(seen[0].visible_pixels),
                                      triangles[1], seen[1].v},
                           .note = note,
                           .is_default = points.empty()});

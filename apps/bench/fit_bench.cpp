@@ -86,7 +86,7 @@ void judge_all(JudgedModel& model, const std::vector<vdtree::DistanceCriterion>&
             shown = known.insert(shown, {{indices.begin(), indices.end()}, model.judge(cut).verdict});
         Setting& setting = settings[i];
         setting.triangles += cut.triangle_count();
-        setting.visible_pixels += static_cast<double>(shown->second.visible);
+        setting.visible_pixels += static_cast<double>(shown->second.visible_pixels);
         if (shown->second.v <= setting.largest[aside]) continue;
         setting.largest[aside] = shown->second.v;
         setting.worst[aside] = model.name();

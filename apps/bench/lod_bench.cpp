@@ -20,7 +20,7 @@ struct LodSeen {
     double v = 0;      // the largest of either
 
     void add(const session::PictureVerdict& verdict) {
-        pixels += static_cast<double>(std::max(verdict.visible, verdict.second_visible));
+        pixels += static_cast<double>(std::max(verdict.visible_pixels, verdict.second_visible_pixels));
         v = std::max({v, verdict.v, verdict.second_v});
     }
 };

@@ -182,7 +182,7 @@ private:
                              how,
                              test,
                              triangles,
-                             {verdict.visible, verdict.second_visible},
+                             {verdict.visible_pixels, verdict.second_visible_pixels},
                              {verdict.v, verdict.second_v}});
             report_.json["views"].push_back({{"group", group_},
                                              {"mesh", model.name()},
@@ -190,9 +190,9 @@ private:
                                              {"test", name_of(test)},
                                              {"triangles", triangles},
                                              {"of", model.triangles()},
-                                             {"visible_pixels", verdict.visible},
+                                             {"visible_pixels", verdict.visible_pixels},
                                              {"largest_v", number_or_null(verdict.v)},
-                                             {"second_visible_pixels", verdict.second_visible},
+                                             {"second_visible_pixels", verdict.second_visible_pixels},
                                              {"second_largest_v", number_or_null(verdict.second_v)}});
         }
     }
@@ -490,7 +490,7 @@ private:
                     model->look(look(direction, fill, gaze));
                     const auto is_safe = [&](double px) {
                         return model->judge(session::Request{.goal = Goal::pixels(px), .fold_test = test})
-                                   .verdict.visible == 0;
+                                   .verdict.visible_pixels == 0;
                     };
                     if (is_safe(tolerance)) continue;
                     double low = 1e-3, high = tolerance;

@@ -25,7 +25,7 @@ struct Row {
     double seconds = 0; // to choose, from nothing, without what is measured once
     double triangles = 0;
     session::PictureVerdict verdict = {};
-    std::vector<session::PassEffect> passes = {};
+    std::vector<session::Effect> passes = {};
 };
 
 class JudgedScene {
@@ -90,7 +90,7 @@ Row without_visible_pixels(double low, double high, int steps, Tried&& tried) {
     std::optional<Row> best;
     const double least = bisect(low, high, steps, [&](double value) {
         Row row = tried(value);
-        const bool shows_nothing = row.verdict.visible == 0;
+        const bool shows_nothing = row.verdict.visible_pixels == 0;
         if (shows_nothing && (!best || row.triangles < best->triangles)) best = std::move(row);
         return shows_nothing;
     });
@@ -109,7 +109,7 @@ std::vector<Row> rows_of(JudgedScene& scene) {
         return scene.as_seen("tree, without what the picture hides, where nothing shows", {}, threshold);
     };
     rows.push_back(hiding(1));
-    if (rows.back().verdict.visible == 0) {
+    if (rows.back().verdict.visible_pixels == 0) {
         rows.back() = without_visible_pixels(1, 64, 6, hiding);
         rows.back().seconds = 0;
     }
@@ -153,9 +153,9 @@ BenchTable table_of(const JudgedScene& scene, const std::vector<Row>& rows) {
                       {"s", "seconds"}}};
     for (const Row& r : rows)
         table.rows.push_back({r.method, count(r.triangles), percent(r.triangles / all, 3),
-                              count(static_cast<double>(r.verdict.visible)), number(r.verdict.v, 2),
-                              count(static_cast<double>(r.verdict.second_visible)), number(r.verdict.second_v, 2),
-                              r.seconds > 0 ? number(r.seconds, 2) : Cell("", 0)});
+                              count(static_cast<double>(r.verdict.visible_pixels)), number(r.verdict.v, 2),
+                              count(static_cast<double>(r.verdict.second_visible_pixels)),
+                              number(r.verdict.second_v, 2), r.seconds > 0 ? number(r.seconds, 2) : Cell("", 0)});
     return table;
 }
 
@@ -263,7 +263,7 @@ BenchReport bench_scenes(const ScenesOptions& options) {
         const std::vector<Row> rows = rows_of(scene);
         report.tables.push_back(table_of(scene, rows));
         constexpr std::size_t most_asked_for = 3; // of the tree, with everything
-        for (const session::PassEffect& e : rows[most_asked_for].passes)
+        for (const session::Effect& e : rows[most_asked_for].passes)
             passes.rows.push_back({scene.name, e.name, e.on ? "on" : "off", e.why, std::to_string(e.surface_passes),
                                    std::to_string(e.full_screen_passes),
                                    number(static_cast<double>(e.texture_bytes) / 1e6, 3), number(e.milliseconds, 3)});

@@ -11,7 +11,9 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/judge.h>
+#include <unseen/session/internal/selections.h>
 #include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/internal/level_pictures.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
@@ -46,7 +48,7 @@ const Thesis* thesis_of(const std::string& scene) {
 
 // A Bezier curve over the ground that corners are on, at their height; the eye looks along it.
 std::vector<vdtree::View> flight(const session::Selections& selections, const SelectionOptions& options) {
-    const session::SelectionGrid& grid = selections.grid;
+    const session::SelectionGrid& grid = selections.data().grid;
     const std::int32_t size = grid.cell_size();
     const glm::dvec3 low = grid.place({0, 0, 0}), high = grid.place({grid.cells.x * size, 0, grid.cells.z * size});
     const auto at = [&](double x, double z) { return glm::mix(low, high, glm::dvec3(x, 0, z)); };
@@ -176,7 +178,7 @@ std::vector<Method> methods_of(const Scene& scene, const std::vector<session::Se
     };
     for (const session::Selections& selected : selections)
         add_selected(&selected == &selections.front() ? Way::selected : Way::other,
-                     "selected, by " + name_of(selected.quality), selected, SelectionBlend::costs);
+                     "selected, by " + name_of(selected.data().quality), selected, SelectionBlend::costs);
     add_selected(Way::other, "selected, combined as in the thesis", selections.front(), SelectionBlend::nearest);
     methods.push_back({Way::thresholds, "by area, the thesis's thresholds",
                        [&scene](const vdtree::View& v) { return scene.switched(v, false, 1); }});
@@ -340,7 +342,7 @@ std::vector<session::Selections> search(const render::Context& context, Scene& s
                                number(done.search_seconds, 3), grouped(done.drawings), grouped(done.evaluations),
                                there ? std::to_string(there->cameras) + " cameras in " + there->precompute : ""});
         json.push_back({{"quality", name_of(quality)}, {"cameras", done.cameras}, {"seconds", done.seconds}});
-        selections.push_back(require(session::read_selections(file)));
+        selections.push_back(require(session::Selections::read(file)));
     }
     return selections;
 }
@@ -392,9 +394,10 @@ BenchReport bench_selection(const SelectionOptions& options) {
                             {{"scene"}, {"Pearson's"}, {"the thesis"}}};
     for (std::size_t i = 0; i < files.size(); ++i) {
         std::vector<session::Selections> selections;
-        if (!options.selections.empty()) selections.push_back(require(session::read_selections(options.selections[i])));
+        if (!options.selections.empty())
+            selections.push_back(require(session::Selections::read(options.selections[i])));
         Scene scene(context, files[i],
-                    selections.empty() ? session::default_selected_levels : selections.front().levels);
+                    selections.empty() ? session::default_selected_levels : selections.front().levels());
         Json json = {{"scene", scene.name}};
         if (selections.empty())
             selections =

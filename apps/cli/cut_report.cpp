@@ -44,13 +44,13 @@ Json to_json(const session::Report& s, double draw_ms) {
                  {"imperceptible_from_m", number_or_null(s.imperceptible_from_m)},
                  {"max_fold_cost", number_or_null(cost)},
                  {"effects", to_json(s.effects)}};
-    if (!s.passes.empty()) json["passes"] = to_json(s.passes);
+    if (!s.passes.empty()) json["passes"] = passes_to_json(s.passes);
     return json;
 }
 
-Json to_json(std::span<const session::PassEffect> effects) {
+Json passes_to_json(std::span<const session::Effect> passes) {
     Json list = Json::array();
-    for (const session::PassEffect& e : effects)
+    for (const session::Effect& e : passes)
         list.push_back({{"name", e.name},
                         {"on", e.on},
                         {"why", e.why},
@@ -141,13 +141,13 @@ void print_details(const session::Report& s, double draw_ms) {
     print_table(rows);
     print_line("effects");
     print(s.effects);
-    print(s.passes);
+    print_passes(s.passes);
 }
 
-void print(std::span<const session::PassEffect> effects) {
-    if (effects.empty()) return;
+void print_passes(std::span<const session::Effect> passes) {
+    if (passes.empty()) return;
     print_line("pictures drawn for it");
-    for (const session::PassEffect& e : effects)
+    for (const session::Effect& e : passes)
         print_line("  " + e.name + (e.on ? ": on, " : ": off, ") + e.why +
                    (e.surface_passes == 0
                         ? std::string()

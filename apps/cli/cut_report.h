@@ -33,8 +33,8 @@ void add_scene(Json& json, const session::Session& session, std::span<const vdtr
 void print_scene(const session::Session& session);
 
 Json to_json(std::span<const session::Effect> effects);
-Json to_json(std::span<const session::PassEffect> effects);
+Json passes_to_json(std::span<const session::Effect> passes);
 void print(std::span<const session::Effect> effects);
-void print(std::span<const session::PassEffect> effects);
+void print_passes(std::span<const session::Effect> passes);
 
 } // namespace unseen::app

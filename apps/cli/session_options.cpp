@@ -104,17 +104,16 @@ Result<perception::Display> make_display(const DisplayOptions& options) {
 
 Result<session::Observer> make_observer(const DisplayOptions& options, const perception::Display& display) {
     session::Observer observer;
-    observer.display = display;
     if (!options.observer.empty()) {
         auto chosen = session::choose_observer(options.observer);
         if (!chosen) return chosen.error();
-        observer.person = chosen->person;
-        observer.csf = std::move(chosen->csf);
+        observer = std::move(*chosen);
     }
+    observer.display = display;
     if (options.csf.empty()) return observer;
     const auto chosen = session::choose_csf(options.csf);
     if (!chosen) return chosen.error();
-    if (observer.csf || (chosen->table && !options.observer.empty()))
+    if (observer.csf || (std::holds_alternative<perception::CsfTable>(*chosen) && !options.observer.empty()))
         return Error{ErrorCode::invalid_argument,
                      "--observer and --csf exclude each other where one of them is a viewer's table: give that alone."};
     auto table = session::read_csf_table(options.csf, display, observer.person);

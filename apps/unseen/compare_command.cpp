@@ -58,8 +58,8 @@ Result<Pair> read_pair(const CompareArguments& a) {
     return Pair{std::move(*reference), std::move(*test)};
 }
 
-Result<session::ObserverChoice> chosen_observer(const CompareArguments& a) {
-    return a.display.observer.empty() ? session::ObserverChoice() : session::choose_observer(a.display.observer);
+Result<session::Observer> chosen_observer(const CompareArguments& a) {
+    return a.display.observer.empty() ? session::Observer() : session::choose_observer(a.display.observer);
 }
 
 Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const perception::Display& display) {
@@ -82,9 +82,11 @@ Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const 
                      "--observer and --csf exclude each other where one of them is a viewer's table: give that alone."};
     auto chosen = session::choose_csf(a.display.csf);
     if (!chosen) return chosen.error();
-    if (chosen->model) options.csf = *chosen->model;
-    if (chosen->table) {
-        options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
+    if (const auto* const model = std::get_if<perception::CsfModel>(&*chosen)) {
+        options.csf = *model;
+    } else {
+        options.csf_table =
+            std::make_shared<const perception::CsfTable>(std::get<perception::CsfTable>(std::move(*chosen)));
         options.gain = 1;
     }
     return options;

@@ -57,11 +57,11 @@ Result<Observer> make_observer(const CsfArguments& a) {
     if (!a.csf.empty()) {
         auto choice = session::choose_csf(a.csf);
         if (!choice) return choice.error();
-        if (choice->table && (s.temporal || s.velocity || s.field || s.distance))
+        if (const auto* const chosen = std::get_if<CsfModel>(&*choice)) observer.model = *chosen;
+        else if (s.temporal || s.velocity || s.field || s.distance)
             return invalid_argument("a viewer's table was measured under conditions of its own: leave --temporal, "
                                     "--velocity, --field and --distance away.");
-        if (choice->model) observer.model = *choice->model;
-        observer.table = std::move(choice->table);
+        else observer.table = std::get<CsfTable>(std::move(*choice));
     }
     if (observer.table || (!a.by_table && a.csf.empty())) return observer;
     auto table = CsfTable::from_model(observer.model, conditions_of(s));

@@ -143,7 +143,7 @@ Json to_json(const session::Session& session, const std::vector<FrameRecord>& fr
                                 {"frame", seen->frame}};
     json["imperceptible_from_m"] = number_or_null(last.imperceptible_from_m);
     json["effects"] = to_json(last.effects);
-    if (!last.passes.empty()) json["passes"] = to_json(last.passes);
+    if (!last.passes.empty()) json["passes"] = passes_to_json(last.passes);
     return json;
 }
 
@@ -174,7 +174,7 @@ void print_details(const std::vector<FrameRecord>& frames, const session::Report
     print_table(rows);
     print_line("effects of the last frame");
     print(last.effects);
-    print(last.passes);
+    print_passes(last.passes);
 }
 
 } // namespace unseen::app

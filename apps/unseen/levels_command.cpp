@@ -50,10 +50,10 @@ public:
         session::LevelControlOptions control_options = options.control;
         std::optional<session::Selections> selections;
         if (control_options.method == LevelMethod::given) {
-            auto read = session::read_selections(options.selection);
+            auto read = session::Selections::read(options.selection);
             if (!read) return read.error();
             selections = std::move(*read);
-            control_options.chain.levels = selections->levels;
+            control_options.chain.levels = selections->levels();
         }
         auto control = LevelControl::create(context, session, view, control_options,
                                             options.what.request_for(session.triangle_count()));

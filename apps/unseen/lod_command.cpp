@@ -156,7 +156,7 @@ Result<std::vector<std::string>> write_separately(const LodArguments& a, const s
     for (const session::LodObject& object : lod.objects) most = std::max(most, object.levels.size());
     files.resize(std::min(files.size(), most));
     for (std::size_t i = 0; i < files.size(); ++i)
-        if (const auto one = session::write_level(files[i], scene, lod, i, a.gltf); !one) return one.error();
+        if (const auto one = session::write_levels(files[i], scene, lod, a.gltf, i); !one) return one.error();
     return files;
 }
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <memory>
 
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selections.h>
 #include <unseen/session_gpu/precompute_selections.h>
 
 #include "interruption.h"
@@ -20,7 +20,6 @@ namespace {
 using session::PrecomputeOptions;
 using session::PrecomputeReport;
 using session::SelectionQuality;
-using session::Selections;
 
 struct PrecomputeArguments {
     ViewOptions& view;
@@ -155,7 +154,7 @@ Result<int> selection_info(const SelectionInfoArguments& a) {
     if (!report) return report.error();
     const auto read = session::read_selections(a.file);
     if (!read) return read.error();
-    const Selections& s = *read;
+    const session::Selections::Data& s = *read;
     std::size_t cameras = 0;
     const auto levels = static_cast<std::size_t>(s.levels);
     double in_sight = 0, loss = 0;

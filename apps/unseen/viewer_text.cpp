@@ -73,7 +73,7 @@ std::vector<TextLine> viewer_lines(const ViewerState& state) {
                          "time"});
     if (!report.stats.is_complete && state.limit_ms)
         lines.push_back({"refining, " + rounded(*state.limit_ms, 3) + " ms a frame", "limit"});
-    for (const session::PassEffect& effect : report.passes)
+    for (const session::Effect& effect : report.passes)
         lines.push_back({(effect.on ? "on, " : "off, ") + effect.why, effect.name});
     if (report.gliding > 0) lines.push_back({grouped(report.gliding) + " vertices", "gliding"});
     lines.push_back({"press h", "keys"});

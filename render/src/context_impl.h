@@ -1,17 +1,48 @@
 // What a context holds, shared by its handles.
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <string>
+#include <type_traits>
 
 #include <unseen/render/context.h>
 
-#include "error_log.h"
 #include "kept_state.h"
-#include "programs.h"
+#include "program.h"
 
 namespace unseen::render {
+
+// Collects what GL reports as an error: debug messages and error flags.
+class ErrorLog {
+public:
+    // Routes the current context's debug output here. The log must outlive the context and stay where it is.
+    void attach();
+
+    // From here on, new errors are told apart from earlier ones, which stay in the log for take_all().
+    void begin();
+
+    // Takes out the errors since begin(), joined by "; ", empty if there were none.
+    std::string take_new();
+
+    // Takes out everything.
+    std::string take_all();
+
+    void add(std::string message);
+
+private:
+    struct Messages {
+        std::vector<std::string> texts;
+        std::size_t left_out = 0;
+
+        void add(std::string text);
+        std::string take();
+    };
+
+    void collect_flags();
+
+    Messages earlier_;
+    Messages recent_;
+    bool flag_told_ = false; // a debug message arrived since the flags were read, so they need not be told again
+};
 
 // A window system's side of a context.
 class Platform {
@@ -32,7 +63,7 @@ void release_glx_thread(); // of whoever it is
 void* current_native_context();
 
 Result<std::unique_ptr<Platform>> make_egl_platform();
-Result<std::unique_ptr<Platform>> make_foreign_platform(const AdoptOptions& options);
+Result<std::unique_ptr<Platform>> make_foreign_platform(const std::function<void()>& make_current);
 Result<std::unique_ptr<Platform>> make_glfw_platform(const WindowOptions& options);
 
 struct Context::Impl {
@@ -48,25 +79,51 @@ struct Context::Impl {
     ~Impl(); // current, for the programs, which go next
 };
 
+// Makes the context current when it goes: the last member of what owns GL objects, so that these go after it.
+class ContextGuard {
+public:
+    explicit ContextGuard(const Context& context) : context_(context) {}
+    ContextGuard(const ContextGuard&) = delete;
+    ContextGuard& operator=(const ContextGuard&) = delete;
+    ~ContextGuard() { static_cast<void>(context_.make_current()); }
+
+private:
+    Context context_;
+};
+
 // Whether the current context has not been lost, as by a driver that was reset.
 Result<void> check_alive();
 
-// Does GL work that returns a Result<void>. The error is the work's own, or else what GL reported: "`what` failed in
-// OpenGL: ...".
+template <class T>
+struct AsResult {
+    using Type = Result<T>;
+};
+template <class T>
+struct AsResult<Result<T>> {
+    using Type = Result<T>;
+};
+
+// Does GL work, and returns what it returns, as a Result. The error is the work's own, or else what GL reported: "`what`
+// failed in OpenGL: ...".
 template <class Work>
-Result<void> in_context(const Context& context, const char* what, Work&& work) {
-    if (auto current = context.make_current(); !current) return current;
+auto in_context(const Context& context, const char* what, Work&& work) {
+    using Returned = std::invoke_result_t<Work>;
+    using Done = typename AsResult<Returned>::Type;
+    if (auto current = context.make_current(); !current) return Done(current.error());
     std::optional<KeptState> kept;
     if (context.impl().platform->is_foreign()) {
-        if (auto alive = check_alive(); !alive) return alive;
+        if (auto alive = check_alive(); !alive) return Done(alive.error());
         kept.emplace();
     }
     ErrorLog& log = context.impl().errors;
     log.begin();
-    Result<void> done = work();
+    Done done = [&]() -> Done {
+        if constexpr (std::is_void_v<Returned>) return work(), Result<void>();
+        else return work();
+    }();
     const std::string errors = log.take_new();
     if (!done || errors.empty()) return done;
-    return Error{ErrorCode::unsupported, std::string(what) + " failed in OpenGL: " + errors + "."};
+    return Done(Error{ErrorCode::unsupported, std::string(what) + " failed in OpenGL: " + errors + "."});
 }
 
 } // namespace unseen::render

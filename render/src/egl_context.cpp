@@ -1,8 +1,5 @@
 // Headless contexts through EGL: hardware devices, then software devices, then Mesa's surfaceless platform.
 #include <algorithm>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include <unseen/vdtree/internal/errors.h>
 
@@ -99,78 +96,72 @@ std::vector<Candidate> candidates() {
 class EglPlatform final : public Platform {
 public:
     // Fails with the reason if the candidate has no context.
-    Result<void> open(const Candidate& candidate);
+    Result<void> open(const Candidate& candidate) {
+        const auto get_display = egl_function<PFNEGLGETPLATFORMDISPLAYEXTPROC>("eglGetPlatformDisplayEXT");
+        if (!get_display) return unsupported("EGL has no platform displays");
+        display_ = get_display(candidate.platform, candidate.native, nullptr);
+        EGLint major = 0, minor = 0;
+        if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, &major, &minor))
+            return unsupported(failed("initialising"));
+        if (!eglBindAPI(EGL_OPENGL_API)) return unsupported(failed("choosing desktop OpenGL"));
+        if (auto config = choose_config(); !config) return config;
+
+        const EGLint context_attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                             4,
+                                             EGL_CONTEXT_MINOR_VERSION,
+                                             5,
+                                             EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                             EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                             EGL_CONTEXT_OPENGL_DEBUG,
+                                             EGL_TRUE,
+                                             EGL_NONE};
+        context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context_attributes);
+        if (context_ == EGL_NO_CONTEXT) return unsupported(failed("making an OpenGL 4.5 core context"));
+        if (!has_extension(eglQueryString(display_, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context")) {
+            const EGLint size[] = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
+            surface_ = eglCreatePbufferSurface(display_, config_, size);
+            if (surface_ == EGL_NO_SURFACE) return unsupported(failed("making a pixel buffer"));
+        }
+        return make_current();
+    }
 
     EglPlatform() = default;
     EglPlatform(const EglPlatform&) = delete;
     EglPlatform& operator=(const EglPlatform&) = delete;
-    ~EglPlatform() override;
 
-    Result<void> make_current() override;
+    ~EglPlatform() override {
+        if (context_ != EGL_NO_CONTEXT) {
+            if (eglGetCurrentContext() == context_) release_egl_thread();
+            eglDestroyContext(display_, context_);
+        }
+        if (surface_ != EGL_NO_SURFACE) eglDestroySurface(display_, surface_);
+    }
+
+    Result<void> make_current() override {
+        eglBindAPI(EGL_OPENGL_API); // current contexts are kept by thread and by API
+        if (eglGetCurrentContext() == context_) return {};
+        release_glfw_thread();
+        release_glx_thread();
+        if (!eglMakeCurrent(display_, surface_, surface_, context_))
+            return unsupported(failed("making the OpenGL context current on this thread"));
+        return {};
+    }
 
 private:
-    Result<void> choose_config();
+    Result<void> choose_config() {
+        const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
+        EGLint count = 0;
+        if (!eglChooseConfig(display_, wanted, &config_, 1, &count))
+            return unsupported(failed("choosing a configuration"));
+        if (count == 0) return unsupported("it has no configuration for desktop OpenGL");
+        return {};
+    }
 
     EGLDisplay display_ = EGL_NO_DISPLAY;
     EGLConfig config_ = nullptr;
     EGLContext context_ = EGL_NO_CONTEXT;
     EGLSurface surface_ = EGL_NO_SURFACE; // a pixel buffer where EGL cannot do without
 };
-
-Result<void> EglPlatform::open(const Candidate& candidate) {
-    const auto get_display = egl_function<PFNEGLGETPLATFORMDISPLAYEXTPROC>("eglGetPlatformDisplayEXT");
-    if (!get_display) return unsupported("EGL has no platform displays");
-    display_ = get_display(candidate.platform, candidate.native, nullptr);
-    EGLint major = 0, minor = 0;
-    if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, &major, &minor))
-        return unsupported(failed("initialising"));
-    if (!eglBindAPI(EGL_OPENGL_API)) return unsupported(failed("choosing desktop OpenGL"));
-    if (auto config = choose_config(); !config) return config;
-
-    const EGLint context_attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                         4,
-                                         EGL_CONTEXT_MINOR_VERSION,
-                                         5,
-                                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                         EGL_CONTEXT_OPENGL_DEBUG,
-                                         EGL_TRUE,
-                                         EGL_NONE};
-    context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context_attributes);
-    if (context_ == EGL_NO_CONTEXT) return unsupported(failed("making an OpenGL 4.5 core context"));
-    if (!has_extension(eglQueryString(display_, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context")) {
-        const EGLint size[] = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
-        surface_ = eglCreatePbufferSurface(display_, config_, size);
-        if (surface_ == EGL_NO_SURFACE) return unsupported(failed("making a pixel buffer"));
-    }
-    return make_current();
-}
-
-Result<void> EglPlatform::choose_config() {
-    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
-    EGLint count = 0;
-    if (!eglChooseConfig(display_, wanted, &config_, 1, &count)) return unsupported(failed("choosing a configuration"));
-    if (count == 0) return unsupported("it has no configuration for desktop OpenGL");
-    return {};
-}
-
-EglPlatform::~EglPlatform() {
-    if (context_ != EGL_NO_CONTEXT) {
-        if (eglGetCurrentContext() == context_) release_egl_thread();
-        eglDestroyContext(display_, context_);
-    }
-    if (surface_ != EGL_NO_SURFACE) eglDestroySurface(display_, surface_);
-}
-
-Result<void> EglPlatform::make_current() {
-    eglBindAPI(EGL_OPENGL_API); // current contexts are kept by thread and by API
-    if (eglGetCurrentContext() == context_) return {};
-    release_glfw_thread();
-    release_glx_thread();
-    if (!eglMakeCurrent(display_, surface_, surface_, context_))
-        return unsupported(failed("making the OpenGL context current on this thread"));
-    return {};
-}
 
 } // namespace
 

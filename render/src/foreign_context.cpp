@@ -8,7 +8,6 @@
 #include <EGL/egl.h>
 
 #include "context_impl.h"
-#include "gl.h"
 
 namespace unseen::render {
 namespace {
@@ -32,27 +31,27 @@ void* current_glx_context() {
 
 class ForeignPlatform final : public Platform {
 public:
-    ForeignPlatform(void* context, const AdoptOptions& options) : context_(context), options_(options) {}
+    ForeignPlatform(void* context, const std::function<void()>& make_current)
+        : context_(context), make_current_(make_current) {}
 
     Result<void> make_current() override {
         if (current_native_context() == context_) return {};
-        if (!options_.make_current)
+        if (!make_current_)
             return unsupported("The adopted OpenGL context is not current on this thread; make it current before the "
-                               "call, or give AdoptOptions::make_current.");
+                               "call, or give Context::adopt() a function that does so.");
         // EGL and GLX do not take over a thread from each other: ours let go.
         release_egl_thread();
         release_glfw_thread();
-        options_.make_current();
+        make_current_();
         if (current_native_context() == context_) return {};
-        return unsupported(
-            "The adopted OpenGL context is not current on this thread after AdoptOptions::make_current: is "
-            "it gone, or current on another thread?");
+        return unsupported("The adopted OpenGL context is not current on this thread after its function was called: is "
+                           "it gone, or current on another thread?");
     }
     bool is_foreign() const noexcept override { return true; }
 
 private:
     void* context_;
-    AdoptOptions options_;
+    std::function<void()> make_current_;
 };
 
 } // namespace
@@ -73,13 +72,13 @@ void* current_native_context() {
     return by_egl ? by_egl : current_glx_context();
 }
 
-Result<std::unique_ptr<Platform>> make_foreign_platform(const AdoptOptions& options) {
+Result<std::unique_ptr<Platform>> make_foreign_platform(const std::function<void()>& make_current) {
     void* const context = current_native_context();
     if (!context || !glGetString(GL_VERSION))
         return unsupported(
             "There is no OpenGL context to adopt: make yours current on this thread before. (OpenGL ES is "
             "another API.)");
-    return std::unique_ptr<Platform>(std::make_unique<ForeignPlatform>(context, options));
+    return std::unique_ptr<Platform>(std::make_unique<ForeignPlatform>(context, make_current));
 }
 
 } // namespace unseen::render

@@ -15,7 +15,6 @@ GLenum label_kind(GlKind kind) {
     case GlKind::texture_2d:
     case GlKind::texture_2d_array: return GL_TEXTURE;
     case GlKind::timestamp: return GL_QUERY;
-    case GlKind::renderbuffer: return GL_RENDERBUFFER;
     case GlKind::framebuffer: return GL_FRAMEBUFFER;
     case GlKind::program: return GL_PROGRAM;
     case GlKind::sampler: return GL_SAMPLER;
@@ -35,7 +34,6 @@ unsigned make_object(GlKind kind, std::string_view label) {
     case GlKind::texture_2d: glCreateTextures(GL_TEXTURE_2D, 1, &id); break;
     case GlKind::texture_2d_array: glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &id); break;
     case GlKind::timestamp: glCreateQueries(GL_TIMESTAMP, 1, &id); break;
-    case GlKind::renderbuffer: glCreateRenderbuffers(1, &id); break;
     case GlKind::framebuffer: glCreateFramebuffers(1, &id); break;
     case GlKind::program: id = glCreateProgram(); break;
     case GlKind::sampler: glCreateSamplers(1, &id); break;
@@ -53,11 +51,23 @@ void delete_object(GlKind kind, unsigned id) noexcept {
     case GlKind::texture_2d:
     case GlKind::texture_2d_array: return glDeleteTextures(1, &id);
     case GlKind::timestamp: return glDeleteQueries(1, &id);
-    case GlKind::renderbuffer: return glDeleteRenderbuffers(1, &id);
     case GlKind::framebuffer: return glDeleteFramebuffers(1, &id);
     case GlKind::program: return glDeleteProgram(id);
     case GlKind::sampler: return glDeleteSamplers(1, &id);
     }
+}
+
+void disable(std::initializer_list<unsigned> capabilities) {
+    for (const GLenum capability : capabilities) glDisable(capability);
+}
+
+void reset_pixel_stores() {
+    for (const GLenum four : {GL_PACK_ALIGNMENT, GL_UNPACK_ALIGNMENT}) glPixelStorei(four, 4);
+    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_UNPACK_ROW_LENGTH,
+                              GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
 }
 
 } // namespace unseen::render

@@ -4,6 +4,7 @@
 // default-constructed or moved-from one.
 #pragma once
 
+#include <initializer_list>
 #include <string_view>
 #include <utility>
 
@@ -15,7 +16,6 @@ enum class GlKind {
     texture_2d,
     texture_2d_array,
     timestamp, // a query of when the GPU comes to it
-    renderbuffer,
     framebuffer,
     program,
     sampler
@@ -36,10 +36,7 @@ public:
 
     static GlObject create(std::string_view label = {}) { return GlObject(make_object(kind, label)); }
 
-    // Takes ownership of a name that other code made.
-    static GlObject wrap(unsigned id) noexcept { return GlObject(id); }
-
-    GlObject(GlObject&& other) noexcept : id_(other.release()) {}
+    GlObject(GlObject&& other) noexcept : id_(std::exchange(other.id_, 0u)) {}
     GlObject& operator=(GlObject&& other) noexcept {
         std::swap(id_, other.id_); // the old object goes with `other`
         return *this;
@@ -51,9 +48,6 @@ public:
     unsigned id() const noexcept { return id_; }
     explicit operator bool() const noexcept { return id_ != 0; }
 
-    // Gives up ownership: the caller deletes the object.
-    unsigned release() noexcept { return std::exchange(id_, 0u); }
-
 private:
     explicit GlObject(unsigned id) noexcept : id_(id) {}
     unsigned id_ = 0;
@@ -64,9 +58,13 @@ using VertexArray = GlObject<GlKind::vertex_array>;
 using Texture2d = GlObject<GlKind::texture_2d>;
 using Texture2dArray = GlObject<GlKind::texture_2d_array>;
 using Timestamp = GlObject<GlKind::timestamp>;
-using Renderbuffer = GlObject<GlKind::renderbuffer>;
 using FramebufferObject = GlObject<GlKind::framebuffer>;
 using ProgramObject = GlObject<GlKind::program>;
 using Sampler = GlObject<GlKind::sampler>;
+
+void disable(std::initializer_list<unsigned> capabilities);
+
+// As pixels in memory lie, whatever others have set.
+void reset_pixel_stores();
 
 } // namespace unseen::render

@@ -1,14 +1,13 @@
 #include "gpu_indices.h"
 
 #include <algorithm>
-#include <string>
+#include <numeric>
 
 #include "shaders.h"
 
 namespace unseen::render {
 namespace {
 
-constexpr unsigned group_size = 64; // of patch.comp
 constexpr std::uint64_t index_bytes = sizeof(std::uint32_t);
 constexpr GLuint64 wait_ns = 1'000'000'000; // a turn of waiting for the GPU; it repeats
 constexpr GLuint writes_binding = 0, window_binding = 1;
@@ -19,17 +18,45 @@ void wait_for(GLsync fence) {
     while (state == GL_TIMEOUT_EXPIRED) state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait_ns);
 }
 
-// Windows onto the index buffer begin where a shader's binding may begin.
-std::uint64_t indices_in_a_window() {
+} // namespace
+
+void draw_triangles(const Program& program, const VertexArray& arrays, const GpuIndices& indices) {
+    constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
+    program.use();
+    glVertexArrayElementBuffer(arrays.id(), indices.buffer());
+    glBindVertexArray(arrays.id());
+    for (std::uint64_t first = 0; first < indices.count(); first += most_indices_a_call)
+        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(std::min(most_indices_a_call, indices.count() - first)),
+                       GL_UNSIGNED_INT,
+                       reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * index_bytes)));
+    glBindVertexArray(0);
+}
+
+std::uint64_t elements_in_a_window(std::uint64_t element_bytes) {
     GLint64 most_bytes = 0;
     GLint alignment = 1;
     glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most_bytes);
     glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
-    const auto step = std::max<std::uint64_t>(static_cast<std::uint64_t>(alignment), index_bytes);
-    return static_cast<std::uint64_t>(most_bytes) / step * step / index_bytes;
+    const auto step = std::lcm(static_cast<std::uint64_t>(std::max(alignment, 1)), element_bytes);
+    return static_cast<std::uint64_t>(most_bytes) / step * step / element_bytes;
 }
 
-} // namespace
+void run_on_windows(const Program& program, std::size_t count, unsigned buffer, std::uint64_t size,
+                    std::uint64_t element_bytes, std::uint64_t window) {
+    constexpr unsigned group_size = 64; // of patch.comp and move.comp
+    program.set(write_count_location, static_cast<unsigned>(count));
+    program.use();
+    for (std::uint64_t first = 0; first < size; first += window) {
+        const std::uint64_t in_window = std::min(window, size - first);
+        program.set(window_first_location, static_cast<unsigned>(first));
+        program.set(window_size_location, static_cast<unsigned>(in_window));
+        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, buffer,
+                          static_cast<GLintptr>(first * element_bytes),
+                          static_cast<GLsizeiptr>(in_window * element_bytes));
+        glDispatchCompute(static_cast<GLuint>((count + group_size - 1) / group_size), 1, 1);
+    }
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, window_binding, 0);
+}
 
 Result<void> GpuIndices::prepare_patching() {
     if (patch_) return {};
@@ -37,7 +64,7 @@ Result<void> GpuIndices::prepare_patching() {
     const auto patch = programs_->named("patch indices", source);
     if (!patch) return patch.error();
     patch_ = *patch;
-    window_indices_ = indices_in_a_window();
+    window_indices_ = elements_in_a_window(index_bytes);
     constexpr GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
     constexpr auto bytes = static_cast<GLsizeiptr>(part_count * part_writes * sizeof(Write));
     staging_ = Buffer::create("changes of triangles");
@@ -46,29 +73,32 @@ Result<void> GpuIndices::prepare_patching() {
     return {};
 }
 
-Result<void> GpuIndices::update(const IndexState& state) {
+Result<void> GpuIndices::update(const vdtree::Cut& cut) {
+    const auto indices = cut.indices(); // first: the rest is about what it returned
+    const std::uint64_t version = cut.index_version();
     uploaded_bytes_ = 0;
-    if (state.version != 0 && state.version == version_) return {};
+    if (version != 0 && version == version_) return {};
     ++changes_;
-    const bool follows = can_follow(state);
+    const bool follows = can_follow(cut);
     version_ = 0; // until it is done
     if (follows)
         if (auto prepared = prepare_patching(); !prepared) return count_ = 0, prepared;
     if (follows && mapped_ && window_indices_ > 0) {
-        if (auto reserved = reserve(state.indices.size(), true); !reserved) return reserved;
-        patch(*state.writes, state.indices);
-    } else if (auto uploaded = upload_all(state.indices); !uploaded) {
+        if (auto reserved = reserve(indices.size(), true); !reserved) return reserved;
+        patch(*cut.index_writes(), indices);
+    } else if (auto uploaded = upload_all(indices); !uploaded) {
         return uploaded;
     }
-    count_ = state.indices.size();
-    version_ = state.version;
+    count_ = indices.size();
+    version_ = version;
     return {};
 }
 
 // The changes lead here, and are less than the whole.
-bool GpuIndices::can_follow(const IndexState& state) const {
-    return version_ != 0 && state.writes && state.writes_from == version_ &&
-           state.writes->size() * sizeof(Write) < state.indices.size_bytes();
+bool GpuIndices::can_follow(const vdtree::Cut& cut) const {
+    const auto writes = cut.index_writes();
+    return version_ != 0 && writes && cut.index_writes_from() == version_ &&
+           writes->size() * sizeof(Write) < cut.indices().size_bytes();
 }
 
 // A half more than is asked for, so that cuts that grow need not move each time.
@@ -120,24 +150,13 @@ void GpuIndices::patch(std::span<const vdtree::IndexWrite> writes, std::span<con
     glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
-// One pass for each window onto the index buffer that a shader can see: nearly always one.
 void GpuIndices::apply(std::size_t part, std::size_t writes) {
     if (writes == 0) return;
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, writes_binding, staging_.id(),
                       static_cast<GLintptr>(part * part_writes * sizeof(Write)),
                       static_cast<GLsizeiptr>(writes * sizeof(Write)));
-    patch_->set(write_count_location, static_cast<unsigned>(writes));
-    patch_->use();
-    for (std::uint64_t first = 0; first < capacity_; first += window_indices_) {
-        const std::uint64_t size = std::min(window_indices_, capacity_ - first);
-        patch_->set(window_first_location, static_cast<unsigned>(first));
-        patch_->set(window_size_location, static_cast<unsigned>(size));
-        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, buffer_.id(),
-                          static_cast<GLintptr>(first * index_bytes), static_cast<GLsizeiptr>(size * index_bytes));
-        glDispatchCompute(static_cast<GLuint>((writes + group_size - 1) / group_size), 1, 1);
-    }
+    run_on_windows(*patch_, writes, buffer_.id(), capacity_, index_bytes, window_indices_);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, writes_binding, 0);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, window_binding, 0);
 }
 
 } // namespace unseen::render

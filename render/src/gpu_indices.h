@@ -5,23 +5,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 
 #include <unseen/vdtree/cut.h>
 
 #include "gl.h"
-#include "gl_object.h"
-#include "programs.h"
+#include "program.h"
 
 namespace unseen::render {
-
-// An index buffer and where it came from. Writes lead from the version `writes_from` to `version`.
-struct IndexState {
-    std::span<const std::uint32_t> indices;
-    std::uint64_t version = 0; // another one for every content; 0: unknown
-    std::uint64_t writes_from = 0;
-    std::optional<std::span<const vdtree::IndexWrite>> writes = {};
-};
 
 // The buffer lies in the GPU's own memory, which drawing reads fastest. Changes go through a small buffer that stays
 // mapped. The CPU writes pairs of place and value to the next of its parts. It waits only where the GPU has not yet
@@ -34,7 +24,7 @@ public:
     explicit GpuIndices(Programs& programs) : programs_(&programs) {} // which outlive it; does no GL
 
     // Fails where the memory does not suffice; then there are no indices.
-    Result<void> update(const IndexState& state);
+    Result<void> update(const vdtree::Cut& cut);
 
     unsigned buffer() const noexcept { return buffer_.id(); } // another one after it has grown; 0 at first
     std::uint64_t count() const noexcept { return count_; }
@@ -55,7 +45,7 @@ private:
     Result<void> prepare_patching();
     Result<void> upload_all(std::span<const std::uint32_t> indices);
     Result<void> reserve(std::uint64_t count, bool keep);
-    bool can_follow(const IndexState& state) const;
+    bool can_follow(const vdtree::Cut& cut) const;
     void patch(std::span<const vdtree::IndexWrite> writes, std::span<const std::uint32_t> indices);
     void apply(std::size_t part, std::size_t writes);
 
@@ -73,5 +63,15 @@ private:
     std::size_t next_part_ = 0;
     std::uint64_t window_indices_ = 0; // as many as a shader may see at a time
 };
+
+void draw_triangles(const Program& program, const VertexArray& arrays, const GpuIndices& indices);
+
+// Shaders see a buffer through windows, which begin where a binding may begin. How many elements one of them holds, each
+// of so many bytes.
+std::uint64_t elements_in_a_window(std::uint64_t element_bytes);
+// Runs a compute program in groups of 64 over `count` changes, once for each window onto a buffer of `size` elements:
+// nearly always one.
+void run_on_windows(const Program& program, std::size_t count, unsigned buffer, std::uint64_t size,
+                    std::uint64_t element_bytes, std::uint64_t window);
 
 } // namespace unseen::render

@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <string>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/light_bounds.h>
-#include <unseen/vdtree/lighting.h>
 
-#include "gl.h"
+#include "shaders.h"
 
 namespace unseen::render {
 namespace {
@@ -33,24 +30,24 @@ Vertex vertex_of(const UnitFrame& frame, glm::vec3 position, float luminance, co
     return {glm::vec3(in_frame), glm::vec4(rgb, luminance)};
 }
 
+void describe(GLuint arrays, GLuint buffer, GLuint vertices, GLsizei size) {
+    glVertexArrayVertexBuffer(arrays, buffer, vertices, 0, size);
+    for (const GLuint attribute : {2 * buffer, 2 * buffer + 1}) {
+        glEnableVertexArrayAttrib(arrays, attribute);
+        glVertexArrayAttribBinding(arrays, attribute, buffer);
+    }
+}
+
 void describe_vertices(GLuint arrays, GLuint vertices) {
-    glVertexArrayVertexBuffer(arrays, 0, vertices, 0, sizeof(Vertex));
-    glEnableVertexArrayAttrib(arrays, 0);
+    describe(arrays, 0, vertices, sizeof(Vertex));
     glVertexArrayAttribFormat(arrays, 0, 3, GL_FLOAT, GL_FALSE, offsetof(Vertex, position));
-    glVertexArrayAttribBinding(arrays, 0, 0);
-    glEnableVertexArrayAttrib(arrays, 1);
     glVertexArrayAttribFormat(arrays, 1, 4, GL_FLOAT, GL_FALSE, offsetof(Vertex, shade));
-    glVertexArrayAttribBinding(arrays, 1, 0);
 }
 
 void describe_lit_vertices(GLuint arrays, GLuint vertices) {
-    glVertexArrayVertexBuffer(arrays, 1, vertices, 0, sizeof(LitVertex));
-    glEnableVertexArrayAttrib(arrays, 2);
+    describe(arrays, 1, vertices, sizeof(LitVertex));
     glVertexArrayAttribIFormat(arrays, 2, 2, GL_SHORT, offsetof(LitVertex, normal));
-    glVertexArrayAttribBinding(arrays, 2, 1);
-    glEnableVertexArrayAttrib(arrays, 3);
     glVertexArrayAttribFormat(arrays, 3, 1, GL_FLOAT, GL_FALSE, offsetof(LitVertex, albedo));
-    glVertexArrayAttribBinding(arrays, 3, 1);
 }
 
 Error too_large(const std::string& what) {
@@ -59,8 +56,36 @@ Error too_large(const std::string& what) {
 
 } // namespace
 
+Result<VertexMover> VertexMover::create(Programs& programs) {
+    const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::move_comp}};
+    const auto program = programs.named("move vertices", source);
+    if (!program) return program.error();
+    VertexMover mover(*program);
+    mover.moves_ = Buffer::create("moved vertices");
+    mover.window_vertices_ = elements_in_a_window(sizeof(Vertex));
+    if (mover.window_vertices_ == 0)
+        return Error{ErrorCode::unsupported,
+                     "The graphics driver gives shaders no buffer for moved vertices; draw without geomorphs."};
+    return mover;
+}
+
+void VertexMover::move(unsigned vertices, std::uint64_t count, std::span<const VertexMove> moves) {
+    constexpr GLuint moves_binding = 0;
+    // As many as one pass takes: GL promises 65535 groups, and 2^24 bytes of a shader's block.
+    constexpr std::size_t most_moves = std::size_t{1} << 19;
+    for (; !moves.empty(); moves = moves.subspan(std::min(moves.size(), most_moves))) {
+        const auto part = moves.first(std::min(moves.size(), most_moves));
+        // A new store each time, so that the driver need not wait for the last frame.
+        glNamedBufferData(moves_.id(), static_cast<GLsizeiptr>(part.size_bytes()), part.data(), GL_STREAM_DRAW);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, moves_binding, moves_.id());
+        run_on_windows(*program_, part.size(), vertices, count, sizeof(Vertex), window_vertices_);
+    }
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, moves_binding, 0);
+    glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
 GpuTree::Impl::Impl(const Context& context_, const vdtree::VertexTree& tree_)
-    : context(context_), tree(tree_.share()), frame(unit_frame(tree.bounds()[tree.root()].ring)) {}
+    : context(context_), tree(tree_.share()), frame(unit_frame(tree.bounds()[tree.root()].ring)), guard(context_) {}
 
 Vertex GpuTree::Impl::vertex(std::size_t i) const {
     return vertex_of(frame, tree.positions()[i], tree.luminance()[i],
@@ -162,8 +187,7 @@ Result<void> GpuCut::Impl::follow(const vdtree::Cut& cut, std::span<const vdtree
     if (!moved.empty())
         if (auto made = of.need_mover(); !made) return made;
 
-    const auto triangles = cut.indices(); // first: the rest is about what it returned
-    auto updated = indices.update({triangles, cut.index_version(), cut.index_writes_from(), cut.index_writes()});
+    auto updated = indices.update(cut);
     uploaded_bytes = indices.uploaded_bytes();
     glides.moves.clear();
     glides.version = moved.empty() ? 0 : ++of.last_version;

@@ -1,23 +1,14 @@
 // What trees and cuts hold on the GPU.
 #pragma once
 
-#include <array>
-#include <limits>
-#include <optional>
-#include <vector>
-
 #include <glm/common.hpp>
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include <unseen/render/draw.h>
 
 #include "camera.h"
 #include "context_impl.h"
-#include "gl_object.h"
 #include "gpu_indices.h"
 #include "surface_texture.h"
-#include "vertex.h"
 #include "vertex_mover.h"
 
 namespace unseen::render {
@@ -42,9 +33,6 @@ struct Glides {
 
 struct GpuTree::Impl {
     Impl(const Context& context_, const vdtree::VertexTree& tree_);
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
 
     Result<void> upload();
     Result<void> need_mover();
@@ -69,13 +57,12 @@ struct GpuTree::Impl {
     std::vector<std::uint32_t> moved;      // that are not where they belong, ascending
     std::uint64_t shown_version = 0;       // of the glides that the vertices have
     std::uint64_t last_version = 0;
+    ContextGuard guard;
 };
 
 struct GpuCut::Impl {
-    explicit Impl(const GpuTree& tree_) : tree(tree_), indices(tree.context().impl().programs), box(tree.impl().box) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(tree.context().make_current()); } // for the objects, which go next
+    explicit Impl(const GpuTree& tree_)
+        : tree(tree_), indices(tree.context().impl().programs), box(tree.impl().box), guard(tree.context()) {}
 
     Result<void> follow(const vdtree::Cut& cut, std::span<const vdtree::MovedVertex> moved);
 
@@ -84,6 +71,7 @@ struct GpuCut::Impl {
     Glides glides;
     Box box; // around all vertices, and around wherever they were moved
     std::uint64_t uploaded_bytes = 0;
+    ContextGuard guard;
 };
 
 } // namespace unseen::render

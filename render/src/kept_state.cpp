@@ -1,6 +1,7 @@
 #include "kept_state.h"
 
 #include <algorithm>
+#include <array>
 
 namespace unseen::render {
 namespace {
@@ -40,10 +41,11 @@ GLint value_of(GLenum name) {
     glGetIntegerv(name, &value);
     return value;
 }
-GLint value_at(GLenum name, GLuint index) {
+GLuint mode_of(GLenum name) { return static_cast<GLuint>(value_of(name)); }
+GLuint mode_at(GLenum name, GLuint index) {
     GLint value = 0;
     glGetIntegeri_v(name, index, &value);
-    return value;
+    return static_cast<GLuint>(value);
 }
 GLuint count_of(GLenum most, GLuint wanted) {
     return std::min(wanted, static_cast<GLuint>(std::max(value_of(most), 0)));
@@ -60,97 +62,88 @@ void set_at(GLenum what, GLuint index, bool is_on) {
 
 } // namespace
 
-KeptState::KeptState() {
-    for (const GLenum what : switches) switches_.push_back(glIsEnabled(what) == GL_TRUE);
-    for (const GLenum store : stores) stores_.push_back(value_of(store));
-    for (const Binding& buffer : buffers) buffers_.push_back(value_of(buffer.name));
-    for (GLuint i = 0; i < count_of(GL_MAX_DRAW_BUFFERS, most_draw_buffers); ++i) {
-        Blend blend{value_at(GL_BLEND_SRC_RGB, i),        value_at(GL_BLEND_DST_RGB, i),
-                    value_at(GL_BLEND_SRC_ALPHA, i),      value_at(GL_BLEND_DST_ALPHA, i),
-                    value_at(GL_BLEND_EQUATION_RGB, i),   value_at(GL_BLEND_EQUATION_ALPHA, i),
-                    glIsEnabledi(GL_BLEND, i) == GL_TRUE, {}};
-        glGetBooleani_v(GL_COLOR_WRITEMASK, i, blend.mask.data());
-        blends_.push_back(blend);
-    }
-    for (GLuint i = 0; i < count_of(GL_MAX_VIEWPORTS, most_viewports); ++i) {
-        Window window{};
-        glGetFloati_v(GL_VIEWPORT, i, window.viewport.data());
-        glGetIntegeri_v(GL_SCISSOR_BOX, i, window.scissor.data());
-        glGetDoublei_v(GL_DEPTH_RANGE, i, window.depth_range.data());
-        window.is_scissored = glIsEnabledi(GL_SCISSOR_TEST, i) == GL_TRUE;
-        windows_.push_back(window);
-    }
-    for (GLuint unit = 0; unit < count_of(GL_MAX_COMBINED_TEXTURE_IMAGE_UNITS, unit_count); ++unit) {
-        textures_.emplace_back();
-        for (const GLenum binding : texture_bindings)
-            if (const GLint texture = value_at(binding, unit); texture != 0) textures_.back().push_back(texture);
-        samplers_.push_back(value_at(GL_SAMPLER_BINDING, unit));
-    }
-    for (GLuint i = 0; i < count_of(GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, storage_count); ++i) {
-        Storage storage{value_at(GL_SHADER_STORAGE_BUFFER_BINDING, i), 0, 0};
-        glGetInteger64i_v(GL_SHADER_STORAGE_BUFFER_START, i, &storage.start);
-        glGetInteger64i_v(GL_SHADER_STORAGE_BUFFER_SIZE, i, &storage.size);
-        storages_.push_back(storage);
-    }
-    program_ = value_of(GL_CURRENT_PROGRAM);
-    vertex_array_ = value_of(GL_VERTEX_ARRAY_BINDING);
-    draw_framebuffer_ = value_of(GL_DRAW_FRAMEBUFFER_BINDING);
-    read_framebuffer_ = value_of(GL_READ_FRAMEBUFFER_BINDING);
-    clip_origin_ = value_of(GL_CLIP_ORIGIN);
-    clip_depth_ = value_of(GL_CLIP_DEPTH_MODE);
-    depth_function_ = value_of(GL_DEPTH_FUNC);
-    cull_face_ = value_of(GL_CULL_FACE_MODE);
-    front_face_ = value_of(GL_FRONT_FACE);
-    GLint modes[2] = {GL_FILL, GL_FILL}; // some drivers tell of both sides
-    glGetIntegerv(GL_POLYGON_MODE, modes);
-    polygon_mode_ = modes[0];
-    glGetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask_);
+void KeptState::keep_blending(GLuint i) {
+    const std::array values = {mode_at(GL_BLEND_SRC_RGB, i),      mode_at(GL_BLEND_DST_RGB, i),
+                               mode_at(GL_BLEND_SRC_ALPHA, i),    mode_at(GL_BLEND_DST_ALPHA, i),
+                               mode_at(GL_BLEND_EQUATION_RGB, i), mode_at(GL_BLEND_EQUATION_ALPHA, i)};
+    std::array<GLboolean, 4> mask{};
+    glGetBooleani_v(GL_COLOR_WRITEMASK, i, mask.data());
+    keep([=, is_on = glIsEnabledi(GL_BLEND, i) == GL_TRUE] {
+        set_at(GL_BLEND, i, is_on);
+        glBlendFuncSeparatei(i, values[0], values[1], values[2], values[3]);
+        glBlendEquationSeparatei(i, values[4], values[5]);
+        glColorMaski(i, mask[0], mask[1], mask[2], mask[3]);
+    });
 }
 
-KeptState::~KeptState() {
-    const auto name = [](GLint value) { return static_cast<GLuint>(value); };
-    const auto mode = [](GLint value) { return static_cast<GLenum>(value); };
-    for (std::size_t i = 0; i < switches_.size(); ++i) set(switches[i], switches_[i]);
-    for (std::size_t i = 0; i < stores_.size(); ++i) glPixelStorei(stores[i], stores_[i]);
-    for (GLuint i = 0; i < blends_.size(); ++i) {
-        const Blend& blend = blends_[i];
-        set_at(GL_BLEND, i, blend.is_on);
-        glBlendFuncSeparatei(i, mode(blend.source_rgb), mode(blend.target_rgb), mode(blend.source_alpha),
-                             mode(blend.target_alpha));
-        glBlendEquationSeparatei(i, mode(blend.rgb), mode(blend.alpha));
-        glColorMaski(i, blend.mask[0], blend.mask[1], blend.mask[2], blend.mask[3]);
-    }
-    for (GLuint i = 0; i < windows_.size(); ++i) {
-        const Window& window = windows_[i];
-        glViewportIndexedfv(i, window.viewport.data());
-        glScissorIndexedv(i, window.scissor.data());
-        glDepthRangeIndexed(i, window.depth_range[0], window.depth_range[1]);
-        set_at(GL_SCISSOR_TEST, i, window.is_scissored);
-    }
-    for (GLuint unit = 0; unit < textures_.size(); ++unit) {
+void KeptState::keep_window(GLuint i) {
+    std::array<GLfloat, 4> viewport{};
+    std::array<GLint, 4> scissor{};
+    std::array<GLdouble, 2> depth_range{};
+    glGetFloati_v(GL_VIEWPORT, i, viewport.data());
+    glGetIntegeri_v(GL_SCISSOR_BOX, i, scissor.data());
+    glGetDoublei_v(GL_DEPTH_RANGE, i, depth_range.data());
+    keep([=, is_scissored = glIsEnabledi(GL_SCISSOR_TEST, i) == GL_TRUE] {
+        glViewportIndexedfv(i, viewport.data());
+        glScissorIndexedv(i, scissor.data());
+        glDepthRangeIndexed(i, depth_range[0], depth_range[1]);
+        set_at(GL_SCISSOR_TEST, i, is_scissored);
+    });
+}
+
+void KeptState::keep_unit(GLuint unit) {
+    std::vector<GLuint> textures; // that are bound
+    for (const GLenum binding : texture_bindings)
+        if (const GLuint texture = mode_at(binding, unit); texture != 0) textures.push_back(texture);
+    keep([=, sampler = mode_at(GL_SAMPLER_BINDING, unit)] {
         glBindTextureUnit(unit, 0);
-        for (const GLint texture : textures_[unit]) glBindTextureUnit(unit, name(texture));
-        glBindSampler(unit, name(samplers_[unit]));
-    }
-    for (GLuint i = 0; i < storages_.size(); ++i) {
-        const Storage& storage = storages_[i];
-        if (storage.buffer != 0 && storage.size > 0)
-            glBindBufferRange(GL_SHADER_STORAGE_BUFFER, i, name(storage.buffer), static_cast<GLintptr>(storage.start),
-                              static_cast<GLsizeiptr>(storage.size));
-        else glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, name(storage.buffer));
-    }
+        for (const GLuint texture : textures) glBindTextureUnit(unit, texture);
+        glBindSampler(unit, sampler);
+    });
+}
+
+void KeptState::keep_storage(GLuint i) {
+    GLint64 start = 0, size = 0;
+    glGetInteger64i_v(GL_SHADER_STORAGE_BUFFER_START, i, &start);
+    glGetInteger64i_v(GL_SHADER_STORAGE_BUFFER_SIZE, i, &size);
+    keep([=, buffer = mode_at(GL_SHADER_STORAGE_BUFFER_BINDING, i)] {
+        if (buffer != 0 && size > 0)
+            glBindBufferRange(GL_SHADER_STORAGE_BUFFER, i, buffer, static_cast<GLintptr>(start),
+                              static_cast<GLsizeiptr>(size));
+        else glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, buffer);
+    });
+}
+
+KeptState::KeptState() {
+    for (const GLenum what : switches) keep([=, is_on = glIsEnabled(what) == GL_TRUE] { set(what, is_on); });
+    for (const GLenum store : stores) keep([=, value = value_of(store)] { glPixelStorei(store, value); });
+    for (GLuint i = 0; i < count_of(GL_MAX_DRAW_BUFFERS, 8); ++i) keep_blending(i);
+    for (GLuint i = 0; i < count_of(GL_MAX_VIEWPORTS, 16); ++i) keep_window(i);
+    // Above all that Unseen binds to.
+    for (GLuint unit = 0; unit < count_of(GL_MAX_COMBINED_TEXTURE_IMAGE_UNITS, 24); ++unit) keep_unit(unit);
+    for (GLuint i = 0; i < count_of(GL_MAX_SHADER_STORAGE_BUFFER_BINDINGS, 8); ++i) keep_storage(i);
     // After the indexed ones, which set these, too.
-    for (std::size_t i = 0; i < buffers_.size(); ++i) glBindBuffer(buffers[i].target, name(buffers_[i]));
-    glUseProgram(name(program_));
-    glBindVertexArray(name(vertex_array_));
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, name(draw_framebuffer_));
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, name(read_framebuffer_));
-    glClipControl(mode(clip_origin_), mode(clip_depth_));
-    glDepthFunc(mode(depth_function_));
-    glCullFace(mode(cull_face_));
-    glFrontFace(mode(front_face_));
-    glPolygonMode(GL_FRONT_AND_BACK, mode(polygon_mode_));
-    glDepthMask(depth_mask_);
+    for (const Binding& buffer : buffers) keep([=, name = mode_of(buffer.name)] { glBindBuffer(buffer.target, name); });
+    GLint polygon_modes[2] = {GL_FILL, GL_FILL}; // some drivers tell of both sides
+    glGetIntegerv(GL_POLYGON_MODE, polygon_modes);
+    GLboolean depth_mask = 0;
+    glGetBooleanv(GL_DEPTH_WRITEMASK, &depth_mask);
+    keep([=, program = mode_of(GL_CURRENT_PROGRAM), arrays = mode_of(GL_VERTEX_ARRAY_BINDING),
+          drawn = mode_of(GL_DRAW_FRAMEBUFFER_BINDING), read = mode_of(GL_READ_FRAMEBUFFER_BINDING),
+          origin = mode_of(GL_CLIP_ORIGIN), depth_mode = mode_of(GL_CLIP_DEPTH_MODE), depth = mode_of(GL_DEPTH_FUNC),
+          culled = mode_of(GL_CULL_FACE_MODE), front = mode_of(GL_FRONT_FACE),
+          polygons = static_cast<GLenum>(polygon_modes[0])] {
+        glUseProgram(program);
+        glBindVertexArray(arrays);
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, drawn);
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, read);
+        glClipControl(origin, depth_mode);
+        glDepthFunc(depth);
+        glCullFace(culled);
+        glFrontFace(front);
+        glPolygonMode(GL_FRONT_AND_BACK, polygons);
+        glDepthMask(depth_mask);
+    });
 }
 
 } // namespace unseen::render

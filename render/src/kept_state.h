@@ -1,7 +1,7 @@
 // What Unseen's calls change of a GL context's state, kept for those that others own.
 #pragma once
 
-#include <array>
+#include <functional>
 #include <vector>
 
 #include "gl.h"
@@ -16,40 +16,18 @@ public:
     KeptState();
     KeptState(const KeptState&) = delete;
     KeptState& operator=(const KeptState&) = delete;
-    ~KeptState();
+    ~KeptState() {
+        for (const auto& restore : restores_) restore();
+    }
 
 private:
-    static constexpr GLuint unit_count = 24;   // of textures and samplers: above all that Unseen binds to
-    static constexpr GLuint storage_count = 8; // of storage buffers, likewise
-    static constexpr GLuint most_viewports = 16, most_draw_buffers = 8;
+    void keep(std::function<void()> restore) { restores_.push_back(std::move(restore)); }
+    void keep_blending(GLuint buffer);
+    void keep_window(GLuint number);
+    void keep_unit(GLuint unit);
+    void keep_storage(GLuint binding);
 
-    struct Blend {
-        GLint source_rgb, target_rgb, source_alpha, target_alpha, rgb, alpha;
-        bool is_on;
-        std::array<GLboolean, 4> mask;
-    };
-    struct Window {
-        std::array<GLfloat, 4> viewport;
-        std::array<GLint, 4> scissor;
-        std::array<GLdouble, 2> depth_range;
-        bool is_scissored;
-    };
-    struct Storage {
-        GLint buffer;
-        GLint64 start, size;
-    };
-
-    std::vector<bool> switches_;
-    std::vector<GLint> stores_;
-    std::vector<GLint> buffers_; // by target
-    std::vector<Blend> blends_;
-    std::vector<Window> windows_;
-    std::vector<std::vector<GLint>> textures_; // by unit, those that are bound
-    std::vector<GLint> samplers_;
-    std::vector<Storage> storages_;
-    GLint program_ = 0, vertex_array_ = 0, draw_framebuffer_ = 0, read_framebuffer_ = 0, clip_origin_ = 0,
-          clip_depth_ = 0, depth_function_ = 0, cull_face_ = 0, front_face_ = 0, polygon_mode_ = 0;
-    GLboolean depth_mask_ = 0;
+    std::vector<std::function<void()>> restores_; // in this order
 };
 
 } // namespace unseen::render

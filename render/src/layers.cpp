@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <string>
 
 #include <unseen/vdtree/internal/errors.h>
 
-#include "gl.h"
 #include "shaders.h"
 #include "surface_pass.h"
 
@@ -19,14 +16,7 @@ constexpr int most_block = 16;
 // Largest ratio of the farthest to the nearest centre's distance: nearer planes would divide what touches the eye.
 constexpr double largest_ratio = 1e3;
 
-enum UniformLocation { layers_location = 0, size_location = 1 };
-
-Texture2d array_texture(const char* label) {
-    GLuint id = 0;
-    glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &id);
-    if (id != 0) glObjectLabel(GL_TEXTURE, id, -1, label);
-    return Texture2d::wrap(id);
-}
+constexpr int counts_location = 0, size_location = 1; // of combine.frag
 
 std::uint64_t bytes_a_pixel(ColourFormat format) { return format == ColourFormat::rgba32f ? 16 : 8; }
 
@@ -81,30 +71,103 @@ Result<LayerSplit> split_into_layers(std::span<const glm::dvec3> centres, const 
 
 struct LayerPasses::Impl {
     Impl(const Context& context_, Target composite_, Target combination_, const LayerOptions& options_)
-        : context(context_), options(options_), composite(std::move(composite_)), combination(std::move(combination_)) {
-    }
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+        : context(context_), options(options_), composite(std::move(composite_)), combination(std::move(combination_)),
+          guard(context_) {}
 
     struct Slice {
         FramebufferObject framebuffer; // outlives the target
         Target target;
     };
 
-    Result<void> need_slices(int count);
-    Result<void> draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& clear);
-    Result<void> draw_mask(int left_out, const Shadows& cast_by_others);
-    Result<void> put_together(int left_out, int block, const Target& to, const Target* mask = nullptr);
+    // One framebuffer a slice: the slices are made at once, for textures do not grow.
+    Result<void> need_slices(int count) {
+        if (slices.size() >= static_cast<std::size_t>(count)) return {};
+        slices.clear();
+        const int width = composite.width(), height = composite.height();
+        colours = Texture2dArray::create("layers");
+        depths = Texture2dArray::create("depths of layers");
+        const GLenum format = options.format == ColourFormat::rgba32f ? GL_RGBA32F : GL_RGBA16F;
+        glTextureStorage3D(colours.id(), 1, format, width, height, count);
+        glTextureStorage3D(depths.id(), 1, GL_DEPTH_COMPONENT32F, width, height, count);
+        for (int i = 0; i < count; ++i) {
+            FramebufferObject framebuffer = FramebufferObject::create(i == 0 ? "background" : "layer");
+            const GLuint id = framebuffer.id();
+            glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT0, colours.id(), 0, i);
+            glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, depths.id(), 0, i);
+            if (glCheckNamedFramebufferStatus(id, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+                slices.clear();
+                return unsupported(
+                    "A picture of " + std::to_string(width) + "x" + std::to_string(height) +
+                    " pixels cannot be split into " + std::to_string(count - 1) +
+                    " layers: the graphics memory does not suffice; choose fewer layers, or a smaller size.");
+            }
+            auto target = Target::foreign(context, width, height, {id, false, true});
+            if (!target) {
+                slices.clear();
+                return target.error();
+            }
+            slices.push_back({std::move(framebuffer), std::move(*target)});
+        }
+        return {};
+    }
+
+    Result<void> draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& cleared) {
+        Target& target = slices[slice].target;
+        ++done.surface_passes;
+        return render::draw(items, camera, target, {.colour = cleared});
+    }
+
+    // Which share of its light comes to each of the layer's surfaces, and where these are.
+    Result<void> draw_mask(int left_out, const Shadows& cast_by_others) {
+        if (!mask) {
+            auto made = Target::create(context, composite.width(), composite.height(),
+                                       {.colours = {options.format}, .label = "mask of shadows"});
+            if (!made) return made.error();
+            mask = std::move(*made);
+        }
+        std::vector<Item> items;
+        for (std::size_t i = 0; i < objects.size(); ++i)
+            if (layer_of[i] == left_out) items.push_back(objects[i]);
+        Camera own = camera;
+        own.shadows = &cast_by_others;
+        own.shadow_mask.reset();
+        const auto pass = SurfacePass::prepare(items, own, mask->impl(), 0, SurfacePass::Use::share_of_light);
+        if (!pass) return pass.error();
+        pass->draw(mask->impl(), own.point, {.colour = glm::vec4(1)});
+        ++done.surface_passes;
+        ++done.mask_passes;
+        return {};
+    }
+
+    Result<void> put_together(int left_out, int block, const Target& to, const Target* masked_by = nullptr) {
+        Programs& programs = context.impl().programs;
+        const auto found = masked_by ? programs.full_screen("combine masked", shaders::combine_frag, {"MASKED"})
+                                     : programs.full_screen("combine", shaders::combine_frag);
+        if (!found) return found.error();
+        const Program& program = **found;
+        set_fixed_state(to.impl());
+        disable({GL_DEPTH_TEST, GL_CULL_FACE, GL_BLEND});
+        to.impl().bind(0);
+        glBindTextureUnit(0, colours.id());
+        glBindTextureUnit(1, depths.id());
+        if (masked_by) {
+            glBindTextureUnit(2, masked_by->colour_texture());
+            glBindTextureUnit(3, masked_by->depth_texture());
+        }
+        glProgramUniform4i(program.id(), counts_location, layer_count, left_out, block, 0);
+        program.set(size_location, glm::ivec2(composite.width(), composite.height()));
+        programs.draw_full_screen(program);
+        for (GLuint unit = 0; unit < 4; ++unit) glBindTextureUnit(unit, 0);
+        ++done.full_screen_passes;
+        return {};
+    }
 
     Context context; // first, and so gone last
     LayerOptions options;
     Target composite, combination;
-    Texture2d colours, depths;
+    Texture2dArray colours, depths;
     std::optional<Target> mask; // made when a combination first has one
     std::vector<Slice> slices;  // the background, then layers
-    const Program *combine = nullptr, *combine_masked = nullptr;
-    VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
 
     // From the last draw.
     Camera camera;
@@ -116,106 +179,8 @@ struct LayerPasses::Impl {
     bool has_background = false; // in its slice
     bool is_masked = false;      // the last combination
     LayerCounts done;
+    ContextGuard guard;
 };
-
-// One framebuffer a slice: the slices are made at once, for textures do not grow.
-Result<void> LayerPasses::Impl::need_slices(int count) {
-    if (slices.size() >= static_cast<std::size_t>(count)) return {};
-    slices.clear();
-    const int width = composite.width(), height = composite.height();
-    colours = array_texture("layers");
-    depths = array_texture("depths of layers");
-    const GLenum format = options.format == ColourFormat::rgba32f ? GL_RGBA32F : GL_RGBA16F;
-    glTextureStorage3D(colours.id(), 1, format, width, height, count);
-    glTextureStorage3D(depths.id(), 1, GL_DEPTH_COMPONENT32F, width, height, count);
-    for (int i = 0; i < count; ++i) {
-        FramebufferObject framebuffer = FramebufferObject::create(i == 0 ? "background" : "layer");
-        const GLuint id = framebuffer.id();
-        glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT0, colours.id(), 0, i);
-        glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, depths.id(), 0, i);
-        if (glCheckNamedFramebufferStatus(id, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-            slices.clear();
-            return unsupported(
-                "A picture of " + std::to_string(width) + "x" + std::to_string(height) +
-                " pixels cannot be split into " + std::to_string(count - 1) +
-                " layers: the graphics memory does not suffice; choose fewer layers, or a smaller size.");
-        }
-        auto target = Target::foreign(context, width, height, {id, false, true});
-        if (!target) {
-            slices.clear();
-            return target.error();
-        }
-        slices.push_back({std::move(framebuffer), std::move(*target)});
-    }
-    return {};
-}
-
-Result<void> LayerPasses::Impl::draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& cleared) {
-    Target& target = slices[slice].target;
-    ++done.surface_passes;
-    return render::draw(items, camera, target, {.colour = cleared});
-}
-
-// Which share of its light comes to each of the layer's surfaces, and where these are.
-Result<void> LayerPasses::Impl::draw_mask(int left_out, const Shadows& cast_by_others) {
-    if (!mask) {
-        auto made = Target::create(context, composite.width(), composite.height(),
-                                   {.colours = {options.format}, .label = "mask of shadows"});
-        if (!made) return made.error();
-        mask = std::move(*made);
-    }
-    std::vector<Item> items;
-    for (std::size_t i = 0; i < objects.size(); ++i)
-        if (layer_of[i] == left_out) items.push_back(objects[i]);
-    Camera own = camera;
-    own.shadows = &cast_by_others;
-    own.shadow_mask.reset();
-    const auto pass = SurfacePass::prepare(items, own, mask->impl(), 0, SurfacePass::Use::share_of_light);
-    if (!pass) return pass.error();
-    pass->draw(mask->impl(), own.point, {.colour = glm::vec4(1)});
-    ++done.surface_passes;
-    ++done.mask_passes;
-    return {};
-}
-
-Result<void> LayerPasses::Impl::put_together(int left_out, int block, const Target& to, const Target* masked_by) {
-    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                    {ShaderSource::Stage::fragment, shaders::combine_frag}};
-    const Program*& program = masked_by ? combine_masked : combine;
-    if (!program) {
-        const std::string_view masked[] = {"MASKED"};
-        auto found = masked_by ? context.impl().programs.named("combine masked", sources, masked)
-                               : context.impl().programs.named("combine", sources);
-        if (!found) return found.error();
-        program = *found;
-    }
-    if (!no_arrays) no_arrays = VertexArray::create("full screen");
-    set_fixed_state(to.impl());
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
-    glDisable(GL_BLEND);
-    to.impl().bind(0);
-    glBindTextureUnit(0, colours.id());
-    glBindTextureUnit(1, depths.id());
-    if (masked_by) {
-        glBindTextureUnit(2, masked_by->colour_texture());
-        glBindTextureUnit(3, masked_by->depth_texture());
-    }
-    glProgramUniform4i(program->id(), layers_location, layer_count, left_out, block, 0);
-    program->set(size_location, glm::ivec2(composite.width(), composite.height()));
-    program->use();
-    glBindVertexArray(no_arrays.id());
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    glBindVertexArray(0);
-    for (GLuint unit = 0; unit < 4; ++unit) glBindTextureUnit(unit, 0);
-    ++done.full_screen_passes;
-    return {};
-}
-
-LayerPasses::LayerPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-LayerPasses::LayerPasses(LayerPasses&&) noexcept = default;
-LayerPasses& LayerPasses::operator=(LayerPasses&&) noexcept = default;
-LayerPasses::~LayerPasses() = default;
 
 Result<LayerPasses> LayerPasses::create(const Context& context, int width, int height, const LayerOptions& options) {
     if (auto valid = check_layers(options.most); !valid) return valid.error();

@@ -1,16 +1,13 @@
 // A texture of the image, and a pass over the pixels that it covers.
-#include <initializer_list>
 #include <unseen/render/internal/overlay.h>
 
 #include <algorithm>
-#include <string>
 
 #include <unseen/vdtree/internal/errors.h>
 
-#include "gl.h"
+#include "gpu_plane.h"
 #include "shaders.h"
 #include "surface_pass.h"
-#include "target_impl.h"
 
 namespace unseen::render {
 namespace {
@@ -18,21 +15,18 @@ namespace {
 constexpr unsigned image_unit = 0; // of overlay.frag
 constexpr int place_location = 0, kind_location = 1;
 
-std::string size_text(const OverlayImage& image) {
-    return std::to_string(image.width) + "x" + std::to_string(image.height);
-}
-
 Result<void> check(const OverlayImage& image) {
     if (image.width < 0 || image.height < 0 || (image.width == 0) != (image.height == 0))
-        return invalid_argument("An image to lay over a picture cannot have " + size_text(image) + " pixels.");
+        return invalid_argument("An image to lay over a picture cannot have " + size_text(image.width, image.height) +
+                                " pixels.");
     if (image.pixels.size() != static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height))
-        return invalid_argument("An image of " + size_text(image) + " pixels does not come as " +
+        return invalid_argument("An image of " + size_text(image.width, image.height) + " pixels does not come as " +
                                 std::to_string(image.pixels.size()) + " of them.");
     GLint most = 0;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
     if (image.width <= most && image.height <= most) return {};
-    return unsupported("An image of " + size_text(image) + " pixels cannot be laid over a picture: this OpenGL takes " +
-                       std::to_string(most) + " a side.");
+    return unsupported("An image of " + size_text(image.width, image.height) +
+                       " pixels cannot be laid over a picture: this OpenGL takes " + std::to_string(most) + " a side.");
 }
 
 // What of the image lies in the target, in the target's own rows.
@@ -53,78 +47,56 @@ unsigned kind_of(Output output) { return output == Output::linear ? 0 : output =
 } // namespace
 
 struct Overlay::Impl {
-    explicit Impl(const Context& context_) : context(context_) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { // current for the objects, which go next
-        if (texture) static_cast<void>(context.make_current());
+    explicit Impl(const Context& context_) : context(context_), guard(context_) {}
+
+    Result<void> take(const OverlayImage& image) {
+        if (auto valid = check(image); !valid) return valid;
+        if (!texture || image.width != width || image.height != height) {
+            width = height = 0;
+            texture = {}; // the old one first, so that both need not fit at a time
+            if (image.pixels.empty()) return {};
+            texture = Texture2d::create("overlay");
+            glTextureStorage2D(texture.id(), 1, GL_RGBA8, image.width, image.height);
+            width = image.width;
+            height = image.height;
+        }
+        reset_pixel_stores();
+        glTextureSubImage2D(texture.id(), 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.pixels.data());
+        return {};
     }
 
-    Result<void> take(const OverlayImage& image);
-    Result<void> draw(const Target::Impl& target, glm::ivec2 corner, int attachment) const;
+    Result<void> draw(const Target::Impl& target, glm::ivec2 corner, int attachment) const {
+        const PixelBox box = visible_box(target, corner, width, height);
+        if (box.width == 0 || box.height == 0) return {};
+        Programs& programs = context.impl().programs;
+        const auto program = programs.full_screen("overlay", shaders::overlay_frag);
+        if (!program) return program.error();
+
+        const Output output = target.output(attachment);
+        set_fixed_state(target);
+        set_scissor(box);
+        disable({GL_DEPTH_TEST, GL_CULL_FACE});
+        glEnable(GL_BLEND);
+        glBlendEquation(GL_FUNC_ADD);
+        glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC1_ALPHA);
+        if (output == Output::display) glEnable(GL_FRAMEBUFFER_SRGB); // and so GL decodes, mixes and encodes
+        target.bind(attachment);
+        (*program)->set(place_location, glm::vec4(corner.x, corner.y, target.height, target.top_row_first ? 1 : 0));
+        (*program)->set(kind_location, kind_of(output));
+        glBindTextureUnit(image_unit, texture.id());
+        glBindSampler(image_unit, 0); // a window's other users may have put one there
+        programs.draw_full_screen(**program);
+        disable({GL_BLEND, GL_SCISSOR_TEST});
+        return {};
+    }
 
     Context context; // first, and so gone last
     int width = 0, height = 0;
     Texture2d texture;
-    VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
+    ContextGuard guard;
 };
 
-Result<void> Overlay::Impl::take(const OverlayImage& image) {
-    if (auto valid = check(image); !valid) return valid;
-    if (!texture || image.width != width || image.height != height) {
-        width = height = 0;
-        texture = {}; // the old one first, so that both need not fit at a time
-        if (image.pixels.empty()) return {};
-        texture = Texture2d::create("overlay");
-        glTextureStorage2D(texture.id(), 1, GL_RGBA8, image.width, image.height);
-        if (!no_arrays) no_arrays = VertexArray::create("full screen");
-        width = image.width;
-        height = image.height;
-    }
-    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    for (const GLenum zero :
-         std::initializer_list<GLenum>{GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
-        glPixelStorei(zero, 0);
-    glTextureSubImage2D(texture.id(), 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, image.pixels.data());
-    return {};
-}
-
-Result<void> Overlay::Impl::draw(const Target::Impl& target, glm::ivec2 corner, int attachment) const {
-    const PixelBox box = visible_box(target, corner, width, height);
-    if (box.width == 0 || box.height == 0) return {};
-    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                    {ShaderSource::Stage::fragment, shaders::overlay_frag}};
-    const auto program = context.impl().programs.named("overlay", sources);
-    if (!program) return program.error();
-
-    const Output output = target.output(attachment);
-    set_fixed_state(target);
-    set_scissor(box);
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
-    glEnable(GL_BLEND);
-    glBlendEquation(GL_FUNC_ADD);
-    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC1_ALPHA);
-    if (output == Output::display) glEnable(GL_FRAMEBUFFER_SRGB); // and so GL decodes, mixes and encodes
-    target.bind(attachment);
-    (*program)->set(place_location, glm::vec4(corner.x, corner.y, target.height, target.top_row_first ? 1 : 0));
-    (*program)->set(kind_location, kind_of(output));
-    (*program)->use();
-    glBindTextureUnit(image_unit, texture.id());
-    glBindSampler(image_unit, 0); // a window's other users may have put one there
-    glBindVertexArray(no_arrays.id());
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    glBindVertexArray(0);
-    glDisable(GL_BLEND);
-    glDisable(GL_SCISSOR_TEST);
-    return {};
-}
-
 Overlay::Overlay(const Context& context) : impl_(std::make_unique<Impl>(context)) {}
-Overlay::Overlay(Overlay&&) noexcept = default;
-Overlay& Overlay::operator=(Overlay&&) noexcept = default;
-Overlay::~Overlay() = default;
 
 bool Overlay::has_image() const noexcept { return static_cast<bool>(impl_->texture); }
 

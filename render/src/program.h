@@ -1,8 +1,9 @@
-// A linked shader program.
+// Linked shader programs, and those of a context.
 #pragma once
 
+#include <compare>
+#include <map>
 #include <span>
-#include <string_view>
 
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
@@ -45,6 +46,46 @@ public:
 private:
     explicit Program(ProgramObject object) : object_(std::move(object)) {}
     ProgramObject object_;
+};
+
+// Where a surface's colours go.
+enum class Output {
+    linear,  // as they are, with the luminance in a
+    display, // opaque; the framebuffer encodes them
+    encoded, // opaque, encoded as sRGB by the shader
+    depth,   // nowhere: only depth is drawn
+};
+
+struct ProgramKey {
+    bool lit = false, textured = false, flat = false, wireframe = false;
+    Output output = Output::linear;
+    bool compares = false; // drops pixels that look like a picture: compare.frag
+    bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
+    int casting = 0;       // lights that cast shadows, and are drawn with them
+    bool mask = false;     // writes the shadows' mask as well
+    bool share = false;    // writes which share of its light comes to a surface, and nothing else
+    auto operator<=>(const ProgramKey&) const = default;
+};
+
+// Programs stay where they are as long as this does. Needs a current context for everything.
+class Programs {
+public:
+    Result<const Program*> surface(ProgramKey key);
+    std::size_t surface_count() const noexcept { return surfaces_.size(); }
+
+    // The one program of this label, a literal.
+    Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources,
+                                 std::span<const std::string_view> defines = {});
+
+    // A fragment shader's program for all pixels of a target, and its drawing.
+    Result<const Program*> full_screen(std::string_view label, std::string_view fragment,
+                                       std::initializer_list<std::string_view> defines = {});
+    void draw_full_screen(const Program& program);
+
+private:
+    std::map<ProgramKey, Program> surfaces_;
+    std::map<std::string_view, Program> named_;
+    VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
 };
 
 } // namespace unseen::render

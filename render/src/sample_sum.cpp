@@ -1,12 +1,11 @@
 // Adds up samples in float, and divides the sum in double.
 #include <unseen/render/sample_sum.h>
 
-#include <string>
+#include <numeric>
 
-#include "gl.h"
-#include "sample_count.h"
+#include <unseen/vdtree/internal/split_mix64.h>
+
 #include "shaders.h"
-#include "shadows_impl.h"
 #include "surface_pass.h"
 
 namespace unseen::render {
@@ -24,62 +23,66 @@ Result<void> check(const Sampling& sampling) {
 
 } // namespace
 
+// The permutation of the columns decides everything.
+std::vector<glm::dvec2> n_rooks(int n, std::uint32_t seed) {
+    if (n <= 0) return {};
+    std::vector<int> row_of_column(static_cast<std::size_t>(n));
+    std::iota(row_of_column.begin(), row_of_column.end(), 0);
+    // The pattern must be the same everywhere, which std::shuffle does not promise. The bias of the modulus is below
+    // 2^-55 for the 256 samples there can be.
+    SplitMix64 random(seed);
+    for (std::size_t i = row_of_column.size(); i > 1; --i)
+        std::swap(row_of_column[i - 1], row_of_column[random.next() % i]);
+
+    std::vector<glm::dvec2> points;
+    points.reserve(row_of_column.size());
+    for (std::size_t column = 0; column < row_of_column.size(); ++column)
+        points.emplace_back((static_cast<double>(column) + 0.5) / n, (row_of_column[column] + 0.5) / n);
+    return points;
+}
+
 struct SampleSum::Impl {
     Impl(Target sample_, Target sum_) : sample(std::move(sample_)), sum(std::move(sum_)) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context().make_current()); } // for the objects, which go next
 
-    Result<void> prepare();
-    void begin(float background);
-    void add(const PixelBox* only);
+    Result<void> prepare() {
+        const auto program = context().impl().programs.full_screen("accumulate", shaders::accumulate_frag);
+        if (!program) return program.error();
+        accumulate = *program;
+        pixels.resize(static_cast<std::size_t>(sum.width()) * static_cast<std::size_t>(sum.height()));
+        begin(background);
+        return {};
+    }
+
+    void begin(float background_) {
+        background = background_;
+        count = 0;
+        set_fixed_state(sum.impl());
+        const glm::vec4 nothing(0);
+        glClearNamedFramebufferfv(sum.id(), GL_COLOR, 0, &nothing.x);
+    }
+
+    void add(const PixelBox& only) {
+        ++count;
+        set_fixed_state(sum.impl());
+        set_scissor(only);
+        disable({GL_DEPTH_TEST, GL_CULL_FACE});
+        glEnable(GL_BLEND);
+        glBlendEquation(GL_FUNC_ADD);
+        glBlendFunc(GL_ONE, GL_ONE);
+        sum.impl().bind(0);
+        glBindTextureUnit(0, sample.colour_texture());
+        accumulate->set(background_location, background);
+        context().impl().programs.draw_full_screen(*accumulate);
+    }
+
     const Context& context() const { return sum.impl().context; }
 
     Target sample, sum;
     const Program* accumulate = nullptr;
-    VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
     float background = default_background;
     int count = 0; // of samples that were added
     std::vector<glm::vec4> pixels;
 };
-
-Result<void> SampleSum::Impl::prepare() {
-    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                    {ShaderSource::Stage::fragment, shaders::accumulate_frag}};
-    const auto program = context().impl().programs.named("accumulate", sources);
-    if (!program) return program.error();
-    accumulate = *program;
-    no_arrays = VertexArray::create("full screen");
-    pixels.resize(static_cast<std::size_t>(sum.width()) * static_cast<std::size_t>(sum.height()));
-    begin(background);
-    return {};
-}
-
-void SampleSum::Impl::begin(float background_) {
-    background = background_;
-    count = 0;
-    set_fixed_state(sum.impl());
-    const glm::vec4 nothing(0);
-    glClearNamedFramebufferfv(sum.id(), GL_COLOR, 0, &nothing.x);
-}
-
-void SampleSum::Impl::add(const PixelBox* only) {
-    ++count;
-    set_fixed_state(sum.impl());
-    if (only) set_scissor(*only);
-    glDisable(GL_DEPTH_TEST);
-    glDisable(GL_CULL_FACE);
-    glEnable(GL_BLEND);
-    glBlendEquation(GL_FUNC_ADD);
-    glBlendFunc(GL_ONE, GL_ONE);
-    sum.impl().bind(0);
-    glBindTextureUnit(0, sample.colour_texture());
-    accumulate->set(background_location, background);
-    accumulate->use();
-    glBindVertexArray(no_arrays.id());
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-    glBindVertexArray(0);
-}
 
 Result<SampleSum> SampleSum::create(const Context& context, int width, int height) {
     auto sample = Target::create(context, width, height, {.label = "sample"});
@@ -92,14 +95,8 @@ Result<SampleSum> SampleSum::create(const Context& context, int width, int heigh
     return SampleSum(std::move(impl));
 }
 
-SampleSum::SampleSum(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-SampleSum::SampleSum(SampleSum&&) noexcept = default;
-SampleSum& SampleSum::operator=(SampleSum&&) noexcept = default;
-SampleSum::~SampleSum() = default;
-
 int SampleSum::width() const noexcept { return impl_->sum.width(); }
 int SampleSum::height() const noexcept { return impl_->sum.height(); }
-Target& SampleSum::sample() noexcept { return impl_->sample; }
 
 Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& view, const Sampling& sampling) {
     if (auto valid = check(sampling); !valid) return valid;
@@ -121,24 +118,8 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
             if (sampling.shadows && points.size() > 1)
                 if (auto shifted = sampling.shadows->impl().shift_texels(texels[turn(i)]); !shifted) return shifted;
             pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
-            impl_->add(&used);
+            impl_->add(used);
         }
-        return {};
-    });
-}
-
-Result<void> SampleSum::begin(float background) {
-    if (auto valid = check({.background = background}); !valid) return valid;
-    return in_context(impl_->context(), "Beginning a sum of samples", [&]() -> Result<void> {
-        impl_->begin(background);
-        return {};
-    });
-}
-
-Result<void> SampleSum::add() {
-    if (impl_->count >= most_samples) return check({.samples = impl_->count + 1});
-    return in_context(impl_->context(), "Adding a sample", [&]() -> Result<void> {
-        impl_->add(nullptr);
         return {};
     });
 }

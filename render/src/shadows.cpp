@@ -1,20 +1,15 @@
 // Maps of depth from the lights. Depth is reversed, as everywhere: 1 near the light, 0 at its farthest.
-#include "shadows_impl.h"
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <limits>
 #include <numbers>
-#include <string>
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/gtc/quaternion.hpp>
 
 #include <unseen/vdtree/internal/errors.h>
 
-#include "gl.h"
+#include "query_pool.h"
 #include "surface_pass.h"
 
 namespace unseen::render {
@@ -40,7 +35,6 @@ constexpr int texels_around = 8;
 // Beyond a window's border, in halves of a map's side: what may cover a texel of it by the rounding of single floats.
 constexpr double border_rounding = 1e-4;
 constexpr std::uint64_t texel_bytes = 4;
-constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
 
 bool is_wide(const CastingLight& light) {
     return light.kind == Kind::point || (light.kind == Kind::spot && light.outer_cosine < std::cos(widest_spot));
@@ -170,7 +164,7 @@ Shadows::Impl::Window Shadows::Impl::window_of(const Layer& layer, const Receive
             window.low = glm::min(window.low, at), window.high = glm::max(window.high, at);
         }
     }
-    const double around = 2.0 * texels_around / options.size;
+    const double around = 2.0 * texels_around / size;
     return {glm::max(window.low - around, whole.low), glm::min(window.high + around, whole.high)};
 }
 
@@ -189,17 +183,17 @@ Result<void> Shadows::Impl::reserve(std::size_t wanted) {
                            " maps, and this OpenGL holds at most " + std::to_string(most_layers) +
                            ": let fewer lights cast shadows.");
     maps = Texture2dArray::create("shadow maps");
-    glTextureStorage3D(maps.id(), 1, GL_DEPTH_COMPONENT32F, options.size, options.size, static_cast<GLsizei>(wanted));
+    glTextureStorage3D(maps.id(), 1, GL_DEPTH_COMPONENT32F, size, size, static_cast<GLsizei>(wanted));
     if (glGetError() == GL_OUT_OF_MEMORY) {
         maps = {};
         return unsupported("The graphics memory does not hold the " + std::to_string(wanted) + " shadow maps of " +
-                           std::to_string(options.size) + " texels a side: choose smaller ones, or fewer lights.");
+                           std::to_string(size) + " texels a side: choose smaller ones, or fewer lights.");
     }
     const GLfloat nothing[] = {0, 0, 0, 0}; // infinitely far
     glTextureParameterfv(maps.id(), GL_TEXTURE_BORDER_COLOR, nothing);
-    for (const GLenum wrap : std::initializer_list<GLenum>{GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+    for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
         glTextureParameteri(maps.id(), wrap, GL_CLAMP_TO_BORDER);
-    for (const GLenum filter : std::initializer_list<GLenum>{GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
         glTextureParameteri(maps.id(), filter, GL_NEAREST);
     framebuffer = FramebufferObject::create("shadow maps");
     glNamedFramebufferDrawBuffer(framebuffer.id(), GL_NONE);
@@ -216,9 +210,9 @@ void Shadows::Impl::aim() {
     for (const CastingLight& light : lights) {
         first_layers.push_back(static_cast<int>(layers.size()));
         const glm::dvec3 from = light.position - ball.centre;
-        const double tangent = tangent_of(light, options.size);
+        const double tangent = tangent_of(light, size);
         if (light.kind == Kind::directional) {
-            layers.push_back({directional(light, reach, options.size)});
+            layers.push_back({directional(light, reach, size)});
         } else if (!is_wide(light)) {
             layers.push_back({perspective(from, -light.direction, tangent, near_distance)});
         } else {
@@ -235,15 +229,14 @@ void Shadows::Impl::aim() {
 void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
     const Window& window = layers[layer].window;
     if (window.is_empty()) return;
-    const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(options.size)),
-                     end = glm::ceil((window.high + 1.0) / 2.0 * static_cast<double>(options.size));
+    const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(size)),
+                     end = glm::ceil((window.high + 1.0) / 2.0 * static_cast<double>(size));
     set_scissor({static_cast<int>(first.x), static_cast<int>(first.y), static_cast<int>(end.x - first.x),
                  static_cast<int>(end.y - first.y)});
     glNamedFramebufferTextureLayer(framebuffer.id(), GL_DEPTH_ATTACHMENT, maps.id(), 0, static_cast<GLint>(layer));
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer.id());
     const GLfloat infinitely_far = 0;
     glClearNamedFramebufferfv(framebuffer.id(), GL_DEPTH, 0, &infinitely_far);
-    program.use();
     const glm::dmat4 clip_from_ball =
         glm::translate(glm::dmat4(1), glm::dvec3(shift, 0)) * layers[layer].clip_from_ball;
     for (const Caster& caster : drawn) {
@@ -253,30 +246,20 @@ void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
         const glm::dmat4 clip_from_unit = clip_from_ball * ball_from_unit_of(caster.cut, caster.placement, ball);
         if (is_outside(cut.box, clip_from_unit, window)) continue; // of six maps around a light, most
         cut.uploaded_bytes += tree.put(cut.glides);
-        program.use(); // putting vertices takes another one
         program.set(0, glm::mat4(clip_from_unit));
-        glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
-        glBindVertexArray(tree.arrays.id());
-        for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call)
-            glDrawElements(GL_TRIANGLES,
-                           static_cast<GLsizei>(std::min(most_indices_a_call, cut.indices.count() - first)),
-                           GL_UNSIGNED_INT,
-                           reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
+        draw_triangles(program, tree.arrays, cut.indices);
     }
-    glBindVertexArray(0);
 }
 
 void Shadows::Impl::draw(const Program& program) {
     glQueryCounter(begun.id(), GL_TIMESTAMP);
-    glViewport(0, 0, options.size, options.size);
+    glViewport(0, 0, size, size);
     glDepthRange(0, 1);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glDepthMask(GL_TRUE);
-    for (const GLenum off :
-         std::initializer_list<GLenum>{GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_RASTERIZER_DISCARD, GL_DEPTH_CLAMP,
-                                       GL_POLYGON_OFFSET_FILL, GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND})
-        glDisable(off);
+    disable({GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_RASTERIZER_DISCARD, GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL,
+             GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND});
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); // depth is reversed
     for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(program, layer);
@@ -285,7 +268,7 @@ void Shadows::Impl::draw(const Program& program) {
 }
 
 Result<void> Shadows::Impl::shift_texels(glm::dvec2 by) {
-    const glm::dvec2 wanted = (by - 0.5) * (2.0 / options.size);
+    const glm::dvec2 wanted = (by - 0.5) * (2.0 / size);
     if (lights.empty() || wanted == shift) return {};
     const auto program = context.impl().programs.surface({.output = Output::depth});
     if (!program) return program.error();
@@ -298,7 +281,7 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters, const Receiver
     std::vector<Caster> now;
     now.reserve(casters.size());
     std::optional<std::vector<CastingLight>> found; // of the first item that is lit
-    const Ball around = options.bounds ? *options.bounds : ball_around(casters);
+    const Ball around = bounds ? *bounds : ball_around(casters);
     if (!(around.radius >= 0 && std::isfinite(around.radius)))
         return invalid_argument("Shadows need a scene of a finite size.");
     for (const Item& item : casters) {
@@ -368,9 +351,9 @@ ShadowUniforms Shadows::Impl::uniforms_of(const Item& item) const {
         for (int layer = first_layers[i]; layer < first_layers[i] + layers_of(light); ++layer)
             uniforms.layers.emplace_back(layers[static_cast<std::size_t>(layer)].clip_from_ball * ball_from_unit);
         uniforms.lights.emplace_back(unit_from_world * (light.position - middle) / unit, first_layers[i]);
-        uniforms.kinds.emplace_back(
-            is_wide(light), has_place,
-            has_place ? tangent_of(light, options.size) : window_share(options.size) / (2 * (1 + ball_margin)), 0);
+        uniforms.kinds.emplace_back(is_wide(light), has_place,
+                                    has_place ? tangent_of(light, size) : window_share(size) / (2 * (1 + ball_margin)),
+                                    0);
     }
     return uniforms;
 }
@@ -380,26 +363,21 @@ void Shadows::Impl::bind() const {
     glBindSampler(maps_unit, 0);
 }
 
-Result<Shadows> Shadows::create(const Context& context, const ShadowOptions& options) {
-    auto impl = std::make_unique<Impl>(context, options);
+Result<Shadows> Shadows::create(const Context& context, const std::optional<Ball>& bounds, int size) {
+    auto impl = std::make_unique<Impl>(context, bounds, size);
     auto made = in_context(context, "Making shadows", [&]() -> Result<void> {
         const int most = largest_target_side();
-        if (options.size < least_size || options.size > most)
-            return unsupported("Shadow maps of " + std::to_string(options.size) +
+        if (size < least_size || size > most)
+            return unsupported("Shadow maps of " + std::to_string(size) +
                                " texels a side cannot be drawn: this OpenGL draws from " + std::to_string(least_size) +
                                " to " + std::to_string(most) + ".");
-        if (options.bounds && !(options.bounds->radius >= 0 && std::isfinite(options.bounds->radius)))
+        if (bounds && !(bounds->radius >= 0 && std::isfinite(bounds->radius)))
             return invalid_argument("The ball that shadows reach over must have a finite radius, 0 or more.");
         return {};
     });
     if (!made) return made.error();
     return Shadows(std::move(impl));
 }
-
-Shadows::Shadows(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Shadows::Shadows(Shadows&&) noexcept = default;
-Shadows& Shadows::operator=(Shadows&&) noexcept = default;
-Shadows::~Shadows() = default;
 
 Result<void> Shadows::update(std::span<const Item> casters, const std::optional<std::span<const Item>>& receivers) {
     return in_context(impl_->context, "Drawing shadow maps", [&] { return impl_->update(casters, receivers); });
@@ -409,8 +387,8 @@ ShadowFacts Shadows::counts() const noexcept {
     ShadowFacts facts;
     facts.lights = static_cast<int>(impl_->lights.size());
     facts.maps = static_cast<int>(impl_->layers.size());
-    facts.size = impl_->options.size;
-    const auto side = static_cast<std::uint64_t>(impl_->options.size);
+    facts.size = impl_->size;
+    const auto side = static_cast<std::uint64_t>(impl_->size);
     facts.bytes = texel_bytes * side * side * impl_->map_count;
     facts.redraws = impl_->redraws;
     return facts;
@@ -419,10 +397,7 @@ ShadowFacts Shadows::counts() const noexcept {
 ShadowFacts Shadows::facts() const {
     ShadowFacts facts = counts();
     if (impl_->redraws == 0 || !impl_->context.make_current()) return facts;
-    GLuint64 begun = 0, ended = 0; // ns
-    glGetQueryObjectui64v(impl_->begun.id(), GL_QUERY_RESULT, &begun);
-    glGetQueryObjectui64v(impl_->ended.id(), GL_QUERY_RESULT, &ended);
-    facts.draw_ms = static_cast<double>(ended - begun) * 1e-6;
+    facts.draw_ms = static_cast<double>(result_of(impl_->ended.id()) - result_of(impl_->begun.id())) * 1e-6; // of ns
     return facts;
 }
 

@@ -1,18 +1,8 @@
 // What shadows hold, and what the surface's shader wants to know of them.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <vector>
-
-#include <glm/mat4x4.hpp>
-#include <glm/vec4.hpp>
-
 #include <unseen/render/shadows.h>
 
-#include "context_impl.h"
-#include "gl_object.h"
 #include "gpu_tree_impl.h"
 
 namespace unseen::render {
@@ -37,10 +27,8 @@ struct ShadowUniforms {
 };
 
 struct Shadows::Impl {
-    Impl(const Context& context_, const ShadowOptions& options_) : context(context_), options(options_) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+    Impl(const Context& context_, const std::optional<Ball>& bounds_, int size_)
+        : context(context_), bounds(bounds_), size(size_), guard(context_) {}
 
     // What was drawn, which need not be drawn again.
     struct Caster {
@@ -76,8 +64,9 @@ struct Shadows::Impl {
     ShadowUniforms uniforms_of(const Item& item) const;
     void bind() const;
 
-    Context context; // first, and so gone last
-    ShadowOptions options;
+    Context context;            // first, and so gone last
+    std::optional<Ball> bounds; // as in create()
+    int size;                   // texels a side of a map
     Ball ball;
     double reach = 1; // its radius, or 1 where that is 0
     std::vector<CastingLight> lights;
@@ -90,6 +79,7 @@ struct Shadows::Impl {
     Timestamp begun, ended;
     std::uint64_t redraws = 0;
     glm::dvec2 shift = glm::dvec2(0); // of the maps' windows, in their coordinates
+    ContextGuard guard;
 };
 
 } // namespace unseen::render

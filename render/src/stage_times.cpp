@@ -3,8 +3,7 @@
 
 #include <deque>
 
-#include "context_impl.h"
-#include "gl.h"
+#include "query_pool.h"
 
 namespace unseen::render {
 namespace {
@@ -14,41 +13,22 @@ constexpr std::size_t most_open_frames = 64; // where nobody takes them, the old
 } // namespace
 
 struct StageTimes::Impl {
-    explicit Impl(const Context& context_) : context(context_) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() {
-        if (!context.make_current()) return;
-        open.push_back(std::move(present));
-        for (const auto& frame : open) free.insert(free.end(), frame.begin(), frame.end());
-        glDeleteQueries(static_cast<GLsizei>(free.size()), free.data());
-    }
+    explicit Impl(const Context& context_) : context(context_), queries(context_, GL_TIMESTAMP) {}
 
     void stamp() {
-        GLuint query = 0;
-        if (free.empty()) {
-            glCreateQueries(GL_TIMESTAMP, 1, &query);
-        } else {
-            query = free.back();
-            free.pop_back();
-        }
-        glQueryCounter(query, GL_TIMESTAMP);
-        present.push_back(query);
+        present.push_back(queries.take());
+        glQueryCounter(present.back(), GL_TIMESTAMP);
     }
     void forget(std::vector<GLuint>& frame) {
-        free.insert(free.end(), frame.begin(), frame.end());
+        for (const GLuint query : frame) queries.put_back(query);
         frame.clear();
     }
 
-    Context context; // first, and so gone last
-    std::vector<GLuint> present, free;
+    Context context;
+    QueryPool queries;
+    std::vector<GLuint> present;
     std::deque<std::vector<GLuint>> open;
 };
-
-StageTimes::StageTimes(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-StageTimes::StageTimes(StageTimes&&) noexcept = default;
-StageTimes& StageTimes::operator=(StageTimes&&) noexcept = default;
-StageTimes::~StageTimes() = default;
 
 Result<StageTimes> StageTimes::create(const Context& context) {
     if (auto current = context.make_current(); !current) return current.error();
@@ -78,14 +58,11 @@ std::vector<std::vector<double>> StageTimes::take() {
     if (!impl_->context.make_current()) return frames;
     while (!impl_->open.empty()) {
         auto& stamps = impl_->open.front();
-        GLuint is_there = GL_FALSE;
-        glGetQueryObjectuiv(stamps.back(), GL_QUERY_RESULT_AVAILABLE, &is_there);
-        if (is_there == GL_FALSE) break;
+        if (!is_there(stamps.back())) break;
         std::vector<double>& stages = frames.emplace_back();
         GLuint64 before = 0;
         for (std::size_t i = 0; i < stamps.size(); ++i) {
-            GLuint64 nanoseconds = 0;
-            glGetQueryObjectui64v(stamps[i], GL_QUERY_RESULT, &nanoseconds);
+            const GLuint64 nanoseconds = result_of(stamps[i]);
             if (i > 0) stages.push_back(static_cast<double>(nanoseconds - before) * 1e-6);
             before = nanoseconds;
         }

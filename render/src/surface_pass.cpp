@@ -2,20 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <limits>
-#include <string>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 
-#include "gl.h"
-
 namespace unseen::render {
 namespace {
-
-constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
 
 constexpr float brightest_light = 1e6f; // times white: far beyond what shows any texel
 
@@ -129,11 +122,9 @@ void set_fixed_state(const Target::Impl& target) {
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glDepthMask(GL_TRUE);
-    for (GLenum off : std::initializer_list<GLenum>{GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD,
-                                                    GL_COLOR_LOGIC_OP, GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL,
-                                                    GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_PRIMITIVE_RESTART,
-                                                    GL_FRAMEBUFFER_SRGB})
-        glDisable(off);
+    disable({GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD, GL_COLOR_LOGIC_OP, GL_DEPTH_CLAMP,
+             GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_PRIMITIVE_RESTART,
+             GL_FRAMEBUFFER_SRGB});
     glEnable(GL_MULTISAMPLE);
 }
 
@@ -319,15 +310,7 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
 
     item.program->set(clip_from_unit_location, jittered(item.projection, view_, point));
     if (output_ != Output::depth) set_colours(item, lod_bias);
-    item.program->use();
-    glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
-    glBindVertexArray(tree.arrays.id());
-    for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call) {
-        const std::uint64_t count = std::min(most_indices_a_call, cut.indices.count() - first);
-        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT,
-                       reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
-    }
-    glBindVertexArray(0);
+    draw_triangles(*item.program, tree.arrays, cut.indices);
 }
 
 void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
@@ -363,6 +346,36 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
         program.set(uv_bounds_location, tree.texture->uv_bounds());
         tree.texture->bind();
     }
+}
+
+// ---- for callers
+
+Result<void> draw(std::span<const Item> items, const Camera& camera, Target& target, const Clear& clear,
+                  int attachment) {
+    const Target::Impl& to = target.impl();
+    return in_context(to.context, "Drawing", [&]() -> Result<void> {
+        const auto pass = SurfacePass::prepare(items, camera, to, attachment);
+        if (!pass) return pass.error();
+        pass->draw(to, camera.point, clear);
+        return {};
+    });
+}
+
+Result<PixelBox> pixels_of(std::span<const Item> items, const vdtree::View& view) {
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    const auto projections = projections_of(items, view, {});
+    if (!projections) return projections.error();
+    ShownPixels shown(view);
+    for (std::size_t i = 0; i < items.size(); ++i)
+        shown.add((*projections)[i], items[i].cut.impl().box, glm::dvec2(0.5));
+    return shown.box();
+}
+
+Result<double> near_plane(std::span<const Item> items, const vdtree::View& view) {
+    if (auto valid = vdtree::validate_perspective(view, "A near plane"); !valid) return valid.error();
+    const auto projections = projections_of(items, view, {});
+    if (!projections) return projections.error();
+    return projections->empty() ? 1.0 : projections->front().near_plane;
 }
 
 } // namespace unseen::render

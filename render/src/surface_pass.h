@@ -1,24 +1,18 @@
 // Draws a scene's items; what has to be found out about them is found out once for any number of draws.
 #pragma once
 
-#include <limits>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <glm/mat4x4.hpp>
-#include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
-
-#include <unseen/render/draw.h>
-
-#include "camera.h"
-#include "gpu_tree_impl.h"
-#include "program.h"
 #include "shadows_impl.h"
 #include "target_impl.h"
 
 namespace unseen::render {
+
+inline constexpr int most_samples = 256; // beyond, a sum's rounding in float would outgrow what a sample adds to it
+
+inline Result<void> check_samples(int samples) {
+    if (samples >= 1 && samples <= most_samples) return {};
+    return Error{ErrorCode::invalid_argument, "The samples a pixel must be from 1 to " + std::to_string(most_samples) +
+                                                  ", not " + std::to_string(samples) + "."};
+}
 
 // Which pixels of a window things can show in.
 class ShownPixels {

@@ -3,13 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <initializer_list>
-#include <string>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
-#include <unseen/vdtree/internal/texture_pyramid.h>
 
 #include "gl.h"
 
@@ -63,21 +56,13 @@ Level halved(int width, int height, Pixel&& pixel) {
     return level;
 }
 
-void set_unpacking() {
-    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    for (const GLenum zero :
-         std::initializer_list<GLenum>{GL_UNPACK_ROW_LENGTH, GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
-        glPixelStorei(zero, 0);
-}
-
 void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels) {
     const int width = static_cast<int>(texture.width), height = static_cast<int>(texture.height);
     const auto texel = [&](int x, int y) {
         return glm::vec3(vdtree::linear_colour(
             texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)]));
     };
-    set_unpacking();
+    reset_pixel_stores();
     std::vector<glm::vec3> row(texture.width);
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) row[static_cast<std::size_t>(x)] = texel(x, y);

@@ -2,13 +2,10 @@
 #include "target_impl.h"
 
 #include <algorithm>
-#include <initializer_list>
-#include <string>
 
 #include <unseen/vdtree/internal/errors.h>
 
-#include "gl.h"
-#include "luminance_texture.h"
+#include "gpu_plane.h"
 
 namespace unseen::render {
 namespace {
@@ -32,10 +29,6 @@ Result<void> check(int width, int height, const TargetOptions& options) {
     const int attachments = std::min(limit(GL_MAX_COLOR_ATTACHMENTS), limit(GL_MAX_DRAW_BUFFERS));
     if (options.colours.size() > static_cast<std::size_t>(attachments))
         return unsupported("This OpenGL draws at most " + std::to_string(attachments) + " colours into a target.");
-    const int samples = std::min(limit(GL_MAX_SAMPLES), limit(GL_MAX_DEPTH_TEXTURE_SAMPLES));
-    if (options.samples < 0 || options.samples > samples)
-        return unsupported("This OpenGL draws at most " + std::to_string(samples) + " samples a pixel, not " +
-                           std::to_string(options.samples) + ".");
     return {};
 }
 
@@ -65,10 +58,7 @@ std::size_t pixel_count(const PixelBox& part) {
 // GL keeps pixels in the order of its own rows.
 void read(const Target::Impl& from, const PixelBox& part, GLenum format, std::size_t channels,
           std::span<float> values) {
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    for (const GLenum zero : std::initializer_list<GLenum>{GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS})
-        glPixelStorei(zero, 0);
-    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    reset_pixel_stores();
     glBindFramebuffer(GL_READ_FRAMEBUFFER, from.id);
     const int first_row = from.top_row_first ? part.top : from.height - part.top - part.height;
     glReadPixels(part.left, first_row, part.width, part.height, format, GL_FLOAT, values.data());
@@ -111,20 +101,13 @@ int largest_target_side() {
 
 Result<void> Target::Impl::make(const TargetOptions& options) {
     if (auto valid = check(width, height, options); !valid) return valid;
-    samples = options.samples;
     has_depth = options.depth;
     framebuffer = FramebufferObject::create(options.label);
     id = framebuffer.id();
     const auto attach = [&](GLenum where, GLenum format, Texture2d& texture) {
-        if (samples > 0) {
-            buffers.push_back(Renderbuffer::create(options.label));
-            glNamedRenderbufferStorageMultisample(buffers.back().id(), samples, format, width, height);
-            glNamedFramebufferRenderbuffer(id, where, GL_RENDERBUFFER, buffers.back().id());
-        } else {
-            texture = Texture2d::create(options.label);
-            glTextureStorage2D(texture.id(), 1, format, width, height);
-            glNamedFramebufferTexture(id, where, texture.id(), 0);
-        }
+        texture = Texture2d::create(options.label);
+        glTextureStorage2D(texture.id(), 1, format, width, height);
+        glNamedFramebufferTexture(id, where, texture.id(), 0);
     };
     for (const ColourFormat format : options.colours) {
         attach(colour_attachment(outputs.size()), gl_format(format), colours.emplace_back());
@@ -178,7 +161,7 @@ Result<void> Target::Impl::check_attachment(int attachment) const {
 
 // A window's samples are resolved by GL itself.
 Result<void> Target::Impl::check_readable() const {
-    if (samples > 0 && id != 0) return invalid_argument("A target with samples is resolved before it is read.");
+    if (samples > 0 && id != 0) return invalid_argument("A framebuffer with samples is resolved before it is read.");
     return {};
 }
 
@@ -203,11 +186,6 @@ Result<Target> Target::foreign(const Context& context, int width, int height, co
     return Target(std::move(impl));
 }
 
-Target::Target(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Target::Target(Target&&) noexcept = default;
-Target& Target::operator=(Target&&) noexcept = default;
-Target::~Target() = default;
-
 int Target::width() const noexcept { return impl_->width; }
 int Target::height() const noexcept { return impl_->height; }
 unsigned Target::id() const noexcept { return impl_->id; }
@@ -217,33 +195,16 @@ unsigned Target::colour_texture(int attachment) const noexcept {
     return number < impl_->colours.size() ? impl_->colours[number].id() : 0;
 }
 
-Result<void> resolve(const Target& from, Target& to) {
-    const Target::Impl &source = from.impl(), &result = to.impl();
-    if (source.width != result.width || source.height != result.height || source.outputs != result.outputs ||
-        source.top_row_first != result.top_row_first)
-        return invalid_argument("Samples are resolved into a target of the same size and format.");
-    return in_context(source.context, "Resolving samples", [&]() -> Result<void> {
-        glDisable(GL_SCISSOR_TEST);
-        glEnable(GL_FRAMEBUFFER_SRGB); // means of light, not of codes
-        for (std::size_t i = 0; i < source.outputs.size(); ++i) {
-            if (!source.is_foreign) glNamedFramebufferReadBuffer(source.id, colour_attachment(i));
-            if (!result.is_foreign) glNamedFramebufferDrawBuffer(result.id, colour_attachment(i));
-            glBlitNamedFramebuffer(source.id, result.id, 0, 0, source.width, source.height, 0, 0, result.width,
-                                   result.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-        }
-        return {};
-    });
-}
-
 Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment, const std::optional<PixelBox>& part) {
     const Target::Impl& from = target.impl();
     const PixelBox box = part.value_or(from.whole());
     if (auto valid = from.check_attachment(attachment); !valid) return valid.error();
     if (auto valid = check_part(box, from.width, from.height, "the target"); !valid) return valid.error();
-    std::vector<glm::vec4> pixels(pixel_count(box));
-    auto read = in_context(from.context, "Reading pixels", [&] { return from.read_colour(attachment, box, pixels); });
-    if (!read) return read.error();
-    return pixels;
+    return in_context(from.context, "Reading pixels", [&]() -> Result<std::vector<glm::vec4>> {
+        std::vector<glm::vec4> pixels(pixel_count(box));
+        if (auto read = from.read_colour(attachment, box, pixels); !read) return read.error();
+        return pixels;
+    });
 }
 
 Result<std::vector<float>> read_luminance(const Target& target, int attachment) {
@@ -262,14 +223,12 @@ Result<std::vector<float>> read_depth(const Target& target, const std::optional<
     const PixelBox box = part.value_or(from.whole());
     if (!from.has_depth) return invalid_argument("The target has no depth.");
     if (auto valid = check_part(box, from.width, from.height, "the target"); !valid) return valid.error();
-    std::vector<float> depth(pixel_count(box));
-    auto done = in_context(from.context, "Reading depth", [&]() -> Result<void> {
-        if (auto valid = from.check_readable(); !valid) return valid;
+    return in_context(from.context, "Reading depth", [&]() -> Result<std::vector<float>> {
+        if (auto valid = from.check_readable(); !valid) return valid.error();
+        std::vector<float> depth(pixel_count(box));
         read(from, box, GL_DEPTH_COMPONENT, 1, depth);
-        return {};
+        return depth;
     });
-    if (!done) return done.error();
-    return depth;
 }
 
 } // namespace unseen::render

@@ -1,14 +1,9 @@
 // What a target holds.
 #pragma once
 
-#include <optional>
-#include <span>
-#include <vector>
-
 #include <unseen/render/target.h>
 
 #include "context_impl.h"
-#include "gl_object.h"
 
 namespace unseen::render {
 
@@ -16,10 +11,8 @@ namespace unseen::render {
 Result<void> check_part(const PixelBox& part, int width, int height, const char* what);
 
 struct Target::Impl {
-    Impl(const Context& context_, int width_, int height_) : context(context_), width(width_), height(height_) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+    Impl(const Context& context_, int width_, int height_)
+        : context(context_), width(width_), height(height_), guard(context_) {}
 
     Result<void> make(const TargetOptions& options);
     Result<void> adopt(const ForeignFramebuffer& foreign);
@@ -39,16 +32,16 @@ struct Target::Impl {
 
     Context context; // first, and so gone last
     int width, height;
-    int samples = 0;
+    int samples = 0; // of the hardware, in foreign ones
     unsigned id = 0;
     FramebufferObject framebuffer; // what id names, unless it is foreign
     bool is_foreign = false;
     bool top_row_first = true;
     bool has_depth = true;
-    std::vector<Output> outputs;    // of the attachments
-    std::vector<Texture2d> colours; // without samples
+    std::vector<Output> outputs; // of the attachments
+    std::vector<Texture2d> colours;
     Texture2d depth;
-    std::vector<Renderbuffer> buffers; // with samples: colours, depth
+    ContextGuard guard;
 };
 
 } // namespace unseen::render

@@ -1,19 +1,13 @@
 // Checks what is asked for, and hands it to the shader.
-#include <initializer_list>
 #include <unseen/render/internal/test_pattern.h>
 
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
-#include <string>
 
 #include <unseen/render/target.h>
 #include <unseen/vdtree/internal/errors.h>
 
 #include "context_impl.h"
-#include "gl.h"
-#include "program.h"
 #include "shaders.h"
 
 namespace unseen::render {
@@ -55,24 +49,42 @@ Result<void> check(const TestPattern& p) {
 } // namespace
 
 struct TestPatternDrawer::Impl {
-    explicit Impl(const Context& context_) : context(context_) {}
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+    explicit Impl(const Context& context_) : context(context_), guard(context_) {}
 
     Context context; // first, and so gone last
     const Program* program = nullptr;
     Buffer levels;
-    VertexArray no_arrays;
     std::optional<Target> target; // made for the first pattern off screen, and for each of another size
+    ContextGuard guard;
 
-    void draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first);
+    void draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first) {
+        const auto vec4 = [](double x, double y, double z, double w) {
+            return glm::vec4(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z),
+                             static_cast<float>(w));
+        };
+        program->set(kind_location, static_cast<unsigned>(p.kind));
+        program->set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
+        program->set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
+        program->set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
+        program->set(chart_location,
+                     vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
+        program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
+        program->set(frame_location, p.frame);
+        for (std::size_t i = 0; i < p.marks.size(); ++i)
+            program->set(marks_location + static_cast<int>(i),
+                         vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
+
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
+        glViewport(0, 0, width, height);
+        disable(
+            {GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER});
+        glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+        glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+        glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+        glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, levels.id());
+        context.impl().programs.draw_full_screen(*program);
+    }
 };
-
-TestPatternDrawer::TestPatternDrawer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-TestPatternDrawer::TestPatternDrawer(TestPatternDrawer&&) noexcept = default;
-TestPatternDrawer& TestPatternDrawer::operator=(TestPatternDrawer&&) noexcept = default;
-TestPatternDrawer::~TestPatternDrawer() = default;
 
 Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std::span<const double> code_luminances) {
     if (code_luminances.size() != code_count)
@@ -86,13 +98,10 @@ Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std:
     }
     auto impl = std::make_unique<Impl>(context);
     auto made = in_context(context, "Making test patterns", [&]() -> Result<void> {
-        const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                        {ShaderSource::Stage::fragment, shaders::test_pattern_frag}};
-        const auto program = context.impl().programs.named("test pattern", sources);
+        const auto program = context.impl().programs.full_screen("test pattern", shaders::test_pattern_frag);
         if (!program) return program.error();
         impl->program = *program;
         impl->levels = Buffer::create("code luminances");
-        impl->no_arrays = VertexArray::create("full screen");
         glNamedBufferStorage(impl->levels.id(), sizeof(levels), levels.data(), 0);
         return {};
     });
@@ -100,42 +109,9 @@ Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std:
     return TestPatternDrawer(std::move(impl));
 }
 
-void TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first) {
-    const auto vec4 = [](double x, double y, double z, double w) {
-        return glm::vec4(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z), static_cast<float>(w));
-    };
-    program->set(kind_location, static_cast<unsigned>(p.kind));
-    program->set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
-    program->set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
-    program->set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
-    program->set(chart_location,
-                 vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
-    program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
-    program->set(frame_location, p.frame);
-    for (std::size_t i = 0; i < p.marks.size(); ++i)
-        program->set(marks_location + static_cast<int>(i),
-                     vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
-
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
-    glViewport(0, 0, width, height);
-    for (const GLenum off : std::initializer_list<GLenum>{GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST,
-                                                          GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER})
-        glDisable(off);
-    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
-    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, levels.id());
-    glBindVertexArray(no_arrays.id());
-    program->use();
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-}
-
 Result<void> TestPatternDrawer::draw_to_window(const TestPattern& pattern, int width, int height) {
     if (auto ok = check(pattern); !ok) return ok;
-    return in_context(impl_->context, "Drawing a test pattern", [&]() -> Result<void> {
-        impl_->draw(pattern, width, height, 0, false);
-        return {};
-    });
+    return in_context(impl_->context, "Drawing a test pattern", [&] { impl_->draw(pattern, width, height, 0, false); });
 }
 
 Result<std::vector<float>> TestPatternDrawer::draw(const TestPattern& pattern, int width, int height) {
@@ -146,10 +122,8 @@ Result<std::vector<float>> TestPatternDrawer::draw(const TestPattern& pattern, i
         if (!made) return made.error();
         target = std::move(*made);
     }
-    auto drawn = in_context(impl_->context, "Drawing a test pattern", [&]() -> Result<void> {
-        impl_->draw(pattern, width, height, target->id(), true);
-        return {};
-    });
+    auto drawn = in_context(impl_->context, "Drawing a test pattern",
+                            [&] { impl_->draw(pattern, width, height, target->id(), true); });
     if (!drawn) return drawn.error();
     const auto pixels = read_pixels(*target);
     if (!pixels) return pixels.error();

@@ -1,16 +1,25 @@
-// Overwrites single vertices of a vertex buffer on the GPU, for a geomorph's frames.
+// Vertices on the GPU, and overwriting single ones of a buffer, for a geomorph's frames.
 #pragma once
 
-#include <cstdint>
-#include <span>
-
-#include "gl_object.h"
-
 #include "gl.h"
-#include "programs.h"
-#include "vertex.h"
+#include "program.h"
+#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::render {
+
+// A vertex as the GPU keeps it.
+struct Vertex {
+    glm::vec3 position; // in the unit ball around the model
+    glm::vec4 shade;    // linear RGB; relative luminance in a
+};
+static_assert(sizeof(Vertex) == 28, "the vertex layout and move.comp count on it");
+
+// What lights want to know of it, in a buffer of its own that is made when there are some.
+struct LitVertex {
+    vdtree::PackedNormal normal;
+    float albedo;
+};
+static_assert(sizeof(LitVertex) == 8);
 
 struct VertexMove {
     std::uint32_t vertex = 0;

@@ -1,5 +1,4 @@
 // Window contexts through GLFW.
-#include <string>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>

@@ -2,7 +2,7 @@
 #include <unseen/session_gpu/as_seen.h>
 
 #include <unseen/perception/judge.h>
-#include <unseen/render/internal/depth.h>
+#include <unseen/render/internal/frame.h>
 #include <unseen/render/renderer.h>
 
 #include "built.h"

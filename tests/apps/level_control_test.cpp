@@ -5,8 +5,8 @@
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
+#include <unseen/session_gpu/internal/level_pictures.h>
 #include <unseen/session_gpu/picture_judge.h>
-#include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
 #include "gl_test.h"

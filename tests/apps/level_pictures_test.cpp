@@ -1,7 +1,8 @@
 // Pictures of objects alone, put together, against pictures of the whole scene; and selections for cameras of a scene.
 #include <unseen/session_gpu/precompute_selections.h>
 
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selections.h>
+#include <unseen/session_gpu/internal/level_pictures.h>
 
 #include "gl_test.h"
 #include "measured.h"
@@ -116,7 +117,8 @@ TEST_F(PrecomputeTest, OfSpaceHasSixDirectionsAndCanBeFollowed) {
     const auto selections = require(read_selections(folder / "space.sel"));
     EXPECT_EQ(selections->directions(), 6);
     auto pictures = require(LevelPictures::create(context(), session));
-    auto follower = require(SelectionFollower::create(*selections, session.scene(), pictures->triangles()));
+    auto follower =
+        require(SelectionFollower::create(Selections(*selections), session.scene(), pictures->triangles()));
     for (int i = 0; i < 40; ++i) {
         vdtree::View view = ahead();
         view.eye = {0, 0.1 * i, 0.2 * i}, view.target = view.eye + glm::dvec3(std::sin(0.2 * i), 0, -std::cos(0.2 * i));

@@ -32,7 +32,7 @@ std::uint64_t seen(const render::Context& context, const Session& session, const
     cuts.push_back(lod.objects[0].cut(level));
     const auto verdict = judge->judge(cuts);
     EXPECT_TRUE(verdict) << verdict.error().message;
-    return verdict->visible + verdict->second_visible;
+    return verdict->visible_pixels + verdict->second_visible_pixels;
 }
 
 TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {

@@ -367,7 +367,7 @@ TEST_F(MaskedSceneTest, DoesNotCountForGazesThatAreUnsure) {
     Session session = session_of(grate(12, 1.5));
     session.set_gaze(Gaze{{20, 20}, 1});
     const auto made = require(simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, masked));
-    const auto effect = std::ranges::find(made->passes, "masking", &PassEffect::name);
+    const auto effect = std::ranges::find(made->passes, "masking", &Effect::name);
     ASSERT_NE(effect, made->passes.end());
     EXPECT_FALSE(effect->on);
     EXPECT_THAT(effect->why, HasSubstr("not known for sure"));
@@ -392,11 +392,11 @@ protected:
         }
         return *Session::create(std::move(scene));
     }
-    std::vector<PassEffect> passes(Session& session, AsSeenOptions options = {.masking = Masking::scene}) {
+    std::vector<Effect> passes(Session& session, AsSeenOptions options = {.masking = Masking::scene}) {
         options.samples = 4;
         const auto made = simplify_as_seen(session, context(), view(), {.purpose = Purpose::picture}, options);
         EXPECT_TRUE(made) << made.error().message;
-        for (const PassEffect& effect : made->passes) {
+        for (const Effect& effect : made->passes) {
             EXPECT_FALSE(effect.why.empty()) << effect.name;
             const bool was_drawn = effect.surface_passes > 0;
             EXPECT_EQ(was_drawn, effect.texture_bytes > 0) << effect.name;
@@ -404,8 +404,8 @@ protected:
         }
         return made->passes;
     }
-    static const PassEffect& of(const std::vector<PassEffect>& passes, const char* name) {
-        return *std::ranges::find(passes, name, &PassEffect::name);
+    static const Effect& of(const std::vector<Effect>& passes, const char* name) {
+        return *std::ranges::find(passes, name, &Effect::name);
     }
     static constexpr std::uint64_t pixels = side * side;
 };
@@ -471,7 +471,7 @@ TEST_F(PassesTest, OfShadowsAreThereWhereALightCastsSome) {
 
 TEST_F(PassesTest, AllOfThemWhereAllIsCalledFor) {
     Session session = session_of(true, grate(12, 1.5), true);
-    for (const PassEffect& effect : passes(session)) EXPECT_TRUE(effect.on) << effect.name << ": " << effect.why;
+    for (const Effect& effect : passes(session)) EXPECT_TRUE(effect.on) << effect.name << ": " << effect.why;
 }
 
 TEST_F(PassesTest, AreDrawnOnceForACameraThatStandsStill) {

@@ -13,7 +13,7 @@
 #include <unseen/calibration/calibration.h>
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/image.h>
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selections.h>
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -208,7 +208,7 @@ void make_texts(const fs::path& folder) {
 // The first byte chooses the reader: see selection_fuzz.cpp.
 void make_selections(const fs::path& folder) {
     namespace session = unseen::session;
-    session::Selections selections;
+    session::Selections::Data selections;
     selections.budget = 1000;
     selections.triangles = {{900, 300, 100}, {80}};
     const auto corner_at = [&](const session::LatticePoint& place) {

@@ -11,7 +11,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selections.h>
 
 #include "memory_file.h"
 #include "target.h"

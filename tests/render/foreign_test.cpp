@@ -119,7 +119,7 @@ TEST(Adopt, DrawsAsInAContextOfItsOwn) {
     const auto expected = require(drawn_in(*own, scene));
     EglContext egl;
     SKIP_WITHOUT(egl);
-    const auto adopted = Context::adopt({.make_current = [&] { egl.make_current(); }});
+    const auto adopted = Context::adopt([&] { egl.make_current(); });
     ASSERT_TRUE(adopted) << adopted.error().message;
     EXPECT_EQ(require(drawn_in(*adopted, scene))->luminance, expected->luminance);
     EXPECT_EQ(adopted->take_errors(), "");
@@ -275,9 +275,9 @@ TEST(Adopt, DeletesNothingOfAnotherContextWhenItsOwnIsGone) {
     const Scene scene(render::testing::bumpy_sphere(12));
     egl->make_current();
     bool is_gone = false;
-    auto adopted = Context::adopt({.make_current = [&] {
+    auto adopted = Context::adopt([&] {
         if (!is_gone) egl->make_current();
-    }});
+    });
     ASSERT_TRUE(adopted) << adopted.error().message;
     std::optional<Renderer> renderer;
     {
@@ -405,7 +405,7 @@ TEST(PlainGlSample, DrawsWhatTheRendererDrawsInAWindow) {
     if (!window) GTEST_SKIP() << "no window with OpenGL 4.5";
     glfwMakeContextCurrent(window);
     {
-        const auto context = Context::adopt({.make_current = [&] { glfwMakeContextCurrent(window); }});
+        const auto context = Context::adopt([&] { glfwMakeContextCurrent(window); });
         ASSERT_TRUE(context) << context.error().message;
         expect_the_renderers_picture(*context, {0, 0});
         EXPECT_EQ(context->take_errors(), "");

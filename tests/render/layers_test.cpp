@@ -215,7 +215,7 @@ TEST_F(LayersTest, ShadowsOnALayerMaskWhatIsBehindItAndItsOwnDoNot) {
     const std::vector<Item> objects = {screen, board}, background = {wall}, all = {screen, board, wall},
                             others = {board, wall};
     const View view = ahead(64, 64);
-    auto shadows = Shadows::create(context(), {.size = 1024}), by_others = Shadows::create(context(), {.size = 1024});
+    auto shadows = Shadows::create(context(), {}, 1024), by_others = Shadows::create(context(), {}, 1024);
     ASSERT_TRUE(shadows->update(all) && by_others->update(others));
     const auto at = [](const std::vector<glm::vec4>& pixels, double x, double y, double z) {
         const double focal = 32 / std::tan(ahead(64, 64).fov_y_degrees * std::acos(-1.0) / 360);

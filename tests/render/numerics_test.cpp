@@ -37,7 +37,7 @@ TEST_F(Numerics, ShadowMapsAtGrazingLight) {
         GpuCut cut(*GpuTree::create(context(), floor.tree));
         ASSERT_TRUE(cut.follow(floor.cut));
         const std::vector<Item> items = {{cut, {}, Shading::smooth, false, lighting}};
-        auto shadows = require(Shadows::create(context(), {.size = map_px}));
+        auto shadows = require(Shadows::create(context(), {}, map_px));
         ASSERT_TRUE(shadows->update(items));
         auto target = require(Target::create(context(), window_px, window_px,
                                              {.colours = {ColourFormat::rgba32f, ColourFormat::rgba32f}}));

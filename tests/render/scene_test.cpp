@@ -125,14 +125,6 @@ TEST_F(SceneTest, SamplesAreAddedAcrossItems) {
         difference += std::abs(drawn[i].a - expected[i].a) / static_cast<double>(drawn.size());
     EXPECT_LT(difference, most_flipped * 0.1) << "flipped samples differ by a part of the range";
     EXPECT_EQ(drawn[0].a, default_background);
-
-    // By hand: the same bits.
-    ASSERT_TRUE(sum->begin(default_background));
-    for (const glm::dvec2 point : n_rooks(8, 1)) {
-        ASSERT_TRUE(draw(items, {.view = oblique_view(), .point = point}, sum->sample()));
-        ASSERT_TRUE(sum->add());
-    }
-    EXPECT_TRUE(std::ranges::equal(*require(sum->mean()), drawn));
 }
 
 TEST_F(SceneTest, OneTreeIsSharedByCutsOfItsOwn) {
@@ -244,28 +236,17 @@ TEST_F(SceneTest, DisplaysGetOpaqueSrgb) {
     }
 }
 
-TEST_F(SceneTest, HardwareSamplesSmoothEdges) {
-    const Scene scene(triangle({-0.83, -0.71, 0}, {0.77, -0.52, 0}, {-0.11, 0.86, 0}, 1, 1, 1));
-    const Item item{.cut = cut_on_gpu(scene)};
-    Target many = target({.samples = 4}), one = target();
-    ASSERT_TRUE(draw({&item, 1}, {.view = frontal_view(window, window)}, many, {.colour = glm::vec4(0)}));
-    ASSERT_TRUE(resolve(many, one));
-    const auto smooth = *read_luminance(one);
-    const auto between = std::ranges::count_if(smooth, [](float l) { return l > 0.1f && l < 0.9f; });
-    EXPECT_GT(between, window) << "edges are mixed";
-    const auto hard = picture({item}, frontal_view(window, window));
-    EXPECT_EQ(std::ranges::count_if(hard, [](float l) { return l > 0.3f && l < 0.9f; }), 0);
-}
-
 TEST_F(SceneTest, AnEmptySceneIsTheBackground) {
     EXPECT_THAT(picture({}, oblique_view()), Each(default_background));
     auto sum = require(SampleSum::create(context(), 4, 4));
     ASSERT_TRUE(sum->draw({}, frontal_view(4, 4), {.samples = 3, .background = 0.4f}));
     EXPECT_THAT(*sum->mean(), Each(glm::vec4(0.4f)));
-    ASSERT_TRUE(sum->begin(0.4f));
-    for (int i = 0; i < 256; ++i) ASSERT_TRUE(sum->add());
-    EXPECT_FALSE(sum->add()) << "the sum's rounding would show";
-    EXPECT_FALSE(sum->begin(std::numeric_limits<float>::quiet_NaN()));
+    const auto drawn = [&](const Sampling& sampling) {
+        return sum->draw({}, frontal_view(4, 4), sampling).has_value();
+    };
+    EXPECT_TRUE(drawn({.samples = 256}));
+    EXPECT_FALSE(drawn({.samples = 257})) << "the sum's rounding would show";
+    EXPECT_FALSE(drawn({.background = std::numeric_limits<float>::quiet_NaN()}));
     GpuCut untouched(on_gpu(Scene(cube())));
     EXPECT_THAT(picture({{.cut = untouched}}, oblique_view()), Each(default_background)) << "it follows no cut yet";
 }

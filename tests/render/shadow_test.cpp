@@ -82,7 +82,7 @@ protected:
                 if (light.kind != Kind::directional) light.position -= scene->tree.origin();
             items.push_back({cut, {}, Shading::smooth, false, own});
         }
-        auto shadows = Shadows::create(context(), {.size = map_px});
+        auto shadows = Shadows::create(context(), {}, map_px);
         EXPECT_TRUE(shadows);
         const auto updated = shadows->update(items);
         EXPECT_TRUE(updated) << updated.error().message;
@@ -264,7 +264,7 @@ TEST_F(ShadowTest, CostsNothingWhereNoLightCastsOne) {
     ASSERT_TRUE(render::draw(items, {.view = from_above()}, *target));
     const auto without = *read_pixels(*target);
     const std::size_t programs = context().impl().programs.surface_count();
-    auto shadows = Shadows::create(context(), {.size = map_px});
+    auto shadows = Shadows::create(context(), {}, map_px);
     ASSERT_TRUE(shadows->update(items));
     ASSERT_TRUE(render::draw(items, {.view = from_above(), .shadows = &*shadows}, *target));
     EXPECT_EQ(*read_pixels(*target), without); // to the bit
@@ -281,7 +281,7 @@ TEST_F(ShadowTest, MapsAreDrawnAgainOnlyWhereSomethingChanged) {
     GpuCut cut(*GpuTree::create(context(), sphere.tree));
     ASSERT_TRUE(cut.follow(sphere.cut));
     std::vector<Item> items = {{cut, {}, Shading::smooth, false, Lighting{.lights = {sun({1, 0, 1})}}}};
-    auto shadows = Shadows::create(context(), {.size = map_px});
+    auto shadows = Shadows::create(context(), {}, map_px);
     for (int i = 0; i < 3; ++i) {
         ASSERT_TRUE(cut.follow(sphere.cut));
         ASSERT_TRUE(shadows->update(items));
@@ -327,8 +327,7 @@ TEST_F(ShadowTest, AreTheSameWhereTheyAreLookedFor) {
                                     glm::dvec3(0.35, 0, 0.3), glm::dvec3(0.7, 0, 0.1)})
             items.push_back(item(stone, 0.1, at));
         const Ball bounds = ball_around(items);
-        auto all = Shadows::create(context(), {.size = map_px, .bounds = bounds}),
-             some = Shadows::create(context(), {.size = map_px, .bounds = bounds});
+        auto all = Shadows::create(context(), bounds, map_px), some = Shadows::create(context(), bounds, map_px);
         ASSERT_TRUE(all->update(items));
         bool is_any_dark = false;
         for (std::size_t i = 2; i < items.size(); ++i) {
@@ -344,7 +343,7 @@ TEST_F(ShadowTest, AreTheSameWhereTheyAreLookedFor) {
         }
         EXPECT_TRUE(is_any_dark);
         // What is there is not drawn again, and what is not is.
-        auto redraws = [&, fresh = Shadows::create(context(), {.size = map_px, .bounds = bounds})](
+        auto redraws = [&, fresh = Shadows::create(context(), bounds, map_px)](
                            const std::optional<std::span<const Item>>& receivers) mutable {
             EXPECT_TRUE(fresh->update(items, receivers));
             return fresh->facts().redraws;
@@ -358,14 +357,14 @@ TEST_F(ShadowTest, AreTheSameWhereTheyAreLookedFor) {
 
 TEST_F(ShadowTest, RefusesWhatCannotBe) {
     for (const int size : {0, 1 << 20}) {
-        const auto shadows = Shadows::create(context(), {.size = size});
+        const auto shadows = Shadows::create(context(), {}, size);
         ASSERT_FALSE(shadows);
         EXPECT_NE(shadows.error().message.find("texels a side cannot be drawn"), std::string::npos);
     }
     GpuCut cut(*GpuTree::create(context(), floor.tree));
     ASSERT_TRUE(cut.follow(floor.cut));
     Item item{cut, {}, Shading::smooth, false, Lighting{.lights = {5, sun({1, 0, 1})}}};
-    auto shadows = Shadows::create(context(), {.size = map_px});
+    auto shadows = Shadows::create(context(), {}, map_px);
     const auto many = shadows->update({{item}});
     ASSERT_FALSE(many);
     EXPECT_NE(many.error().message.find("at most 4"), std::string::npos);
@@ -393,7 +392,7 @@ TEST_F(ShadowTest, AllKindsOfSurfacesAreDrawnWithThem) {
     for (const Shading shading : {Shading::smooth, Shading::flat})
         for (const bool wireframe : {false, true}) {
             const Item items[] = {{cut, {}, shading, wireframe, lighting}, {above, {}, shading, wireframe, lighting}};
-            auto shadows = Shadows::create(context(), {.size = map_px});
+            auto shadows = Shadows::create(context(), {}, map_px);
             ASSERT_TRUE(shadows->update(items));
             auto target = Target::create(context(), window_px, window_px);
             const auto drawn = require(render::draw(items, {.view = from_above(), .shadows = &*shadows}, *target));

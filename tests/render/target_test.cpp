@@ -47,8 +47,6 @@ TEST_F(TargetTest, RefusesMoreThanTheDriverCanDraw) {
     EXPECT_EQ(made.error().code, unseen::ErrorCode::unsupported);
     EXPECT_THAT(made.error().message, HasSubstr(std::to_string(most)));
     EXPECT_FALSE(Target::create(context(), 4, 4, {.colours = std::vector(1000, ColourFormat::rgba16f)}));
-    EXPECT_FALSE(Target::create(context(), 4, 4, {.samples = 100000}));
-    EXPECT_FALSE(Target::create(context(), 4, 4, {.samples = -1}));
 }
 
 TEST_F(TargetTest, KeepsItsColoursApart) {
@@ -74,18 +72,6 @@ TEST_F(TargetTest, ReadsDepthOfDepthOnlyTargets) {
     EXPECT_THAT(*require(read_depth(*made)), Each(FloatEq(depth)));
     EXPECT_FALSE(read_luminance(*made));
     EXPECT_FALSE(read_depth(*require(Target::create(context(), 4, 4, {.depth = false}))));
-}
-
-TEST_F(TargetTest, SamplesAreResolvedBeforeTheyAreRead) {
-    const auto many = Target::create(context(), 4, 4, {.samples = 4});
-    auto one = Target::create(context(), 4, 4);
-    auto smaller = Target::create(context(), 2, 4);
-    ASSERT_TRUE(many && one && smaller);
-    fill(*many, 0, {0.25f, 0.5f, 0.75f, 1});
-    EXPECT_THAT(error_in(read_luminance(*many)), HasSubstr("resolved"));
-    ASSERT_TRUE(resolve(*many, *one));
-    EXPECT_THAT(*require(read_pixels(*one)), Each(glm::vec4(0.25f, 0.5f, 0.75f, 1)));
-    EXPECT_FALSE(resolve(*many, *smaller));
 }
 
 TEST_F(TargetTest, RowsComeFromTheTopAlsoOfForeignFramebuffers) {

@@ -113,7 +113,7 @@ TEST_F(VisibilityTest, FindsTheExtentOfAPicture) {
 }
 
 TEST_F(VisibilityTest, RefusesPlanesThatCannotBeDrawnTo) {
-    EXPECT_THAT(error_in(GpuPlanes::create({4, largest_target_side() + 1}, 1, PlaneFormat::full, "too high")),
+    EXPECT_THAT(error_in(GpuPlanes().need({4, largest_target_side() + 1}, 1, PlaneFormat::full, "too high")),
                 HasSubstr("memory does not suffice"));
     EXPECT_NE(context().take_errors(), ""); // GL says so, too
 }

@@ -1,21 +1,15 @@
 // Names of files are looked for in the text of a mesh, without a parser. One that only seems to be named makes a tree
 // be built once more, or an output be refused; so every name that might be meant counts.
-#include "cache_key.h"
+#include "loaded_tree.h"
 
 #include <algorithm>
 #include <bit>
-#include <cstdint>
-#include <cstdio>
 #include <set>
-#include <span>
-#include <string_view>
-#include <vector>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/internal/lit_folds.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/names.h>
 

@@ -1,9 +1,7 @@
 // Which fold test an object's cut goes by, and whether that knows what there is to see.
 #include <algorithm>
-#include <utility>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/internal/chroma.h>
 #include <unseen/perception/internal/motion.h>
 #include <unseen/vdtree/internal/errors.h>
 

@@ -1,6 +1,5 @@
-#include <unseen/perception/internal/chroma.h>
-
-#include "effects.h"
+// What takes part in making a cut and what does not, with reasons: a row for each.
+#include "fold_test.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +7,6 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/internal/motion.h>
-
-#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/number_format.h>
 
 namespace unseen::session {
@@ -18,62 +15,72 @@ namespace {
 // The default field is the physical one, computed by way of degrees: rounding is no magnification.
 constexpr double same_field_degrees = 1e-7;
 
-bool is_full(const Decision& decision) { return decision.request.goal.kind == Goal::Kind::full; }
+// What reasons look at.
+struct Cutting {
+    const Sight& sight;
+    const Decision& decision;
+    const std::optional<CutFacts>& facts;
 
-Effect fold_test_effect(const Sight& sight, const Decision& decision) {
-    if (is_full(decision)) return {"fold test", false, "nothing is folded in the full model"};
-    return {"fold test", true,
-            name_of(decision.test) + ": " + what_it_looks_at(sight, decision.test) +
-                (decision.why.empty() ? "" : " (" + std::string(decision.why) + ")")};
-}
+    bool is_full() const { return decision.request.goal.kind == Goal::Kind::full; }
+    bool is_perceptual() const { return session::is_perceptual(decision); }
+    bool is_for_mesh() const { return decision.request.purpose == Purpose::mesh; }
+    std::string test() const { return name_of(decision.test); }
+    // What else is folded stays where shadows would show it.
+    std::string but_shadows(const std::string& folded) const {
+        return folded + (casts_shadows(sight) ? ", but for outlines whose shadows would move visibly" : "");
+    }
+};
 
-// Without commas in thousands, for a comma parts the coordinates of a pixel.
-std::string to_tenths(double px) { return shortest(std::round(10 * px) / 10); }
+struct Reason {
+    bool on;
+    Message why;
+};
 
-Effect gaze_effect(const Sight& sight, const Decision& decision) {
-    if (is_full(decision)) return {"gaze", false, "nothing is folded in the full model"};
-    if (!is_perceptual(decision))
-        return {"gaze", false, "the fold test " + name_of(decision.test) + " does not use it"};
-    const std::optional<Gaze>& gaze = sight.observer.gaze;
-    if (!gaze) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
+// An effect that needs something says `otherwise` without it.
+enum class Needs { nothing, folds, perception, picture };
+struct EffectRow {
+    const char* name;
+    Needs needs;
+    const char* otherwise;
+    Reason (*reason)(const Cutting& c);
+};
+
+constexpr const char* folds_nothing = "nothing is folded in the full model";
+constexpr const char* only_perceptual_knows = "only the perceptual fold test knows it";
+constexpr const char* only_perceptual_looks_up = "only the perceptual fold test looks sensitivity up";
+constexpr const char* from_elsewhere = "the mesh may be looked at from elsewhere";
+
+Reason gaze(const Cutting& c) {
+    if (!c.is_perceptual()) return {false, "the fold test " + c.test() + " does not use it"};
+    const std::optional<Gaze>& gaze = c.sight.observer.gaze;
+    if (!gaze) return {false, "no gaze is given, so everything counts as looked at"};
     const std::string around =
         gaze->margin_deg > 0 ? ", give or take " + rounded(gaze->margin_deg, 3) + " degrees," : std::string(",");
-    return {"gaze", true,
-            "the viewer looks at pixel " + to_tenths(gaze->px.x) + ", " + to_tenths(gaze->px.y) + around +
-                " and sees less sharply elsewhere"};
+    // Without commas in thousands, for a comma parts the coordinates of a pixel.
+    const auto to_tenths = [](double px) { return shortest(std::round(10 * px) / 10); };
+    return {true, "the viewer looks at pixel " + to_tenths(gaze->px.x) + ", " + to_tenths(gaze->px.y) + around +
+                      " and sees less sharply elsewhere"};
 }
 
-Effect silhouette_effect(const Sight& sight, const Decision& decision) {
-    if (!is_perceptual(decision)) return {"silhouettes", false, "only the perceptual fold test knows them"};
-    const perception::SceneLuminance& range = sight.luminance;
+Reason silhouettes(const Cutting& c) {
     const auto cdm2 = [&](float relative) {
-        return rounded(perception::to_luminance(sight.observer.display, static_cast<double>(relative)).value(), 3);
+        return rounded(perception::to_luminance(c.sight.observer.display, static_cast<double>(relative)).value(), 3);
     };
-    return {"silhouettes", true,
-            "folds on outlines are tested against " + cdm2(range.darkest) + " to " + cdm2(range.brightest) +
-                " cd/m2, the whole scene with its background"};
+    return {true, "folds on outlines are tested against " + cdm2(c.sight.luminance.darkest) + " to " +
+                      cdm2(c.sight.luminance.brightest) + " cd/m2, the whole scene with its background"};
 }
 
-Effect csf_effect(const Sight& sight, const Decision& decision) {
-    if (!is_perceptual(decision)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
-    return {"csf table", sight.observer.csf != nullptr, describe(sight.observer)};
-}
-
-Effect motion_effect(const Sight& sight, const Decision& decision) {
-    if (!is_perceptual(decision)) return {"motion", false, "only the perceptual fold test knows it"};
-    if (sight.observer.velocity <= perception::least_velocity)
-        return {"motion", false, Message::of("without {observer.velocity} everything counts as still on the retina")};
-    return {
-        "motion", true,
-        "everything counts as moving over the retina at " + rounded(sight.observer.velocity.value(), 3) +
-            " degrees/s, where fine things blur and coarse ones are seen better; what stands still, or what the eye "
-            "follows, is seen more finely than that"};
+Reason motion(const Cutting& c) {
+    if (c.sight.observer.velocity <= perception::least_velocity)
+        return {false, Message::of("without {observer.velocity} everything counts as still on the retina")};
+    return {true, "everything counts as moving over the retina at " + rounded(c.sight.observer.velocity.value(), 3) +
+                      " degrees/s, where fine things blur and coarse ones are seen better; what stands still, or what "
+                      "the eye follows, is seen more finely than that"};
 }
 
 // Where in the window, and between which luminances, the table has no samples.
-Effect reach_effect(const Sight& sight, const Decision& decision) {
-    const std::string name = "beyond the csf table";
-    if (!is_perceptual(decision)) return {name, false, "only the perceptual fold test looks sensitivity up"};
+Reason beyond_table(const Cutting& c) {
+    const Sight& sight = c.sight;
     const perception::Display& display = sight.observer.display;
     double farthest = 0; // degrees
     if (sight.gaze_px) {
@@ -93,204 +100,199 @@ Effect reach_effect(const Sight& sight, const Decision& decision) {
     const auto light = [&](float relative) { return perception::to_luminance(display, static_cast<double>(relative)); };
     const std::string beyond = perception::beyond_reach(
         *sight.csf, perception::Degrees(farthest), light(sight.luminance.darkest), light(sight.luminance.brightest));
-    if (beyond.empty()) return {name, false, "the table reaches as far as the window and its light do"};
-    return {name, true, beyond};
+    if (beyond.empty()) return {false, "the table reaches as far as the window and its light do"};
+    return {true, beyond};
 }
 
-Effect prelit_effect(const Sight& sight) {
-    if (sight.lighting && !sight.object.tree.colours().empty())
-        return {"pre-lit colours", false, Message::of("{scene.lights} lights the colours")};
-    if (sight.object.tree.is_prelit())
-        return {"pre-lit colours", true,
-                sight.object.tree.colours().empty() ? "the texture is taken as lit"
-                                                    : "the mesh's colours are taken as lit"};
-    if (sight.object.tree.colours().empty() && sight.object.tree.texture().empty())
-        return {"pre-lit colours", false, "the mesh has no colours"};
-    return {"pre-lit colours", false, "colours are reflectance, and are lit"};
+Reason chroma(const Cutting& c) {
+    if (!c.decision.request.chroma) return {false, Message::of("without {request.chroma} only luminance counts")};
+    if (!perception::has_chroma(c.sight.object.tree)) return {false, "nothing has any colour"};
+    return {true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
 
-Effect texture_effect(const Sight& sight, const Decision& decision) {
-    if (sight.object.tree.texture().empty())
-        return {"texture", false,
-                sight.object.texture_left_out ? Message::of("{load.without_textures} leaves it out")
-                                              : Message("the model has none")};
-    if (!is_perceptual(decision)) return {"texture", true, "drawn; folds are not tested against it"};
-    if (decision.test == FoldTest::error)
-        return {"texture", true,
-                "folds are tested against what they change of it, and its detail against how far they move it"};
-    if (decision.test == FoldTest::luebke_hallen_safe)
-        return {"texture", true,
-                "folds are tested against its darkest and brightest texels around them, and by how far they move it"};
-    return {"texture", true, "folds are tested against its darkest and brightest texels around them"};
+Reason translucency(const Cutting& c) {
+    if (!is_translucent(c.sight)) return {false, "no vertex has an alpha below 1"};
+    return {true, "where a vertex has an alpha below 1, anything in the scene may show through"};
 }
 
-Effect chroma_effect(const Sight& sight, const Decision& decision) {
-    if (!is_perceptual(decision)) return {"chroma", false, "only the perceptual fold test knows it"};
-    if (!decision.request.chroma)
-        return {"chroma", false, Message::of("without {request.chroma} only luminance counts")};
-    if (!perception::has_chroma(sight.object.tree)) return {"chroma", false, "nothing has any colour"};
-    return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
+Reason texture(const Cutting& c) {
+    if (c.sight.object.tree.texture().empty())
+        return {false, c.sight.object.texture_left_out ? Message::of("{load.without_textures} leaves it out")
+                                                       : Message("the model has none")};
+    if (!c.is_perceptual()) return {true, "drawn; folds are not tested against it"};
+    if (c.decision.test == FoldTest::error)
+        return {true, "folds are tested against what they change of it, and its detail against how far they move it"};
+    const std::string extremes = "folds are tested against its darkest and brightest texels around them";
+    return {true, extremes + (c.decision.test == FoldTest::luebke_hallen_safe ? ", and by how far they move it" : "")};
 }
 
-Effect light_effect(const Sight& sight, const Decision& decision) {
-    if (sight.lighting)
-        return {"light", true,
-                sight.lights->description() +
-                    (is_perceptual(decision)
+Reason prelit(const Cutting& c) {
+    const vdtree::VertexTree& tree = c.sight.object.tree;
+    if (c.sight.lighting && !tree.colours().empty()) return {false, Message::of("{scene.lights} lights the colours")};
+    if (tree.is_prelit())
+        return {true, tree.colours().empty() ? "the texture is taken as lit" : "the mesh's colours are taken as lit"};
+    if (tree.colours().empty() && tree.texture().empty()) return {false, "the mesh has no colours"};
+    return {false, "colours are reflectance, and are lit"};
+}
+
+Reason light(const Cutting& c) {
+    if (c.sight.lighting)
+        return {true,
+                c.sight.lights->description() +
+                    (c.is_perceptual()
                          ? ": folds are tested against what these can make of the normals and places in their rings"
                          : "; drawn, for the fold test does not look at luminance")};
-    if (sight.object.is_relit)
-        return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
-    return {"light", false,
-            sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
+    if (c.sight.object.is_relit)
+        return {true, "luminance and its bounds were computed again for another light than the tree's"};
+    return {false,
+            c.sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
 }
 
-Effect shadow_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
-    if (!casts_shadows(sight)) return {"shadows", false, "no light casts a shadow: no pass"};
-    const std::size_t casting = vdtree::shadow_lights(*sight.lighting), all = sight.lighting->lights.size();
+Reason shadows(const Cutting& c) {
+    if (!casts_shadows(c.sight)) return {false, "no light casts a shadow: no pass"};
+    const std::size_t casting = vdtree::shadow_lights(*c.sight.lighting), all = c.sight.lighting->lights.size();
     std::string why =
         std::to_string(casting) + " of " + std::to_string(all) + (casting == 1 ? " lights casts" : " lights cast");
-    if (is_full(decision)) return {"shadows", true, why};
-    if (!is_perceptual(decision))
-        return {"shadows", true,
-                why + "; the fold test " + name_of(decision.test) +
-                    " does not look at them, so their edges may move visibly"};
-    if (!decision.request.keeps_shadows)
-        return {"shadows", true, why + Message::of("; without {request.keeps_shadows} their edges may move visibly")};
+    if (c.is_full()) return {true, why};
+    if (!c.is_perceptual())
+        return {true, why + "; the fold test " + c.test() + " does not look at them, so their edges may move visibly"};
+    if (!c.decision.request.keeps_shadows)
+        return {true, why + Message::of("; without {request.keeps_shadows} their edges may move visibly")};
     why += "; folds are tested with any of these hidden, and outlines that a light sees fold only where their shadows' "
            "edges move invisibly";
-    if (decision.request.purpose == Purpose::picture) why += " or out of the window";
-    if (facts && facts->outlines == 0) why += ": as all do here";
-    else if (facts)
-        why += ": " + grouped(facts->outlines) + " of " + grouped(sight.object.tree.interior_count()) +
+    if (!c.is_for_mesh()) why += " or out of the window";
+    if (c.facts && c.facts->outlines == 0) why += ": as all do here";
+    else if (c.facts)
+        why += ": " + grouped(c.facts->outlines) + " of " + grouped(c.sight.object.tree.interior_count()) +
                " nodes are kept for that";
-    return {"shadows", true, why};
+    return {true, why};
 }
 
-constexpr const char* but_shadows = ", but for outlines whose shadows would move visibly";
-
-Effect frustum_effect(const Sight& sight, const Decision& decision) {
-    if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
-    if (decision.request.purpose == Purpose::mesh)
-        return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
-    if (may_cast_anything(sight, decision)) return {"frustum culling", false, may_cast};
-    return {"frustum culling", true,
-            std::string("what lies outside of the window is folded") + (casts_shadows(sight) ? but_shadows : "")};
+Reason frustum(const Cutting& c) {
+    if (c.is_for_mesh()) return {false, from_elsewhere};
+    if (may_cast_anything(c.sight, c.decision)) return {false, may_cast};
+    return {true, c.but_shadows("what lies outside of the window is folded")};
 }
 
-Effect culling_effect(const Sight& sight, Purpose purpose) {
-    const WorldSphere sphere = world_sphere(sight.object);
-    const bool is_open = sight.object.tree.closedness() == vdtree::Closedness::open;
-    const bool is_outside = !is_around_eye(sphere, sight.view);
-    if (purpose == Purpose::mesh) return {"back-face culling", false, "nothing is drawn"};
-    if (is_open) return {"back-face culling", false, "the surface is open, so both sides are drawn"};
-    if (!is_outside) return {"back-face culling", false, "the eye is in the model, so both sides are drawn"};
-    return {"back-face culling", true,
-            sight.object.tree.closedness() == vdtree::Closedness::closed_outward
-                ? "the surface is closed, so its inner side cannot be seen"
-                : "the surface is closed but inside out, so it is turned"};
+Reason back_face_culling(const Cutting& c) {
+    const vdtree::Closedness closedness = c.sight.object.tree.closedness();
+    if (closedness == vdtree::Closedness::open) return {false, "the surface is open, so both sides are drawn"};
+    if (is_around_eye(world_sphere(c.sight.object), c.sight.view))
+        return {false, "the eye is in the model, so both sides are drawn"};
+    return {true, closedness == vdtree::Closedness::closed_outward
+                      ? "the surface is closed, so its inner side cannot be seen"
+                      : "the surface is closed but inside out, so it is turned"};
 }
 
-Effect magnification_effect(const Sight& sight, const Decision& decision) {
-    if (sight.view.orthographic_height)
-        return {"magnification", false, "the view is orthographic: sizes are those on the screen, at any depth"};
-    const double physical = perception::physical_field(sight.observer.display, sight.view.height).value();
-    const std::string fields =
-        rounded(sight.view.fov_y_degrees, 4) + " degrees, the window fills " + rounded(physical, 4);
-    if (std::abs(sight.view.fov_y_degrees - physical) <= same_field_degrees)
-        return {"magnification", false, "the camera's field is the one that the window fills on the display"};
-    if (!is_perceptual(decision)) return {"magnification", false, "pixels do not depend on it (camera " + fields + ")"};
-    return {"magnification", true, "the camera's field is " + fields + ": angles are those on the screen"};
+Reason magnification(const Cutting& c) {
+    const vdtree::View& view = c.sight.view;
+    if (view.orthographic_height)
+        return {false, "the view is orthographic: sizes are those on the screen, at any depth"};
+    const double physical = perception::physical_field(c.sight.observer.display, view.height).value();
+    const std::string fields = rounded(view.fov_y_degrees, 4) + " degrees, the window fills " + rounded(physical, 4);
+    if (std::abs(view.fov_y_degrees - physical) <= same_field_degrees)
+        return {false, "the camera's field is the one that the window fills on the display"};
+    if (!c.is_perceptual()) return {false, "pixels do not depend on it (camera " + fields + ")"};
+    return {true, "the camera's field is " + fields + ": angles are those on the screen"};
 }
 
-Effect distance_effect(const Decision& decision, const std::optional<CutFacts>& facts) {
-    const std::string name = "imperceptible distance";
-    if (is_full(decision)) return {name, true, "nothing is folded, so it holds from any distance"};
-    if (!is_perceptual(decision))
-        return {name, false, "costs of the fold test " + name_of(decision.test) + " are no distances"};
-    if (facts && std::isinf(facts->imperceptible_from_m))
-        return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
-    if (decision.request.goal.kind == Goal::Kind::imperceptible)
-        return {name, true,
-                "the display's distance times " + rounded(decision.request.threshold, 4) +
-                    ", above which no fold costs"};
-    return {name, true, "the display's distance times the largest fold cost"};
+Reason imperceptible_distance(const Cutting& c) {
+    if (c.is_full()) return {true, "nothing is folded, so it holds from any distance"};
+    if (!c.is_perceptual()) return {false, "costs of the fold test " + c.test() + " are no distances"};
+    if (c.facts && std::isinf(c.facts->imperceptible_from_m))
+        return {false, "a fold around the eye or across its plane stays visible from everywhere"};
+    if (c.decision.request.goal.kind != Goal::Kind::imperceptible)
+        return {true, "the display's distance times the largest fold cost"};
+    return {true,
+            "the display's distance times " + rounded(c.decision.request.threshold, 4) + ", above which no fold costs"};
 }
 
-Effect back_face_effect(const Sight& sight, Purpose purpose) {
-    if (purpose == Purpose::mesh) return {"back-face folding", false, "the mesh may be looked at from elsewhere"};
-    if (culls_back_faces(sight))
-        return {"back-face folding", true,
-                casts_shadows(sight) ? "what faces away is folded, but for outlines whose shadows would move visibly"
-                                     : "what faces away is not drawn, so it is folded"};
-    if (sight.object.tree.closedness() == vdtree::Closedness::open)
-        return {"back-face folding", false, "the surface is open"};
-    if (is_translucent(sight)) return {"back-face folding", false, "what faces away may show through"};
-    return {"back-face folding", false, "the eye is in the model"};
+Reason back_face_folding(const Cutting& c) {
+    if (culls_back_faces(c.sight))
+        return {true, casts_shadows(c.sight) ? c.but_shadows("what faces away is folded")
+                                             : "what faces away is not drawn, so it is folded"};
+    if (c.sight.object.tree.closedness() == vdtree::Closedness::open) return {false, "the surface is open"};
+    return {false, is_translucent(c.sight) ? "what faces away may show through" : "the eye is in the model"};
 }
 
-Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
-    const std::string name = "hidden folding";
-    if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
-    if (folds_unseen(sight, decision))
-        return {name, true,
-                std::string("what lies behind what this view shows is folded, by a picture of its depths") +
-                    (casts_shadows(sight) ? but_shadows : "")};
-    if (may_cast_anything(sight, decision)) return {name, false, may_cast};
-    if (!folds_hidden(sight, decision))
-        return {name, false,
-                is_perceptual(decision) ? "nothing solid is looked at from outside"
-                                        : "only the perceptual fold tests know what a fold changes"};
-    if (!facts) return {name, true, "what is behind spheres inside the solid is folded"};
-    if (facts->occluders == 0) return {name, false, "no sphere fits into the solid"};
-    return {name, true,
-            "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded" +
-                (casts_shadows(sight) ? but_shadows : "")};
+Reason hidden_folding(const Cutting& c) {
+    if (folds_unseen(c.sight, c.decision))
+        return {true, c.but_shadows("what lies behind what this view shows is folded, by a picture of its depths")};
+    if (may_cast_anything(c.sight, c.decision)) return {false, may_cast};
+    if (!folds_hidden(c.sight, c.decision))
+        return {false, c.is_perceptual() ? "nothing solid is looked at from outside"
+                                         : "only the perceptual fold tests know what a fold changes"};
+    if (!c.facts) return {true, "what is behind spheres inside the solid is folded"};
+    if (c.facts->occluders == 0) return {false, "no sphere fits into the solid"};
+    return {true, c.but_shadows("what is behind one of " + std::to_string(c.facts->occluders) +
+                                " spheres inside the solid is folded")};
 }
 
-Effect masking_effect(const Sight& sight, const Decision& decision) {
-    if (decision.masking)
-        return {"masking", true,
-                "folds are tested against thresholds that the scene around the object raises in this view, by " +
-                    std::to_string(decision.masking->bands().size()) + " bands of frequency"};
-    if (decision.request.masking.empty())
-        return {"masking", false, Message::of("without {request.masking} nothing masks what folds change")};
-    if (decision.test != FoldTest::error)
-        return {"masking", false, "the fold test " + name_of(decision.test) + " does not know it"};
-    return {"masking", false, why_unmasked(sight)};
+Reason masking(const Cutting& c) {
+    if (c.decision.masking)
+        return {true, "folds are tested against thresholds that the scene around the object raises in this view, by " +
+                          std::to_string(c.decision.masking->bands().size()) + " bands of frequency"};
+    if (c.decision.request.masking.empty())
+        return {false, Message::of("without {request.masking} nothing masks what folds change")};
+    if (c.decision.test != FoldTest::error) return {false, "the fold test " + c.test() + " does not know it"};
+    return {false, why_unmasked(c.sight)};
 }
 
-Effect translucency_effect(const Sight& sight, const Decision& decision) {
-    if (!is_perceptual(decision)) return {"translucency", false, "only the perceptual fold test knows it"};
-    if (!is_translucent(sight)) return {"translucency", false, "no vertex has an alpha below 1"};
-    return {"translucency", true, "where a vertex has an alpha below 1, anything in the scene may show through"};
+Reason time_limit(const Cutting& c) {
+    if (!c.decision.request.milliseconds) return {false, "none is given"};
+    return {true, !c.facts               ? "it ends the cut; the worst folds are undone first"
+                  : c.facts->is_complete ? "the cut was made within it"
+                                         : "it ended the cut; the worst folds were undone first"};
 }
 
-Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>& facts) {
-    if (!decision.request.milliseconds) return {"time limit", false, "none is given"};
-    return {"time limit", true,
-            !facts               ? "it ends the cut; the worst folds are undone first"
-            : facts->is_complete ? "the cut was made within it"
-                                 : "it ended the cut; the worst folds were undone first"};
-}
+constexpr EffectRow effect_rows[] = {
+    {"fold test", Needs::folds, folds_nothing,
+     [](const Cutting& c) -> Reason {
+         return {true, c.test() + ": " + what_it_looks_at(c.sight, c.decision.test) +
+                           (c.decision.why.empty() ? "" : " (" + std::string(c.decision.why) + ")")};
+     }},
+    {"gaze", Needs::folds, folds_nothing, gaze},
+    {"silhouettes", Needs::perception, "only the perceptual fold test knows them", silhouettes},
+    {"csf table", Needs::perception, only_perceptual_looks_up,
+     [](const Cutting& c) -> Reason {
+         return {c.sight.observer.csf != nullptr, describe(c.sight.observer)};
+     }},
+    {"motion", Needs::perception, only_perceptual_knows, motion},
+    {"beyond the csf table", Needs::perception, only_perceptual_looks_up, beyond_table},
+    {"chroma", Needs::perception, only_perceptual_knows, chroma},
+    {"translucency", Needs::perception, only_perceptual_knows, translucency},
+    {"texture", Needs::nothing, "", texture},
+    {"pre-lit colours", Needs::nothing, "", prelit},
+    {"light", Needs::nothing, "", light},
+    {"shadows", Needs::nothing, "", shadows},
+    {"frustum culling", Needs::folds, folds_nothing, frustum},
+    {"back-face culling", Needs::picture, "nothing is drawn", back_face_culling},
+    {"magnification", Needs::nothing, "", magnification},
+    {"imperceptible distance", Needs::nothing, "", imperceptible_distance},
+};
+// The full model has none of these.
+constexpr EffectRow rows_of_folds[] = {
+    {"back-face folding", Needs::picture, from_elsewhere, back_face_folding},
+    {"hidden folding", Needs::picture, from_elsewhere, hidden_folding},
+    {"masking", Needs::nothing, "", masking},
+    {"time limit", Needs::nothing, "", time_limit},
+};
 
 } // namespace
 
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
-    const Purpose purpose = decision.request.purpose;
-    std::vector<Effect> effects = {fold_test_effect(sight, decision),     gaze_effect(sight, decision),
-                                   silhouette_effect(sight, decision),    csf_effect(sight, decision),
-                                   motion_effect(sight, decision),        reach_effect(sight, decision),
-                                   chroma_effect(sight, decision),        translucency_effect(sight, decision),
-                                   texture_effect(sight, decision),       prelit_effect(sight),
-                                   light_effect(sight, decision),         shadow_effect(sight, decision, facts),
-                                   frustum_effect(sight, decision),       culling_effect(sight, purpose),
-                                   magnification_effect(sight, decision), distance_effect(decision, facts)};
-    if (is_full(decision)) return effects;
-    effects.push_back(back_face_effect(sight, purpose));
-    effects.push_back(hidden_effect(sight, decision, facts));
-    effects.push_back(masking_effect(sight, decision));
-    effects.push_back(time_limit_effect(decision, facts));
+    const Cutting c{sight, decision, facts};
+    std::vector<Effect> effects;
+    const auto add = [&](const EffectRow& row) {
+        const bool has_it = row.needs == Needs::folds        ? !c.is_full()
+                            : row.needs == Needs::perception ? c.is_perceptual()
+                            : row.needs == Needs::picture    ? !c.is_for_mesh()
+                                                             : true;
+        Reason reason = has_it ? row.reason(c) : Reason{false, row.otherwise};
+        effects.push_back({.name = row.name, .on = reason.on, .why = std::move(reason.why), .object = sight.number});
+    };
+    std::ranges::for_each(effect_rows, add);
+    if (!c.is_full()) std::ranges::for_each(rows_of_folds, add);
     return effects;
 }
 

@@ -1,8 +1,5 @@
-// Which fold test a cut of an object goes by, and what it looks at.
+// Which fold test a cut of an object goes by, what it looks at, and what is kept of it.
 #pragma once
-
-#include <cstddef>
-#include <memory>
 
 #include "sight.h"
 
@@ -29,8 +26,8 @@ bool casts_shadows(const Sight& sight);
 // Whether what is not seen may not fold: shadows of it may be seen, and nobody asks what they show.
 bool may_cast_anything(const Sight& sight, const Decision& decision);
 bool is_translucent(const Sight& sight);
-bool culls_back_faces(
-    const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
+// Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
+bool culls_back_faces(const Sight& sight);
 // Whether what lies outside of the window folds, and all of the object does, by more than any rounding.
 bool is_out_of_sight(Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
@@ -39,5 +36,50 @@ inline constexpr const char* may_cast = "what is not seen may cast shadows that 
 // Why what a scene masks does not count for an object; null where it may.
 const char* why_unmasked(const Sight& sight);
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
+
+// What the cut itself says about effects.
+struct CutFacts {
+    double imperceptible_from_m = 0;
+    bool is_complete = true;   // no time limit ended it
+    std::size_t occluders = 0; // how many spheres could hide something
+    std::size_t outlines = 0;  // nodes that are kept for their shadows
+};
+
+// What takes part in making a cut and what does not, with reasons. Without facts: as far as can be said before there is
+// a cut.
+std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts);
+Effect geomorph_effect(const vdtree::Geomorph* geomorph, const vdtree::Cut& cut); // null: there is none
+
+// ---- criteria, which are kept from one request to the next, and what they depend on
+
+// All that a criterion depends on, but for what never changes in a scene.
+struct Key {
+    FoldTest test = FoldTest::error;
+    double pixels = 0; // of the others than perceptual tests; and of these alone:
+    std::optional<double> farthest_gaze_px = {};
+    perception::SceneLuminance scene = {0, 0};
+    std::shared_ptr<const vdtree::Lighting> still_lights = {}; // of the test by errors
+    bool is_lit = false, chroma = false;
+    std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
+    vdtree::View lens = {};
+    bool operator==(const Key&) const = default;
+};
+
+struct KeptCriterion {
+    Key key;
+    vdtree::DistanceCriterion criterion;
+    std::shared_ptr<const perception::ShadowEdges> edges; // null where no light casts shadows
+};
+
+Key key_of(const Sight& sight, const Decision& decision);
+
+// The gaze is where the key says: one criterion does for all gazes up to there.
+perception::FoldTestOptions test_options(const Sight& sight, const Decision& decision, const Key& key);
+
+// See fold_tests.cpp, where each test makes its own.
+Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Decision& decision, const Key& key);
+
+// The last one that the object was asked for. Objects with one tree share it, but not under lights.
+std::shared_ptr<const KeptCriterion>& last_criterion(Sight& sight, const Key& key);
 
 } // namespace unseen::session

@@ -2,26 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
+#include <iterator>
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "session_state.h"
-#include "shadow_limit.h"
+#include "shadow_outlines.h"
 
 namespace unseen::session {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
 // Cost is v*/v for the perceptual tests alone; the others count pixels.
 double imperceptible_from(const Sight& sight, const Decision& decision, float largest_cost) {
     if (decision.request.goal.kind == Goal::Kind::full) return 0;
     if (!is_perceptual(decision)) return undefined;
-    if (vdtree::is_unbounded(largest_cost)) return infinity;
+    if (vdtree::is_unbounded(largest_cost)) return std::numeric_limits<double>::infinity();
     return sight.observer.display.distance.value() * static_cast<double>(largest_cost);
 }
 
@@ -57,8 +55,52 @@ public:
     explicit State(std::shared_ptr<Session::State> session)
         : session_(std::move(session)), objects_(session_->scene.objects.size()) {}
 
-    Result<Report> follow(const vdtree::View& view, const Request& request);
-    Result<void> set_glide(double seconds);
+    Result<Report> follow(const vdtree::View& view, const Request& request) {
+        auto prepared = session_->prepare(view, request, shadows_);
+        if (!prepared) return prepared.error();
+        if (const auto taken = take_up_trees(); !taken) return taken.error();
+        const bool folds = request.goal.kind != Goal::Kind::full;
+        if (folds) {
+            if (const auto made = make_recipes(*prepared); !made) return made.error();
+        } else {
+            for (Followed& object : objects_) object.stats_out_of_sight.reset();
+        }
+        Report report;
+        const auto start = vdtree::Clock::now();
+        const bool is_shared = prepared->shares_budget();
+        const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
+        report.adapt_ms = vdtree::ms_since(start);
+        if (!stats) return stats.error();
+        conclude(report, *prepared, *stats);
+
+        const auto adapted = vdtree::Clock::now();
+        if (glide_s_)
+            if (const auto glided = glide(report); !glided) return glided.error();
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            const Followed& object = objects_[i];
+            static_cast<void>(object.geomorph ? object.geomorph->drawn().indices() : object.cut->indices());
+            if (!request.reasons) continue;
+            report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
+            report.effects.back().object = i;
+        }
+        report.extract_ms = vdtree::ms_since(adapted);
+        return report;
+    }
+
+    Result<void> set_glide(double seconds) {
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
+            if (!tree.texture().empty())
+                return invalid_field("{Follower::set_glide()} does not move textures: leave it out, or add "
+                                     "{load.without_textures}.");
+            auto made = vdtree::Geomorph::create(tree, seconds);
+            if (!made) return made.error();
+            objects_[i].geomorph = std::move(*made);
+        }
+        glide_s_ = seconds;
+        passed_s_ = 0;
+        return {};
+    }
 
     // One object's cut.
     struct Followed {
@@ -74,14 +116,132 @@ public:
     void let_pass(double seconds) { passed_s_ += seconds; }
 
 private:
-    Result<void> take_up_trees();
-    Result<void> make_recipes(Prepared& prepared);
-    bool stays_out_of_sight(const Followed& object, Sight& sight, const Decision& decision) const;
-    Result<std::vector<vdtree::AdjustStats>> unfold_all();
-    Result<std::vector<vdtree::AdjustStats>> share_budget(const Request& request);
-    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request, Prepared& prepared);
-    void conclude(Report& report, Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const;
-    Result<void> glide(Report& report);
+    // A cut is of one tree: where another has come in its place, it begins anew.
+    Result<void> take_up_trees() {
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            Followed& object = objects_[i];
+            const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
+            if (object.cut && object.tree_count == session_->tree_count[i]) continue;
+            object.cut.emplace(tree);
+            object.stats_out_of_sight.reset();
+            object.tree_count = session_->tree_count[i];
+            if (!glide_s_) continue;
+            auto made = vdtree::Geomorph::create(tree, *glide_s_);
+            if (!made) return made.error();
+            object.geomorph = std::move(*made);
+        }
+        return {};
+    }
+
+    Result<void> make_recipes(Prepared& prepared) {
+        const bool is_shared = prepared.shares_budget();
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            Followed& object = objects_[i];
+            Sight& sight = prepared.sights[i];
+            const Decision& decision = prepared.decisions[i];
+            object.recipe.reset();
+            if (!is_shared && stays_out_of_sight(object, sight, decision)) continue;
+            auto recipe = make_recipe(sight, decision);
+            if (!recipe) return recipe.error();
+            // What comes into the window shall not glide there any more.
+            if (glide_s_ && !recipe->viewpoint.frusta.empty())
+                recipe->viewpoint.frusta = {
+                    vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
+            object.recipe = std::move(*recipe);
+            object.stats_out_of_sight.reset();
+        }
+        return {};
+    }
+
+    // Nothing of the object is in the window, nor was it when its cut was made: all is folded, and stays so.
+    bool stays_out_of_sight(const Followed& object, Sight& sight, const Decision& decision) const {
+        return object.stats_out_of_sight && object.test_out_of_sight == decision.test && !glide_s_ &&
+               is_out_of_sight(sight, decision);
+    }
+
+    Result<std::vector<vdtree::AdjustStats>> unfold_all() {
+        std::vector<vdtree::AdjustStats> stats(objects_.size());
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            vdtree::Cut& cut = *objects_[i].cut;
+            if (cut.triangle_count() != cut.tree().triangle_count()) cut.unfold_all();
+            stats[i].triangles = cut.triangle_count();
+        }
+        return stats;
+    }
+
+    Result<std::vector<vdtree::AdjustStats>> share_budget(const Request& request) {
+        if (request.goal.fill || request.milliseconds)
+            return unsupported(Message::of("Several objects share a budget without {request.goal.fill} and "
+                                           "{request.milliseconds}: leave these out."));
+        std::vector<vdtree::SceneObject> objects;
+        for (Followed& object : objects_) {
+            CutRecipe& recipe = *object.recipe;
+            objects.push_back(
+                {*object.cut, *recipe.criterion, std::move(recipe.viewpoint), recipe.options.cull_back_faces});
+        }
+        return vdtree::follow_scene(objects, request.goal.triangles);
+    }
+
+    // Each has the time that the ones before have left.
+    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request, Prepared& prepared) {
+        std::vector<vdtree::AdjustStats> stats;
+        const auto start = vdtree::Clock::now();
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            Followed& object = objects_[i];
+            if (!object.recipe) {
+                stats.push_back(*object.stats_out_of_sight);
+                continue;
+            }
+            CutRecipe& recipe = *object.recipe;
+            if (request.milliseconds && i > 0)
+                recipe.options.milliseconds = std::max(0.0, *request.milliseconds - vdtree::ms_since(start));
+            auto followed = object.cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
+            if (!followed) return followed.error();
+            stats.push_back(*followed);
+            Sight& sight = prepared.sights[i];
+            const Decision& decision = prepared.decisions[i];
+            if (followed->triangles > 0 || !followed->is_complete || !is_out_of_sight(sight, decision)) continue;
+            object.stats_out_of_sight = *followed;
+            object.stats_out_of_sight->node_tests = 0; // of the calls that are spared
+            object.stats_out_of_sight->folds = object.stats_out_of_sight->unfolds = 0;
+            object.test_out_of_sight = decision.test;
+        }
+        return stats;
+    }
+
+    void conclude(Report& report, Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const {
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            Sight& sight = prepared.sights[i];
+            const Decision& decision = prepared.decisions[i];
+            report.source_triangles += sight.object.tree.triangle_count();
+            report.dropped += sight.object.tree.dropped_triangles();
+            add(report.stats, stats[i]);
+            report.fold_tests.push_back(decision.test);
+            CutFacts facts;
+            facts.imperceptible_from_m = imperceptible_from(sight, decision, stats[i].max_fold_cost);
+            facts.is_complete = stats[i].is_complete;
+            if (decision.request.reasons && folds_hidden(sight, decision))
+                facts.occluders = inner_spheres(sight.object, sight.cache).size();
+            if (decision.request.reasons && objects_[i].recipe) facts.outlines = count(shadow_of(sight).kept);
+            if (decision.request.reasons)
+                std::ranges::move(effects_of(sight, decision, facts), std::back_inserter(report.effects));
+            const bool is_unknown = std::isnan(report.imperceptible_from_m) || std::isnan(facts.imperceptible_from_m);
+            report.imperceptible_from_m =
+                is_unknown ? undefined : std::max(report.imperceptible_from_m, facts.imperceptible_from_m);
+        }
+    }
+
+    Result<void> glide(Report& report) {
+        vdtree::Index drawn = 0;
+        for (Followed& object : objects_) {
+            if (auto stepped = object.geomorph->step(*object.cut, passed_s_); !stepped) return stepped;
+            drawn += object.geomorph->drawn().triangle_count();
+            report.gliding += object.geomorph->moved().size();
+        }
+        passed_s_ = 0;
+        report.drawn_triangles = drawn;
+        return {};
+    }
 
     std::shared_ptr<Session::State> session_;
     std::vector<Followed> objects_;
@@ -90,189 +250,7 @@ private:
     double passed_s_ = 0; // since the last step of glides
 };
 
-Result<void> Follower::State::set_glide(double seconds) {
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
-        if (!tree.texture().empty())
-            return invalid_field("{Follower::set_glide()} does not move textures: leave it out, or add "
-                                 "{load.without_textures}.");
-        auto made = vdtree::Geomorph::create(tree, seconds);
-        if (!made) return made.error();
-        objects_[i].geomorph = std::move(*made);
-    }
-    glide_s_ = seconds;
-    passed_s_ = 0;
-    return {};
-}
-
-// A cut is of one tree: where another has come in its place, it begins anew.
-Result<void> Follower::State::take_up_trees() {
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        Followed& object = objects_[i];
-        const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
-        if (object.cut && object.tree_count == session_->tree_count[i]) continue;
-        object.cut.emplace(tree);
-        object.stats_out_of_sight.reset();
-        object.tree_count = session_->tree_count[i];
-        if (!glide_s_) continue;
-        auto made = vdtree::Geomorph::create(tree, *glide_s_);
-        if (!made) return made.error();
-        object.geomorph = std::move(*made);
-    }
-    return {};
-}
-
-// Nothing of the object is in the window, nor was it when its cut was made: all is folded, and stays so.
-bool Follower::State::stays_out_of_sight(const Followed& object, Sight& sight, const Decision& decision) const {
-    return object.stats_out_of_sight && object.test_out_of_sight == decision.test && !glide_s_ &&
-           is_out_of_sight(sight, decision);
-}
-
-Result<void> Follower::State::make_recipes(Prepared& prepared) {
-    const bool is_shared = prepared.shares_budget();
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        Followed& object = objects_[i];
-        Sight& sight = prepared.sights[i];
-        const Decision& decision = prepared.decisions[i];
-        object.recipe.reset();
-        if (!is_shared && stays_out_of_sight(object, sight, decision)) continue;
-        auto recipe = make_recipe(sight, decision);
-        if (!recipe) return recipe.error();
-        // What comes into the window shall not glide there any more.
-        if (glide_s_ && !recipe->viewpoint.frusta.empty())
-            recipe->viewpoint.frusta = {
-                vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
-        object.recipe = std::move(*recipe);
-        object.stats_out_of_sight.reset();
-    }
-    return {};
-}
-
-Result<std::vector<vdtree::AdjustStats>> Follower::State::unfold_all() {
-    std::vector<vdtree::AdjustStats> stats(objects_.size());
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        vdtree::Cut& cut = *objects_[i].cut;
-        if (cut.triangle_count() != cut.tree().triangle_count()) cut.unfold_all();
-        stats[i].triangles = cut.triangle_count();
-    }
-    return stats;
-}
-
-Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Request& request) {
-    if (request.goal.fill || request.milliseconds)
-        return unsupported(Message::of("Several objects share a budget without {request.goal.fill} and "
-                                       "{request.milliseconds}: leave these out."));
-    std::vector<vdtree::SceneObject> objects;
-    for (Followed& object : objects_) {
-        CutRecipe& recipe = *object.recipe;
-        objects.push_back(
-            {*object.cut, *recipe.criterion, std::move(recipe.viewpoint), recipe.options.cull_back_faces});
-    }
-    return vdtree::follow_scene(objects, request.goal.triangles);
-}
-
-// Each has the time that the ones before have left.
-Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request, Prepared& prepared) {
-    std::vector<vdtree::AdjustStats> stats;
-    const auto start = vdtree::Clock::now();
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        Followed& object = objects_[i];
-        if (!object.recipe) {
-            stats.push_back(*object.stats_out_of_sight);
-            continue;
-        }
-        CutRecipe& recipe = *object.recipe;
-        if (request.milliseconds && i > 0)
-            recipe.options.milliseconds = std::max(0.0, *request.milliseconds - vdtree::ms_since(start));
-        auto followed = object.cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
-        if (!followed) return followed.error();
-        stats.push_back(*followed);
-        Sight& sight = prepared.sights[i];
-        const Decision& decision = prepared.decisions[i];
-        if (followed->triangles > 0 || !followed->is_complete || !is_out_of_sight(sight, decision)) continue;
-        object.stats_out_of_sight = *followed;
-        object.stats_out_of_sight->node_tests = 0; // of the calls that are spared
-        object.stats_out_of_sight->folds = object.stats_out_of_sight->unfolds = 0;
-        object.test_out_of_sight = decision.test;
-    }
-    return stats;
-}
-
-void Follower::State::conclude(Report& report, Prepared& prepared,
-                               const std::vector<vdtree::AdjustStats>& stats) const {
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        Sight& sight = prepared.sights[i];
-        const Decision& decision = prepared.decisions[i];
-        report.source_triangles += sight.object.tree.triangle_count();
-        report.dropped += sight.object.tree.dropped_triangles();
-        add(report.stats, stats[i]);
-        report.fold_tests.push_back(decision.test);
-        CutFacts facts;
-        facts.imperceptible_from_m = imperceptible_from(sight, decision, stats[i].max_fold_cost);
-        facts.is_complete = stats[i].is_complete;
-        if (decision.request.reasons && folds_hidden(sight, decision))
-            facts.occluders = inner_spheres(sight.object, sight.cache).size();
-        if (decision.request.reasons && objects_[i].recipe) facts.outlines = count(shadow_of(sight).kept);
-        if (decision.request.reasons) {
-            for (Effect& effect : effects_of(sight, decision, facts)) {
-                effect.object = i;
-                report.effects.push_back(std::move(effect));
-            }
-        }
-        const bool is_unknown = std::isnan(report.imperceptible_from_m) || std::isnan(facts.imperceptible_from_m);
-        report.imperceptible_from_m =
-            is_unknown ? undefined : std::max(report.imperceptible_from_m, facts.imperceptible_from_m);
-    }
-}
-
-Result<void> Follower::State::glide(Report& report) {
-    vdtree::Index drawn = 0;
-    for (Followed& object : objects_) {
-        if (auto stepped = object.geomorph->step(*object.cut, passed_s_); !stepped) return stepped;
-        drawn += object.geomorph->drawn().triangle_count();
-        report.gliding += object.geomorph->moved().size();
-    }
-    passed_s_ = 0;
-    report.drawn_triangles = drawn;
-    return {};
-}
-
-Result<Report> Follower::State::follow(const vdtree::View& view, const Request& request) {
-    auto prepared = session_->prepare(view, request, shadows_);
-    if (!prepared) return prepared.error();
-    if (const auto taken = take_up_trees(); !taken) return taken.error();
-    const bool folds = request.goal.kind != Goal::Kind::full;
-    if (folds) {
-        if (const auto made = make_recipes(*prepared); !made) return made.error();
-    } else {
-        for (Followed& object : objects_) object.stats_out_of_sight.reset();
-    }
-    Report report;
-    const auto start = vdtree::Clock::now();
-    const bool is_shared = prepared->shares_budget();
-    const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
-    report.adapt_ms = vdtree::ms_since(start);
-    if (!stats) return stats.error();
-    conclude(report, *prepared, *stats);
-
-    const auto adapted = vdtree::Clock::now();
-    if (glide_s_)
-        if (const auto glided = glide(report); !glided) return glided.error();
-    for (std::size_t i = 0; i < objects_.size(); ++i) {
-        const Followed& object = objects_[i];
-        static_cast<void>(object.geomorph ? object.geomorph->drawn().indices() : object.cut->indices());
-        if (!request.reasons) continue;
-        report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
-        report.effects.back().object = i;
-    }
-    report.extract_ms = vdtree::ms_since(adapted);
-    return report;
-}
-
 Follower::Follower(const Session& session) : state_(std::make_unique<State>(session.state_)) {}
-Follower::Follower(Follower&&) noexcept = default;
-Follower& Follower::operator=(Follower&&) noexcept = default;
-Follower::~Follower() = default;
 
 Result<void> Follower::set_glide(double seconds) { return state_->set_glide(seconds); }
 void Follower::let_pass(double seconds) { state_->let_pass(seconds); }

@@ -2,9 +2,6 @@
 
 #include <unseen/vdtree/internal/number_text.h>
 
-#include <string>
-#include <utility>
-
 namespace unseen::session {
 
 Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {

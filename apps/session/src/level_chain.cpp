@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <string>
 
 #include <unseen/session/session.h>
 #include <unseen/vdtree/internal/contrast_classes.h>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
-#include <string_view>
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/builder.h>
@@ -14,7 +13,6 @@
 #include <unseen/vdtree/internal/stopwatch.h>
 #include <unseen/vdtree/tree_io.h>
 
-#include "cache_key.h"
 #include "loaded_tree.h"
 #include "textures.h"
 
@@ -186,10 +184,8 @@ Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOp
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
     if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
-    if (options.messages.warning)
-        for (const Message& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
-    if (options.messages.note)
-        for (const Message& note : read->notes) options.messages.note(file.string() + ": " + note);
+    tell(options.messages.warning, file, read->warnings);
+    tell(options.messages.note, file, read->notes);
     return read;
 }
 

@@ -1,16 +1,20 @@
 // Trees from files, with what the session needs to know of where they are from.
 #pragma once
 
-#include <memory>
-
 #include <unseen/perception/internal/lit_folds.h>
-#include <unseen/session/load.h>
 #include <unseen/session/scene.h>
 
 namespace unseen::session {
 
 // Larger trees are measured only where somebody asks for that. Interior nodes; about a minute on one core.
 inline constexpr vdtree::NodeId most_measured = 2'000'000;
+
+// Says texts about a file, if anybody listens.
+template <class Tell, class Texts>
+void tell(const Tell& to, const std::filesystem::path& file, const Texts& texts) {
+    if (to)
+        for (const auto& text : texts) to(file.string() + ": " + text);
+}
 
 // "kept in FOLDER for the next time".
 Message kept_in(const TreeCache& cache);
@@ -52,5 +56,24 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
 // `place` may be null. `takes_long`: a note says so before it is measured.
 Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                                         const Messages& messages, bool takes_long);
+
+// ---- what a tree is kept under
+
+// A hash of all that the tree of a file depends on: the bytes of the file and of those it refers to (libraries of
+// materials, images, buffers), the options, and how trees are built and measured. Nothing for what is no regular file,
+// and where it is not sure what the file refers to. Cost: reading the files once.
+std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
+
+// Of the tree of a mesh that was read, with its texture and document.
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
+                           bool conserves_light);
+
+// Of what a tree's folds change under lights, whichever these are. `key`: the tree's.
+std::string lights_key(const std::string& key);
+
+// ---- scenes
+
+// Of a file that SceneFile has read, as Scene::load() says.
+Result<Scene> scene_from(meshio::SceneFile file, const std::filesystem::path& name, const LoadOptions& options);
 
 } // namespace unseen::session

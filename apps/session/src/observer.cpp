@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <numbers>
 
 #include <glm/geometric.hpp>
 
@@ -38,40 +36,50 @@ perception::JudgeOptions judge_options(const Observer& observer) {
     return options;
 }
 
-Result<ObserverChoice> choose_observer(const std::string& name_or_file) {
-    const auto person = perception::person(name_or_file);
-    if (person) return ObserverChoice{*person, {}};
-    std::error_code unknown;
-    if (!std::filesystem::exists(name_or_file, unknown))
-        return invalid_argument(Message::of("{observer.person}: there is no such file, and ") + person.error().message);
-    auto table = calibration::read_csf(name_or_file);
-    if (!table) return table.error();
-    return ObserverChoice{{}, std::make_shared<const perception::CsfTable>(std::move(*table))};
+namespace {
+
+// What comes of no name known: the table in a file of that name.
+Result<perception::CsfTable> read_table(const std::string& file, const Message& field, const std::string& unknown) {
+    std::error_code failed;
+    if (!std::filesystem::exists(file, failed))
+        return invalid_argument(field + ": there is no such file, and " + unknown);
+    return calibration::read_csf(file);
 }
 
-Result<CsfChoice> choose_csf(const std::string& model_or_file) {
+} // namespace
+
+Result<Observer> choose_observer(const std::string& name_or_file) {
+    Observer observer;
+    const auto person = perception::person(name_or_file);
+    if (person) {
+        observer.person = *person;
+        return observer;
+    }
+    auto table = read_table(name_or_file, Message::of("{observer.person}"), person.error().message);
+    if (!table) return table.error();
+    observer.csf = std::make_shared<const perception::CsfTable>(std::move(*table));
+    return observer;
+}
+
+Result<std::variant<perception::CsfModel, perception::CsfTable>> choose_csf(const std::string& model_or_file) {
+    using Choice = std::variant<perception::CsfModel, perception::CsfTable>;
     const auto model = perception::csf_model(model_or_file);
-    if (model) {
-        if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
+    if (model && !perception::is_achromatic(*model))
         return invalid_field("{observer.csf = }{} is sensitivity to colour, not to luminance contrast.",
                              {model_or_file});
-    }
-    std::error_code unknown;
-    if (!std::filesystem::exists(model_or_file, unknown))
-        return invalid_argument(Message::of("{observer.csf}: there is no such file, and ") + model.error().message +
-                                ".");
-    auto table = calibration::read_csf(model_or_file);
-    if (!table) return table.error();
-    return CsfChoice{{}, std::move(*table)};
+    if (model) return Choice(*model);
+    auto table = read_table(model_or_file, Message::of("{observer.csf}"), model.error().message + ".");
+    return table ? Result<Choice>(std::move(*table)) : table.error();
 }
 
 Result<std::shared_ptr<const perception::CsfTable>>
 read_csf_table(const std::string& model_or_file, const perception::Display& display, const perception::Person& person) {
     auto choice = choose_csf(model_or_file);
     if (!choice) return choice.error();
-    auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance})
-                               : Result<perception::CsfTable>(*std::move(choice->table));
-    if (table && choice->model) table = table->scaled(person.gain);
+    const auto* const model = std::get_if<perception::CsfModel>(&*choice);
+    auto table = model ? perception::CsfTable::from_model(*model, {.distance = display.distance})
+                       : Result<perception::CsfTable>(std::get<perception::CsfTable>(std::move(*choice)));
+    if (table && model) table = table->scaled(person.gain);
     if (!table) return table.error();
     return std::make_shared<const perception::CsfTable>(std::move(*table));
 }

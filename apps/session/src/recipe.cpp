@@ -5,8 +5,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/light_bounds.h>
-
 #include "shadow_outlines.h"
 
 namespace unseen::session {

@@ -6,7 +6,6 @@
 #include <unseen/vdtree/internal/errors.h>
 
 #include "loaded_tree.h"
-#include "scene_from_file.h"
 #include "textures.h"
 
 #include <glm/geometric.hpp>

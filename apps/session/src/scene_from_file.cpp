@@ -1,4 +1,4 @@
-#include "scene_from_file.h"
+#include "loaded_tree.h"
 
 #include <algorithm>
 #include <atomic>
@@ -8,6 +8,8 @@
 #include <thread>
 
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
 
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/builder.h>
@@ -17,9 +19,6 @@
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
-#include "cache_key.h"
-#include "loaded_tree.h"
-#include "stretch.h"
 #include "textures.h"
 
 namespace unseen::session {
@@ -176,6 +175,76 @@ private:
     std::size_t built_ = 0, empty_ = 0;
 };
 
+// ---- affine transforms as a similarity after a stretch
+
+// placement.to_world(stretch * x) is the transform of x. The stretch is symmetric, of determinant 1 or, for mirror
+// images, -1; the identity where the transform is a similarity.
+struct Factored {
+    vdtree::Similarity placement;
+    glm::dmat3 stretch = glm::dmat3(1);
+};
+
+// Two stretches that differ by no more, in any component, count as one. Single floats of nested nodes are off by some
+// 1e-6; an object as large as the largest screen, 32768 pixels, moves by a third of a pixel.
+constexpr double same_stretch = 1e-5;
+// Beyond, what is thinnest is lost in the rounding of what is thickest.
+constexpr double most_condition = 1e6;
+constexpr int most_steps = 60; // of Newton's iteration, which doubles the digits: a few are enough
+
+double largest_of(const glm::dmat3& m) {
+    double largest = 0;
+    for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) largest = std::max(largest, std::abs(m[c][r]));
+    return largest;
+}
+
+double norm(const glm::dmat3& m) {
+    double sum = 0;
+    for (int c = 0; c < 3; ++c) sum += glm::dot(m[c], m[c]);
+    return std::sqrt(sum);
+}
+
+bool is_same_stretch(const glm::dmat3& a, const glm::dmat3& b) { return largest_of(a - b) <= same_stretch; }
+
+// By polar decomposition. Nothing for a matrix that is not finite, or has no inverse.
+std::optional<Factored> factor(const glm::dmat4& transform) {
+    for (int c = 0; c < 4; ++c)
+        for (int r = 0; r < 4; ++r)
+            if (!std::isfinite(transform[c][r])) return std::nullopt;
+    glm::dmat3 linear(transform);
+    const double size = largest_of(linear);
+    if (!(size > 0)) return std::nullopt;
+    linear /= size; // a determinant of tiny scales would underflow
+    const double determinant = glm::determinant(linear);
+    const glm::dmat3 inverse = glm::inverse(linear);
+    if (!(norm(linear) * norm(inverse) <= most_condition)) return std::nullopt; // NaN, too
+
+    // Higham 1986: X becomes the mean of itself and its inverse transposed, both scaled to each other's size.
+    glm::dmat3 turn = linear;
+    for (int i = 0; i < most_steps; ++i) {
+        const glm::dmat3 opposite = glm::transpose(glm::inverse(turn));
+        const double scale = std::sqrt(norm(opposite) / norm(turn));
+        const glm::dmat3 next = (turn * scale + opposite / scale) * 0.5;
+        const double step = largest_of(next - turn);
+        turn = next;
+        constexpr double settled = 1e-15;
+        if (step <= settled) break;
+    }
+    glm::dmat3 stretch = glm::transpose(turn) * linear;
+    stretch = (stretch + glm::transpose(stretch)) * 0.5;
+    const double scale = std::cbrt(std::abs(determinant));
+    stretch /= scale;
+    if (determinant < 0) turn = -turn, stretch = -stretch;
+
+    Factored factored;
+    factored.placement.scale = scale * size;
+    factored.placement.rotation = glm::normalize(glm::quat_cast(turn));
+    factored.placement.translation = glm::dvec3(transform[3]);
+    if (!(factored.placement.scale > 0) || !std::isfinite(factored.placement.scale)) return std::nullopt;
+    if (!is_same_stretch(stretch, glm::dmat3(1))) factored.stretch = stretch;
+    return factored;
+}
+
 // ---- lights
 
 struct Middle {
@@ -258,6 +327,48 @@ bool is_turned(const vdtree::Similarity& placement) {
     return glm::length(glm::dvec3(q.x, q.y, q.z)) > same_direction;
 }
 
+// What the nodes of a file show, and where.
+struct Layout {
+    std::vector<Part> parts = {};
+    std::vector<Placed> placed = {};
+    bool turns = false; // an object
+};
+
+Result<Layout> lay_out(const meshio::SceneContents& contents, const fs::path& name, const LoadOptions& options) {
+    Layout layout;
+    std::map<std::size_t, std::vector<std::size_t>> of_mesh; // parts
+    for (const meshio::SceneNode& node : contents.nodes) {
+        const auto wrong = [&](std::string_view text) {
+            return Error{ErrorCode::malformed_data,
+                         Message::of(text, {name.string(), std::to_string(node.node), in_quotes(node.name)})};
+        };
+        auto factored = factor(node.to_world);
+        if (!factored)
+            return wrong(
+                "{}: node {} {} has, with the nodes above it, a transform without an inverse (a scale of 0, or "
+                "one that is a million times another): correct it, or read the file with {load.as = }model.");
+        factored->placement.scale *= options.unit_metres;
+        factored->placement.translation *= options.unit_metres;
+        if (!is_in_reach(factored->placement))
+            return wrong(
+                "{}: node {} {} is too small, too large or too far away for single floats (beyond 1e-15 to 1e15 "
+                "metres): correct its transform, or give {load.unit_metres}.");
+        layout.turns = layout.turns || is_turned(factored->placement);
+        const auto mesh = static_cast<std::size_t>(node.mesh);
+        std::vector<std::size_t>& same = of_mesh[mesh];
+        auto found = std::ranges::find_if(
+            same, [&](std::size_t part) { return is_same_stretch(layout.parts[part].stretch, factored->stretch); });
+        if (found == same.end()) {
+            found = same.insert(same.end(), layout.parts.size());
+            layout.parts.push_back({mesh, factored->stretch});
+        }
+        Part& part = layout.parts[*found];
+        part.folds = part.folds || !node.is_background;
+        layout.placed.push_back({&node, factored->placement, *found});
+    }
+    return layout;
+}
+
 } // namespace
 
 Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const LoadOptions& options) {
@@ -267,58 +378,24 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
             "{} is a scene, and {load.texture} lies over one model: leave it out, or read the file with "
             "{load.as = }model.",
             {name.string()});
-    std::vector<Part> parts;
-    std::map<std::size_t, std::vector<std::size_t>> of_mesh; // parts
-    std::vector<Placed> placed;
-    bool turns = false;
-    for (const meshio::SceneNode& node : contents.nodes) {
-        auto factored = factor(node.to_world);
-        if (!factored)
-            return Error{ErrorCode::malformed_data,
-                         Message::of("{}: node {} {} has, with the nodes above it, a transform without an inverse (a "
-                                     "scale of 0, or one that is a million times another): correct it, or read the "
-                                     "file with {load.as = }model.",
-                                     {name.string(), std::to_string(node.node), in_quotes(node.name)})};
-        factored->placement.scale *= options.unit_metres;
-        factored->placement.translation *= options.unit_metres;
-        if (!is_in_reach(factored->placement))
-            return Error{ErrorCode::malformed_data,
-                         Message::of("{}: node {} {} is too small, too large or too far away for single floats "
-                                     "(beyond 1e-15 to 1e15 metres): correct its transform, or give "
-                                     "{load.unit_metres}.",
-                                     {name.string(), std::to_string(node.node), in_quotes(node.name)})};
-        turns = turns || is_turned(factored->placement);
-        const auto mesh = static_cast<std::size_t>(node.mesh);
-        std::vector<std::size_t>& same = of_mesh[mesh];
-        const auto found = std::find_if(same.begin(), same.end(), [&](std::size_t part) {
-            return is_same_stretch(parts[part].stretch, factored->stretch);
-        });
-        const std::size_t part = found != same.end() ? *found : parts.size();
-        if (found == same.end()) {
-            same.push_back(part);
-            parts.push_back({mesh, factored->stretch});
-        }
-        parts[part].folds = parts[part].folds || !node.is_background;
-        placed.push_back({&node, factored->placement, part});
-    }
-    if (options.messages.warning)
-        for (const Message& warning : contents.warnings) options.messages.warning(name.string() + ": " + warning);
-    if (options.messages.note)
-        for (const Message& note : contents.notes) options.messages.note(name.string() + ": " + note);
+    auto layout = lay_out(contents, name, options);
+    if (!layout) return layout.error();
+    tell(options.messages.warning, name, contents.warnings);
+    tell(options.messages.note, name, contents.notes);
 
     // The test by errors knows the trees' own light alone.
-    const bool is_lit = !options.prelit && (!contents.lights.empty() || turns);
-    if (const auto built = Builder(file, name, options, is_lit).build(parts); !built) return built.error();
+    const bool is_lit = !options.prelit && (!contents.lights.empty() || layout->turns);
+    if (const auto built = Builder(file, name, options, is_lit).build(layout->parts); !built) return built.error();
     Scene scene;
     // What an object takes in a session, with its cut, and what it adds to a file.
     constexpr std::uint64_t bytes_per_object = 8192, bytes_per_leaf = 32;
     Budget budget(contents.file_bytes, 256, std::uint64_t{2} << 30);
-    for (const Placed& node : placed) {
-        const Part& part = parts[node.part];
+    for (const Placed& node : layout->placed) {
+        const Part& part = layout->parts[node.part];
         if (!part.tree) continue;
         if (!budget.spend(1, bytes_per_object + bytes_per_leaf * part.tree->leaf_count()))
             return Error{ErrorCode::unsupported,
-                         name.string() + ": its " + grouped(placed.size()) +
+                         name.string() + ": its " + grouped(layout->placed.size()) +
                              " nodes multiply to far more than the file holds; split the scene."};
         Object object{part.tree->share(), node.placement, node.node->name};
         object.texture_left_out = options.without_textures;

@@ -1,11 +1,10 @@
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selection_search.h>
+#include <unseen/session/internal/selections.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 #include <queue>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -92,181 +91,178 @@ std::vector<int> levels_within(std::span<const LevelCosts> objects, std::uint64_
 }
 
 struct SelectionFollower::Impl {
-    Selections selections;
+    Selections file;
+    const Selections::Data& selections = file.data();
     SelectionFollowOptions options;
     std::vector<WorldSphere> spheres;
     std::vector<int> levels; // of the last frame; empty: there was none
 
-    std::vector<WeighedCorner> around(glm::dvec3 eye) const;
-    std::vector<LevelCosts> costs_of(const std::vector<std::size_t>& objects, glm::dvec3 eye) const;
-    std::vector<int> nearest(const vdtree::View& view) const;
-    void keep_what_holds(const std::vector<std::size_t>& objects, const std::vector<LevelCosts>& costs,
-                         std::vector<int>& chosen) const;
-};
+    Impl(Selections file_, const SelectionFollowOptions& options_) : file(std::move(file_)), options(options_) {}
 
-// The corners of the cell that the eye is in, or of the nearest one, by linear weights.
-std::vector<WeighedCorner> SelectionFollower::Impl::around(glm::dvec3 eye) const {
-    const SelectionGrid& grid = selections.grid;
-    const glm::dvec3 at = (eye - grid.origin) / grid.step;
-    const SelectionCell* best = nullptr;
-    double least = 0;
-    glm::dvec3 share(0);
-    for (const SelectionCell& cell : selections.cells) {
-        const glm::dvec3 low(cell.at.x, cell.at.y, cell.at.z);
-        glm::dvec3 in = glm::clamp((at - low) / static_cast<double>(cell.size), glm::dvec3(0), glm::dvec3(1));
-        glm::dvec3 off = at - (low + in * static_cast<double>(cell.size));
-        if (grid.is_on_ground()) in.y = off.y = 0;
-        const double distance = glm::dot(off, off);
-        if (best && !(distance < least)) continue;
-        best = &cell, least = distance, share = in;
-    }
-    std::vector<WeighedCorner> corners;
-    for (const LatticePoint& p : corners_of(grid, *best)) {
-        const auto weight = [](bool is_high, double s) { return is_high ? s : 1 - s; };
-        corners.push_back({selections.corner(p), weight(p.x > best->at.x, share.x) *
-                                                     (grid.is_on_ground() ? 1 : weight(p.y > best->at.y, share.y)) *
-                                                     weight(p.z > best->at.z, share.z)});
-    }
-    return corners;
-}
-
-std::vector<LevelCosts> SelectionFollower::Impl::costs_of(const std::vector<std::size_t>& objects,
-                                                          glm::dvec3 eye) const {
-    std::vector<LevelCosts> costs;
-    std::vector<std::size_t> place(spheres.size(), spheres.size()); // among the objects
-    const auto distance = [&](std::size_t object, glm::dvec3 from) {
-        return std::max(glm::length(spheres[object].centre - from), spheres[object].radius);
-    };
-    const double pixels = static_cast<double>(selections.window_px) * static_cast<double>(selections.window_px);
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        const std::size_t object = objects[i];
-        place[object] = i;
-        LevelCosts& own = costs.emplace_back();
-        own.triangles = selections.triangles[object];
-        const double size = spheres[object].radius / distance(object, eye);
-        for (const std::uint32_t count : own.triangles)
-            own.costs.push_back(unseen_cost * pixels * size * size *
-                                std::log2(static_cast<double>(std::max(own.triangles.front(), 1U)) /
-                                          static_cast<double>(std::max(count, 1U))));
-    }
-    for (const WeighedCorner& around_eye : around(eye)) {
-        if (!(around_eye.weight > 0)) continue;
-        const glm::dvec3 from = selections.grid.place(around_eye.corner->at);
-        for (const SelectionCamera& camera : around_eye.corner->cameras)
-            for (const SelectedLevel& seen : camera.objects) {
-                const std::size_t i = place[seen.object];
-                if (i == spheres.size()) continue;
-                const double ratio =
-                    std::clamp(distance(seen.object, from) / distance(seen.object, eye), 1 / most_ratio, most_ratio);
-                const double factor = around_eye.weight * std::pow(ratio, cost_falls);
-                for (std::size_t k = 0; k < seen.costs.size(); ++k)
-                    costs[i].costs[k + 1] += factor * static_cast<double>(seen.costs[k]);
-            }
-    }
-    // Sums of pictures' losses need not rise with the level; what is coarser is not better.
-    for (LevelCosts& own : costs)
-        for (std::size_t k = 1; k < own.costs.size(); ++k) own.costs[k] = std::max(own.costs[k], own.costs[k - 1]);
-    return costs;
-}
-
-std::vector<int> SelectionFollower::Impl::nearest(const vdtree::View& view) const {
-    const SelectionCorner* corner = nullptr;
-    double least = 0;
-    for (const WeighedCorner& candidate : around(view.eye)) {
-        const glm::dvec3 off = selections.grid.place(candidate.corner->at) - view.eye;
-        if (const double d = glm::dot(off, off); !corner || d < least) corner = candidate.corner, least = d;
-    }
-    const glm::dvec3 ahead = glm::normalize(view.target - view.eye);
-    std::vector<std::size_t> directions(corner->cameras.size());
-    std::iota(directions.begin(), directions.end(), std::size_t{0});
-    std::stable_sort(directions.begin(), directions.end(), [&](std::size_t a, std::size_t b) {
-        return glm::dot(selection_directions[a], ahead) > glm::dot(selection_directions[b], ahead);
-    });
-    std::vector<int> chosen;
-    for (const auto& counts : selections.triangles) chosen.push_back(static_cast<int>(counts.size()) - 1);
-    for (std::size_t d = 0; d < 2; ++d)
-        for (const SelectedLevel& seen : corner->cameras[directions[d]].objects)
-            chosen[seen.object] = std::min(chosen[seen.object], static_cast<int>(seen.level));
-    return chosen;
-}
-
-// From the levels of the last frame only so far towards those that were chosen as the budget asks for, and as is worth
-// it.
-void SelectionFollower::Impl::keep_what_holds(const std::vector<std::size_t>& objects,
-                                              const std::vector<LevelCosts>& costs, std::vector<int>& chosen) const {
-    const std::vector<int> wanted = chosen;
-    std::uint64_t total = 0;
-    const auto triangles = [&](std::size_t i, int level) {
-        return std::uint64_t{costs[i].triangles[static_cast<std::size_t>(level)]};
-    };
-    const auto cost = [&](std::size_t i, int level) { return costs[i].costs[static_cast<std::size_t>(level)]; };
-    for (std::size_t i = 0; i < objects.size(); ++i) {
-        if (levels[objects[i]] >= 0) chosen[i] = levels[objects[i]];
-        total += triangles(i, chosen[i]);
-    }
-    // Of those that are finer than wanted, the one that loses least for each triangle, but not `without`.
-    const auto cheapest = [&](const std::vector<int>& now) {
-        std::size_t best = objects.size();
+    // The corners of the cell that the eye is in, or of the nearest one, by linear weights.
+    std::vector<WeighedCorner> around(glm::dvec3 eye) const {
+        const SelectionGrid& grid = selections.grid;
+        const glm::dvec3 at = (eye - grid.origin) / grid.step;
+        const SelectionCell* best = nullptr;
         double least = 0;
+        glm::dvec3 share(0);
+        for (const SelectionCell& cell : selections.cells) {
+            const glm::dvec3 low(cell.at.x, cell.at.y, cell.at.z);
+            glm::dvec3 in = glm::clamp((at - low) / static_cast<double>(cell.size), glm::dvec3(0), glm::dvec3(1));
+            glm::dvec3 off = at - (low + in * static_cast<double>(cell.size));
+            if (grid.is_on_ground()) in.y = off.y = 0;
+            const double distance = glm::dot(off, off);
+            if (best && !(distance < least)) continue;
+            best = &cell, least = distance, share = in;
+        }
+        std::vector<WeighedCorner> corners;
+        for (const LatticePoint& p : corners_of(grid, *best)) {
+            const auto weight = [](bool is_high, double s) { return is_high ? s : 1 - s; };
+            corners.push_back({selections.corner(p), weight(p.x > best->at.x, share.x) *
+                                                         (grid.is_on_ground() ? 1 : weight(p.y > best->at.y, share.y)) *
+                                                         weight(p.z > best->at.z, share.z)});
+        }
+        return corners;
+    }
+
+    std::vector<LevelCosts> costs_of(const std::vector<std::size_t>& objects, glm::dvec3 eye) const {
+        std::vector<LevelCosts> costs;
+        std::vector<std::size_t> place(spheres.size(), spheres.size()); // among the objects
+        const auto distance = [&](std::size_t object, glm::dvec3 from) {
+            return std::max(glm::length(spheres[object].centre - from), spheres[object].radius);
+        };
+        const double pixels = static_cast<double>(selections.window_px) * static_cast<double>(selections.window_px);
         for (std::size_t i = 0; i < objects.size(); ++i) {
-            if (now[i] >= wanted[i]) continue;
-            const double ratio =
-                (cost(i, wanted[i]) - cost(i, now[i])) /
-                static_cast<double>(std::max<std::uint64_t>(triangles(i, now[i]) - triangles(i, wanted[i]), 1));
-            if (best == objects.size() || ratio < least) best = i, least = ratio;
+            const std::size_t object = objects[i];
+            place[object] = i;
+            LevelCosts& own = costs.emplace_back();
+            own.triangles = selections.triangles[object];
+            const double size = spheres[object].radius / distance(object, eye);
+            for (const std::uint32_t count : own.triangles)
+                own.costs.push_back(unseen_cost * pixels * size * size *
+                                    std::log2(static_cast<double>(std::max(own.triangles.front(), 1U)) /
+                                              static_cast<double>(std::max(count, 1U))));
         }
-        return best;
-    };
-    while (total > options.budget) {
-        const std::size_t i = cheapest(chosen);
-        if (i == objects.size()) break; // what was chosen does not hold it either
-        total -= triangles(i, chosen[i]) - triangles(i, wanted[i]);
-        chosen[i] = wanted[i];
-    }
-    std::vector<std::size_t> coarser;
-    for (std::size_t i = 0; i < objects.size(); ++i)
-        if (chosen[i] > wanted[i]) coarser.push_back(i);
-    const auto gain = [&](std::size_t i) {
-        return (cost(i, chosen[i]) - cost(i, wanted[i])) /
-               static_cast<double>(std::max<std::uint64_t>(triangles(i, wanted[i]) - triangles(i, chosen[i]), 1));
-    };
-    std::stable_sort(coarser.begin(), coarser.end(), [&](std::size_t a, std::size_t b) { return gain(a) > gain(b); });
-    int changes = 0;
-    for (const std::size_t i : coarser) {
-        if (changes >= options.most_changes) return;
-        std::vector<int> tried = chosen;
-        tried[i] = wanted[i];
-        std::uint64_t sum = total + triangles(i, wanted[i]) - triangles(i, chosen[i]);
-        double lost = cost(i, wanted[i]);
-        int made = 1;
-        while (sum > options.budget) {
-            const std::size_t other = cheapest(tried);
-            if (other == objects.size()) break;
-            sum -= triangles(other, tried[other]) - triangles(other, wanted[other]);
-            lost += cost(other, wanted[other]) - cost(other, tried[other]);
-            tried[other] = wanted[other];
-            ++made;
+        for (const WeighedCorner& around_eye : around(eye)) {
+            if (!(around_eye.weight > 0)) continue;
+            const glm::dvec3 from = selections.grid.place(around_eye.corner->at);
+            for (const SelectionCamera& camera : around_eye.corner->cameras)
+                for (const SelectedLevel& seen : camera.objects) {
+                    const std::size_t i = place[seen.object];
+                    if (i == spheres.size()) continue;
+                    const double ratio = std::clamp(distance(seen.object, from) / distance(seen.object, eye),
+                                                    1 / most_ratio, most_ratio);
+                    const double factor = around_eye.weight * std::pow(ratio, cost_falls);
+                    for (std::size_t k = 0; k < seen.costs.size(); ++k)
+                        costs[i].costs[k + 1] += factor * static_cast<double>(seen.costs[k]);
+                }
         }
-        if (sum > options.budget || !(cost(i, chosen[i]) > options.hysteresis * lost)) continue;
-        if (changes > 0 && changes + made > options.most_changes) return;
-        chosen = std::move(tried);
-        total = sum;
-        changes += made;
+        // Sums of pictures' losses need not rise with the level; what is coarser is not better.
+        for (LevelCosts& own : costs)
+            for (std::size_t k = 1; k < own.costs.size(); ++k) own.costs[k] = std::max(own.costs[k], own.costs[k - 1]);
+        return costs;
     }
-}
+
+    std::vector<int> nearest(const vdtree::View& view) const {
+        const SelectionCorner* corner = nullptr;
+        double least = 0;
+        for (const WeighedCorner& candidate : around(view.eye)) {
+            const glm::dvec3 off = selections.grid.place(candidate.corner->at) - view.eye;
+            if (const double d = glm::dot(off, off); !corner || d < least) corner = candidate.corner, least = d;
+        }
+        const glm::dvec3 ahead = glm::normalize(view.target - view.eye);
+        std::vector<std::size_t> directions(corner->cameras.size());
+        std::iota(directions.begin(), directions.end(), std::size_t{0});
+        std::stable_sort(directions.begin(), directions.end(), [&](std::size_t a, std::size_t b) {
+            return glm::dot(selection_directions[a], ahead) > glm::dot(selection_directions[b], ahead);
+        });
+        std::vector<int> chosen;
+        for (const auto& counts : selections.triangles) chosen.push_back(static_cast<int>(counts.size()) - 1);
+        for (std::size_t d = 0; d < 2; ++d)
+            for (const SelectedLevel& seen : corner->cameras[directions[d]].objects)
+                chosen[seen.object] = std::min(chosen[seen.object], static_cast<int>(seen.level));
+        return chosen;
+    }
+
+    // From the levels of the last frame only so far towards those that were chosen as the budget asks for, and as is worth
+    // it.
+    void keep_what_holds(const std::vector<std::size_t>& objects, const std::vector<LevelCosts>& costs,
+                         std::vector<int>& chosen) const {
+        const std::vector<int> wanted = chosen;
+        std::uint64_t total = 0;
+        const auto triangles = [&](std::size_t i, int level) {
+            return std::uint64_t{costs[i].triangles[static_cast<std::size_t>(level)]};
+        };
+        const auto cost = [&](std::size_t i, int level) { return costs[i].costs[static_cast<std::size_t>(level)]; };
+        for (std::size_t i = 0; i < objects.size(); ++i) {
+            if (levels[objects[i]] >= 0) chosen[i] = levels[objects[i]];
+            total += triangles(i, chosen[i]);
+        }
+        // Of those that are finer than wanted, the one that loses least for each triangle, but not `without`.
+        const auto cheapest = [&](const std::vector<int>& now) {
+            std::size_t best = objects.size();
+            double least = 0;
+            for (std::size_t i = 0; i < objects.size(); ++i) {
+                if (now[i] >= wanted[i]) continue;
+                const double ratio =
+                    (cost(i, wanted[i]) - cost(i, now[i])) /
+                    static_cast<double>(std::max<std::uint64_t>(triangles(i, now[i]) - triangles(i, wanted[i]), 1));
+                if (best == objects.size() || ratio < least) best = i, least = ratio;
+            }
+            return best;
+        };
+        while (total > options.budget) {
+            const std::size_t i = cheapest(chosen);
+            if (i == objects.size()) break; // what was chosen does not hold it either
+            total -= triangles(i, chosen[i]) - triangles(i, wanted[i]);
+            chosen[i] = wanted[i];
+        }
+        std::vector<std::size_t> coarser;
+        for (std::size_t i = 0; i < objects.size(); ++i)
+            if (chosen[i] > wanted[i]) coarser.push_back(i);
+        const auto gain = [&](std::size_t i) {
+            return (cost(i, chosen[i]) - cost(i, wanted[i])) /
+                   static_cast<double>(std::max<std::uint64_t>(triangles(i, wanted[i]) - triangles(i, chosen[i]), 1));
+        };
+        std::stable_sort(coarser.begin(), coarser.end(),
+                         [&](std::size_t a, std::size_t b) { return gain(a) > gain(b); });
+        int changes = 0;
+        for (const std::size_t i : coarser) {
+            if (changes >= options.most_changes) return;
+            std::vector<int> tried = chosen;
+            tried[i] = wanted[i];
+            std::uint64_t sum = total + triangles(i, wanted[i]) - triangles(i, chosen[i]);
+            double lost = cost(i, wanted[i]);
+            int made = 1;
+            while (sum > options.budget) {
+                const std::size_t other = cheapest(tried);
+                if (other == objects.size()) break;
+                sum -= triangles(other, tried[other]) - triangles(other, wanted[other]);
+                lost += cost(other, wanted[other]) - cost(other, tried[other]);
+                tried[other] = wanted[other];
+                ++made;
+            }
+            if (sum > options.budget || !(cost(i, chosen[i]) > options.hysteresis * lost)) continue;
+            if (changes > 0 && changes + made > options.most_changes) return;
+            chosen = std::move(tried);
+            total = sum;
+            changes += made;
+        }
+    }
+};
 
 Result<SelectionFollower> SelectionFollower::create(Selections selections, const Scene& scene,
                                                     std::span<const std::vector<std::uint32_t>> triangles,
                                                     const SelectionFollowOptions& options) {
     if (!(options.hysteresis >= 1 && std::isfinite(options.hysteresis)) || options.most_changes < 1)
         return invalid_argument("Levels are followed with a hysteresis of 1 or more, and one change a frame or more.");
-    if (selections.triangles.size() != scene.objects.size() ||
-        !std::equal(triangles.begin(), triangles.end(), selections.triangles.begin(), selections.triangles.end()) ||
-        selections.scene != scene_fingerprint(scene, triangles))
+    const Selections::Data& data = selections.data();
+    if (data.triangles.size() != scene.objects.size() || !std::ranges::equal(triangles, data.triangles) ||
+        data.scene != scene_fingerprint(scene, triangles))
         return Error{ErrorCode::malformed_data,
                      "The selections are of another scene, or of other levels of this one: make them anew with "
                      "'unseen levels precompute'."};
-    auto impl = std::make_unique<Impl>(Impl{std::move(selections), options, {}, {}});
+    auto impl = std::make_shared<Impl>(std::move(selections), options);
     if (impl->options.budget == 0) impl->options.budget = impl->selections.budget;
     for (const Object& object : scene.objects) impl->spheres.push_back(world_sphere(object));
     return SelectionFollower(std::move(impl));
@@ -299,12 +295,5 @@ Result<ChosenLevels> SelectionFollower::choose(const vdtree::View& view) {
     own.levels = result.levels;
     return result;
 }
-
-const Selections& SelectionFollower::selections() const noexcept { return impl_->selections; }
-
-SelectionFollower::SelectionFollower(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-SelectionFollower::SelectionFollower(SelectionFollower&&) noexcept = default;
-SelectionFollower& SelectionFollower::operator=(SelectionFollower&&) noexcept = default;
-SelectionFollower::~SelectionFollower() = default;
 
 } // namespace unseen::session

@@ -1,10 +1,9 @@
-#include <unseen/session/selection.h>
+#include <unseen/session/internal/selection_search.h>
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
-#include <limits>
 #include <queue>
+#include <tuple>
 
 #include <unseen/perception/internal/ssim_window.h>
 #include <unseen/perception/judge.h>
@@ -55,60 +54,43 @@ PixelRect united(const PixelRect& a, const PixelRect& b) {
 }
 
 // ---- pictures from parts
-// ----------------------------------------------------------------------------------------------
 
 namespace {
 
-// Puts the rectangle together anew; the rest of `values` stays.
-class Composite {
-public:
-    explicit Composite(const LayeredPicture& picture) : picture_(picture) {}
-
-    void fill(std::span<const int> levels, const PixelRect& box, std::span<float> values) {
-        if (box.is_empty()) return;
-        depth_.resize(picture_.background_depth.size());
-        const auto count = static_cast<std::ptrdiff_t>(box.width());
-        for (int y = box.top; y < box.bottom; ++y) {
-            const auto at = static_cast<std::ptrdiff_t>(place_in(picture_.width, box.left, y));
-            std::copy_n(picture_.background.begin() + at, count, values.begin() + at);
-            std::copy_n(picture_.background_depth.begin() + at, count, depth_.begin() + at);
-        }
-        for (std::size_t i = 0; i < picture_.objects.size(); ++i)
-            add(picture_.objects[i].levels[static_cast<std::size_t>(levels[i])], box, values);
+// Puts the rectangle together anew; the rest of `values` stays. `depth`: for the picture's pixels.
+void fill(const LayeredPicture& picture, std::span<const int> levels, const PixelRect& box, std::span<float> values,
+          std::vector<float>& depth) {
+    if (box.is_empty()) return;
+    depth.resize(picture.background_depth.size());
+    const auto count = static_cast<std::ptrdiff_t>(box.width());
+    for (int y = box.top; y < box.bottom; ++y) {
+        const auto at = static_cast<std::ptrdiff_t>(place_in(picture.width, box.left, y));
+        std::copy_n(picture.background.begin() + at, count, values.begin() + at);
+        std::copy_n(picture.background_depth.begin() + at, count, depth.begin() + at);
     }
-
-private:
-    void add(const LevelImage& image, const PixelRect& box, std::span<float> values) {
+    for (std::size_t i = 0; i < picture.objects.size(); ++i) {
+        const LevelImage& image = picture.objects[i].levels[static_cast<std::size_t>(levels[i])];
         const int left = std::max(box.left, image.box.left), right = std::min(box.right, image.box.right);
         const int top = std::max(box.top, image.box.top), bottom = std::min(box.bottom, image.box.bottom);
         for (int y = top; y < bottom; ++y)
             for (int x = left; x < right; ++x) {
                 const std::size_t from = place_in(image.box.width(), x - image.box.left, y - image.box.top),
-                                  to = place_in(picture_.width, x, y);
-                if (image.depth[from] > depth_[to]) {
-                    depth_[to] = image.depth[from];
-                    values[to] = image.values[from];
-                }
+                                  to = place_in(picture.width, x, y);
+                if (image.depth[from] > depth[to]) depth[to] = image.depth[from], values[to] = image.values[from];
             }
     }
-
-    const LayeredPicture& picture_;
-    std::vector<float> depth_;
-};
-
-PixelRect whole(const LayeredPicture& picture) { return {0, 0, picture.width, picture.height}; }
+}
 
 } // namespace
 
 std::vector<float> put_together(const LayeredPicture& picture, std::span<const int> levels) {
     assert(levels.size() == picture.objects.size());
-    std::vector<float> values(picture.background.size());
-    Composite(picture).fill(levels, whole(picture), values);
+    std::vector<float> values(picture.background.size()), depth;
+    fill(picture, levels, {0, 0, picture.width, picture.height}, values, depth);
     return values;
 }
 
 // ---- what a picture loses
-// ---------------------------------------------------------------------------------------------
 
 Result<PictureLoss> PictureLoss::create(SelectionQuality quality, int width, int height, std::vector<float> reference,
                                         const perception::Display& display) {
@@ -212,16 +194,7 @@ void PictureLoss::take(std::span<const float> picture, const PixelRect& changed)
         }
 }
 
-double PictureLoss::of(std::span<const float> picture) const {
-    std::vector<double> losses;
-    count(picture, {0, 0, columns_, rows_}, losses);
-    double sum = 0;
-    for (const double loss : losses) sum += loss;
-    return sum;
-}
-
 // ---- the search
-// -------------------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -229,7 +202,7 @@ namespace {
 class Search {
 public:
     Search(const LayeredPicture& picture, PictureLoss loss, std::vector<float> values)
-        : picture_(picture), loss_(std::move(loss)), composite_(picture), values_(std::move(values)), tried_(values_),
+        : picture_(picture), loss_(std::move(loss)), values_(std::move(values)), tried_(values_),
           levels_(picture.objects.size(), 0) {
         for (const ObjectImages& object : picture.objects) triangles_ += object.triangles.front();
     }
@@ -317,7 +290,7 @@ private:
             united(images[static_cast<std::size_t>(levels_[i])].box, images[static_cast<std::size_t>(level)].box);
         const int before = levels_[i];
         levels_[i] = level;
-        composite_.fill(levels_, box, tried_);
+        fill(picture_, levels_, box, tried_, depth_);
         levels_[i] = before;
         PixelRect changed;
         for (int y = box.top; y < box.bottom; ++y) {
@@ -342,8 +315,8 @@ private:
 
     const LayeredPicture& picture_;
     PictureLoss loss_;
-    Composite composite_;
     std::vector<float> values_, tried_; // as it is; the same but for a change that is tried
+    std::vector<float> depth_;          // of what is put together
     std::vector<int> levels_;
     std::uint64_t triangles_ = 0, evaluations_ = 0;
 };
@@ -359,24 +332,11 @@ struct Candidate {
     std::uint64_t saved = 0;
     std::size_t object = 0;
     std::uint64_t version = 0; // of the object's surroundings, when it was counted
-};
-struct IsWorse {
-    bool operator()(const Candidate& a, const Candidate& b) const {
-        if (a.cost != b.cost) return a.cost > b.cost;
-        if (a.saved != b.saved) return a.saved < b.saved;
-        return a.object > b.object;
+
+    bool operator<(const Candidate& other) const { // the queue's greatest comes first
+        return std::tuple(-cost, saved, other.object) < std::tuple(-other.cost, other.saved, object);
     }
 };
-
-FoundSelection found(const Search& search, std::uint64_t budget) {
-    FoundSelection result;
-    result.levels = search.levels();
-    result.triangles = search.triangles();
-    result.loss = search.loss();
-    result.holds = search.triangles() <= budget;
-    result.evaluations = search.evaluations();
-    return result;
-}
 
 // Raises by one level what gains most for a triangle and fits, until nothing does.
 void spend_the_rest(Search& search, std::uint64_t budget) {
@@ -401,8 +361,7 @@ void spend_the_rest(Search& search, std::uint64_t budget) {
 } // namespace
 
 Result<FoundSelection> select_greedily(const LayeredPicture& picture, SelectionQuality quality,
-                                       const perception::Display& display, const SearchOptions& options,
-                                       bool measures_alone) {
+                                       const perception::Display& display, std::uint64_t budget, bool measures_alone) {
     auto begun = Search::begin(picture, quality, display);
     if (!begun) return begun.error();
     Search& search = *begun;
@@ -412,8 +371,7 @@ Result<FoundSelection> select_greedily(const LayeredPicture& picture, SelectionQ
         for (int level = 1; level <= search.last_level(i); ++level) alone[i].push_back(search.change_to(i, level));
 
     std::vector<std::uint64_t> versions(objects, 0);
-    using Queue = std::priority_queue<Candidate, std::vector<Candidate>, IsWorse>;
-    Queue queue;
+    std::priority_queue<Candidate> queue;
     const auto add = [&](std::size_t i) {
         const int next = search.levels()[i] + 1;
         if (next > search.last_level(i)) return;
@@ -424,9 +382,9 @@ Result<FoundSelection> select_greedily(const LayeredPicture& picture, SelectionQ
                                   : search.change_to(i, next);
         queue.push({change / static_cast<double>(std::max<std::uint64_t>(saved, 1)), saved, i, versions[i]});
     };
-    if (search.triangles() > options.budget)
+    if (search.triangles() > budget)
         for (std::size_t i = 0; i < objects; ++i) add(i);
-    while (search.triangles() > options.budget && !queue.empty()) {
+    while (search.triangles() > budget && !queue.empty()) {
         const Candidate first = queue.top();
         queue.pop();
         if (first.version != versions[first.object]) {
@@ -440,60 +398,10 @@ Result<FoundSelection> select_greedily(const LayeredPicture& picture, SelectionQ
             if (i == first.object || meet(search.reach(i, next), changed)) ++versions[i];
         }
         add(first.object);
-        if (options.is_lazy) continue;
-        Queue anew;
-        for (; !queue.empty(); queue.pop()) {
-            if (queue.top().version == versions[queue.top().object]) anew.push(queue.top());
-        }
-        std::swap(queue, anew);
-        std::vector<char> is_there(objects, 0);
-        for (Queue copy = queue; !copy.empty(); copy.pop()) is_there[copy.top().object] = 1;
-        for (std::size_t i = 0; i < objects; ++i)
-            if (!is_there[i]) add(i);
     }
-    if (search.triangles() <= options.budget) spend_the_rest(search, options.budget);
-    FoundSelection result = found(search, options.budget);
-    result.alone = std::move(alone);
-    return result;
-}
-
-Result<FoundSelection> select_exhaustively(const LayeredPicture& picture, SelectionQuality quality,
-                                           const perception::Display& display, const SearchOptions& options) {
-    auto begun = Search::begin(picture, quality, display);
-    if (!begun) return begun.error();
-    Search& search = *begun;
-    std::uint64_t combinations = 1;
-    for (std::size_t i = 0; i < picture.objects.size(); ++i) {
-        combinations *= static_cast<std::uint64_t>(search.last_level(i)) + 1;
-        if (combinations > most_combinations)
-            return invalid_argument("Trying all levels of " + std::to_string(picture.objects.size()) +
-                                    " objects takes more than " + std::to_string(most_combinations) + " pictures.");
-    }
-    auto loss = PictureLoss::create(quality, picture.width, picture.height,
-                                    put_together(picture, std::vector<int>(picture.objects.size(), 0)), display);
-    if (!loss) return loss.error();
-    FoundSelection best;
-    best.loss = std::numeric_limits<double>::infinity();
-    std::vector<int> levels(picture.objects.size(), 0);
-    for (std::uint64_t number = 0; number < combinations; ++number) {
-        std::uint64_t rest = number, triangles = 0;
-        for (std::size_t i = 0; i < levels.size(); ++i) {
-            const auto count = static_cast<std::uint64_t>(search.last_level(i)) + 1;
-            levels[i] = static_cast<int>(rest % count);
-            rest /= count;
-            triangles += search.triangles_of(i, levels[i]);
-        }
-        const bool is_last = number + 1 == combinations; // every object at its last level
-        if (triangles > options.budget && !(is_last && best.levels.empty())) continue;
-        ++best.evaluations;
-        const double lost = loss->of(put_together(picture, levels));
-        if (!best.levels.empty() && !(lost < best.loss)) continue;
-        best.levels = levels;
-        best.loss = lost;
-        best.triangles = triangles;
-        best.holds = triangles <= options.budget;
-    }
-    return best;
+    if (search.triangles() <= budget) spend_the_rest(search, budget);
+    return FoundSelection{search.levels(),      search.triangles(), search.loss(), search.triangles() <= budget,
+                          search.evaluations(), std::move(alone)};
 }
 
 } // namespace unseen::session

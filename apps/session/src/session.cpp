@@ -2,19 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include <numbers>
 #include <unordered_map>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/gaze.h>
 #include <unseen/perception/internal/motion.h>
-#include <unseen/session/follower.h>
-#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/errors.h>
-#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/number_text.h>
 
 #include "loaded_tree.h"
@@ -66,10 +60,8 @@ Result<void> check_object(const Scene& scene, std::size_t object) {
                             std::to_string(scene.objects.size()) + ", counted from 0.");
 }
 
-Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
-    Plan plan{decision.test, std::string(decision.why), decision.measures, effects_of(sight, decision, std::nullopt)};
-    for (Effect& effect : plan.effects) effect.object = object;
-    return plan;
+Plan plan_of(const Sight& sight, const Decision& decision) {
+    return {decision.test, std::string(decision.why), decision.measures, effects_of(sight, decision, std::nullopt)};
 }
 
 } // namespace
@@ -347,11 +339,6 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
 
 // ---- the session
 
-Session::Session(std::shared_ptr<State> state) : state_(std::move(state)) {}
-Session::Session(Session&&) noexcept = default;
-Session& Session::operator=(Session&&) noexcept = default;
-Session::~Session() = default;
-
 Result<Session> Session::create(Scene scene, Observer observer, Messages messages) {
     auto state = State::create(std::move(scene), std::move(observer), std::move(messages));
     if (!state) return state.error();
@@ -423,7 +410,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
     if (!sights) return sights.error();
     const auto decision = decide((*sights)[object], request, object);
     if (!decision) return decision.error();
-    return plan_of((*sights)[object], *decision, object);
+    return plan_of((*sights)[object], *decision);
 }
 
 Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
@@ -432,7 +419,7 @@ Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Reque
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;
     for (std::size_t i = 0; i < prepared->sights.size(); ++i)
-        plans.push_back(plan_of(prepared->sights[i], prepared->decisions[i], i));
+        plans.push_back(plan_of(prepared->sights[i], prepared->decisions[i]));
     return plans;
 }
 
@@ -460,14 +447,6 @@ Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) 
     if (!sights) return sights.error();
     if (sights->empty()) return perception::SceneLuminance{state_->background, state_->background};
     return sights->front().luminance;
-}
-
-std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const {
-    return session::inner_spheres(state_->scene.objects[object], *state_->caches[object]);
-}
-
-Result<const perception::CutRings*> Session::cut_rings(std::size_t object) const {
-    return session::cut_rings(state_->scene.objects[object], *state_->caches[object], false);
 }
 
 } // namespace unseen::session

@@ -1,15 +1,7 @@
 // What a session and its followers share.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <vector>
-
-#include <unseen/perception/gaze.h>
-
-#include "effects.h"
 #include "fold_test.h"
-#include "sight.h"
 
 namespace unseen::session {
 

@@ -1,17 +1,12 @@
 #include "shadow_reach.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
-#include <limits>
-#include <numbers>
-#include <optional>
 #include <queue>
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/light_bounds.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 
 namespace unseen::session {

@@ -5,18 +5,9 @@
 // the light and the way to it: what casts a shadow looks up what lies behind it.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
 #include <unseen/perception/internal/shadow_edges.h>
-#include <unseen/session/scene.h>
 #include <unseen/session/session.h>
-#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/light_bounds.h>
-#include <unseen/vdtree/lighting.h>
-#include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::session {
 

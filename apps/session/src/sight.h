@@ -1,24 +1,14 @@
 // One object of a scene as it is seen: what fold tests look at.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <string_view>
-#include <vector>
-
-#include <unseen/perception/criterion.h>
 #include <unseen/perception/internal/cut_rings.h>
 #include <unseen/perception/internal/lit_folds.h>
-#include <unseen/session/observer.h>
-#include <unseen/session/scene.h>
-#include <unseen/session/session.h>
-#include <unseen/vdtree/internal/light_bounds.h>
 
 #include "shadow_reach.h"
 
 namespace unseen::session {
 
-struct KeptCriterion; // see fold_test.cpp
+struct KeptCriterion; // see fold_test.h
 
 // What is derived from an object's tree, made when it is first asked for. Dropped when the tree is replaced.
 struct ObjectCache {

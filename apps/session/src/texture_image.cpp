@@ -2,15 +2,9 @@
 #include "texture_image.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <csetjmp>
-#include <cstdint>
-#include <cstdio> // what jpeglib.h counts on
 #include <new>
-#include <span>
-#include <string>
-#include <vector>
 
 #include <jerror.h>
 #include <jpeglib.h>

@@ -1,8 +1,6 @@
 // Brings the images that a mesh file, or its user, names to the mesh.
 #pragma once
 
-#include <filesystem>
-
 #include <unseen/session/load.h>
 
 namespace unseen::session {

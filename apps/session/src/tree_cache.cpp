@@ -2,10 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
-#include <cstdlib>
-#include <limits>
-#include <string_view>
 #include <system_error>
 
 #define XXH_INLINE_ALL

@@ -2,14 +2,15 @@
 #include <unseen/session_gpu/as_seen.h>
 
 #include <algorithm>
-#include <utility>
 
+#include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/internal/motion.h>
-#include <unseen/render/internal/depth.h>
+#include <unseen/perception/masking.h>
+#include <unseen/render/internal/frame.h>
+#include <unseen/render/internal/layers.h>
+#include <unseen/render/internal/visibility_passes.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
-
-#include "scene_masks.h"
 
 namespace unseen::session {
 namespace {
@@ -41,13 +42,140 @@ const char* why_nothing_masks(const Session& session, const Simplification& made
     return nullptr;
 }
 
-PassEffect shadow_effect(SceneRenderer& renderer) {
+Effect shadow_effect(SceneRenderer& renderer) {
     const auto facts = renderer.shadows();
     if (!facts) return {"shadows", false, "no light casts a shadow"};
     return {"shadows",     true, std::to_string(facts->lights) + (facts->lights == 1 ? " light casts" : " lights cast"),
             facts->maps,   0,    facts->bytes,
             facts->draw_ms};
 }
+
+// ---- what the pictures of a view mask
+
+struct SceneMasks {
+    std::vector<perception::MaskingPicture> of_objects; // what one layer masks is the same for all its objects
+    // Of all cells and bands of a layer's picture, in how many thresholds rise by a quarter or more.
+    float largest_share = 0;
+    int surface_passes = 0, full_screen_passes = 0;
+    std::uint64_t texture_bytes = 0;
+};
+
+// People differ in how much they see of a masker, too, and models of sight do. Changes are looked for by the observer,
+// and maskers count as for somebody who sees half as much: of the default observer, as for the median person.
+constexpr double maskers_gain = 0.5;
+
+// All but one layer's objects.
+std::vector<render::Item> without_layer(const SceneItems& scene, const std::vector<int>& layer_of, int layer) {
+    std::vector<render::Item> rest;
+    for (std::size_t i = 0; i < scene.items.size(); ++i)
+        if (i >= scene.objects.size() || layer_of[scene.objects[i]] != layer) rest.push_back(scene.items[i]);
+    return rest;
+}
+
+// What pictures of a view mask, for this observer.
+struct Masks {
+    const render::Context& context_;
+    const vdtree::View& view_;
+    double black_, white_; // cd/m2
+    render::Sampling sampling_;
+    JudgeTables tables_;
+    render::SampleSum sum_;
+    std::optional<render::VisibilityPasses> passes_ = {};
+    int drawings_ = 0;
+
+    static Result<Masks> create(const Session& session, const render::Context& context, const vdtree::View& view,
+                                int samples) {
+        const perception::Display& display = session.observer().display;
+        const double black = perception::to_luminance(display, 0).value(),
+                     white = perception::to_luminance(display, 1).value();
+        perception::JudgeOptions judging = judge_options(session.observer());
+        judging.gain *= maskers_gain;
+        auto tables = perception::judge_tables(view.width, view.height, static_cast<float>(black),
+                                               static_cast<float>(white), judging);
+        if (!tables) return tables.error();
+        auto sum = render::SampleSum::create(context, view.width, view.height);
+        if (!sum) return sum.error();
+        return Masks{context,
+                     view,
+                     black,
+                     white,
+                     {.samples = samples, .background = session.background()},
+                     std::move(*tables),
+                     std::move(*sum)};
+    }
+
+    Result<perception::Elevations> of(std::span<const render::Item> items, render::Shadows* shadows) {
+        sampling_.shadows = shadows;
+        if (auto drawn = sum_.draw(items, view_, sampling_); !drawn) return drawn.error();
+        drawings_ += sampling_.samples;
+        render::LuminanceTexture picture = sum_.mean_luminance();
+        picture.scale *= static_cast<float>(white_ - black_);
+        picture.offset = static_cast<float>(black_ + static_cast<double>(picture.offset) * (white_ - black_));
+        if (!passes_) {
+            auto made = render::VisibilityPasses::create(context_, tables_, picture);
+            if (!made) return made.error();
+            passes_ = std::move(*made);
+        } else if (auto set = passes_->set_reference(picture); !set) {
+            return set.error();
+        }
+        if (auto mapped = passes_->map_elevations(); !mapped) return mapped.error();
+        auto grid = passes_->read_elevations();
+        if (!grid) return grid.error();
+        perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
+        for (const JudgeTables::Band& band : tables_.bands) elevations.bands.emplace_back(band.nominal_cpd);
+        return elevations;
+    }
+
+    int full_screen_passes() const { return passes_ ? passes_->full_screen_passes() : 0; }
+    std::uint64_t texture_bytes() const {
+        constexpr std::uint64_t of_sum = 36; // bytes a pixel: SampleSum
+        const std::uint64_t pixels = static_cast<std::uint64_t>(view_.width) * static_cast<std::uint64_t>(view_.height);
+        return of_sum * pixels + (passes_ ? passes_->texture_bytes() : 0);
+    }
+};
+
+// Of cells in all bands, those whose thresholds rise by a quarter or more: less does nearly nothing.
+float share_raised(const perception::Elevations& a, const perception::Elevations& b) {
+    constexpr float raised = 1.25f;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < a.elevation.size(); ++i) count += std::min(a.elevation[i], b.elevation[i]) >= raised;
+    return static_cast<float>(count) / static_cast<float>(std::max<std::size_t>(a.elevation.size(), 1));
+}
+
+// Objects by the depth of their centres. No layers: all are in one.
+Result<render::LayerSplit> split_objects(const Session& session, const vdtree::View& view, int layers) {
+    std::vector<glm::dvec3> centres;
+    for (const Object& object : session.scene().objects) centres.push_back(world_sphere(object).centre);
+    return render::split_into_layers(centres, view, layers);
+}
+
+// Draws the scene, and it without each layer's objects, and maps what each picture masks; waits for the GPU after each.
+// Shadows are those of the whole scene, whatever is drawn.
+Result<SceneMasks> find_masks(const Session& session, const render::Context& context, const SceneItems& scene,
+                              const vdtree::View& view, const render::LayerSplit& split, int samples) {
+    auto masks = Masks::create(session, context, view, samples);
+    if (!masks) return masks.error();
+    const auto whole = masks->of(scene.items, scene.shadows);
+    if (!whole) return whole.error();
+    SceneMasks found;
+    std::vector<perception::MaskingPicture> by_layer;
+    for (int layer = 0; layer < std::max(split.count, 1); ++layer) {
+        auto rest = masks->of(without_layer(scene, split.layer_of, layer), scene.shadows);
+        if (!rest) return rest.error();
+        found.largest_share = std::max(found.largest_share, share_raised(*whole, *rest));
+        const perception::Elevations both[] = {*whole, std::move(*rest)};
+        auto masking = perception::MaskingPicture::create(view, both);
+        if (!masking) return masking.error();
+        by_layer.push_back(std::move(*masking));
+    }
+    for (const int layer : split.layer_of) found.of_objects.push_back(by_layer[static_cast<std::size_t>(layer)]);
+    found.surface_passes = masks->drawings_;
+    found.full_screen_passes = masks->full_screen_passes();
+    found.texture_bytes = masks->texture_bytes();
+    return found;
+}
+
+// ---- what a simplification is to go by
 
 // What pictures of one simplification say, for the next one.
 class Pictures {
@@ -66,7 +194,7 @@ public:
         effects_.push_back(shadow_effect(*renderer));
         return {};
     }
-    std::vector<PassEffect> take_effects() { return std::move(effects_); }
+    std::vector<Effect> take_effects() { return std::move(effects_); }
 
 private:
     Result<void> find_hidden(const SceneItems& scene, Request& request) {
@@ -116,7 +244,7 @@ private:
     const render::Context& context_;
     const vdtree::View& view_;
     const AsSeenOptions& options_;
-    std::vector<PassEffect> effects_;
+    std::vector<Effect> effects_;
 };
 
 } // namespace

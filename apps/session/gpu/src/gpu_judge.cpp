@@ -1,9 +1,6 @@
 #include <unseen/session_gpu/gpu_judge.h>
 
 #include <algorithm>
-#include <optional>
-#include <string>
-#include <utility>
 
 #include <unseen/perception/internal/judge_tables.h>
 #include <unseen/render/internal/visibility_passes.h>
@@ -34,11 +31,6 @@ struct GpuJudge::Impl {
     int width, height;
     std::optional<render::LuminanceImage> test; // made for the first uploaded picture
 };
-
-GpuJudge::GpuJudge(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-GpuJudge::GpuJudge(GpuJudge&&) noexcept = default;
-GpuJudge& GpuJudge::operator=(GpuJudge&&) noexcept = default;
-GpuJudge::~GpuJudge() = default;
 
 Result<GpuJudge> GpuJudge::create(const render::Context& context, const perception::Image& reference,
                                   const perception::JudgeOptions& options) {

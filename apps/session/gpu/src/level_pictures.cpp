@@ -1,16 +1,9 @@
-#include <unseen/session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/internal/level_pictures.h>
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <string>
-#include <utility>
 
-#include <glm/vec2.hpp>
-
-#include <unseen/render/draw.h>
-#include <unseen/render/sample_sum.h>
-#include <unseen/render/target.h>
+#include <unseen/render/internal/frame.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
@@ -93,17 +86,106 @@ struct LevelPictures::Impl {
     Impl(const render::Context& context_, Session& session_)
         : context(context_), session(session_.share()), uploads(context_) {}
 
-    Result<void> load(int level_count);
-    Result<void> need_sheet(const vdtree::View& view);
-    Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
-    Result<std::vector<render::Item>> backdrop_items(const vdtree::View& view) const;
+    Result<void> load(int level_count) {
+        if (auto ready = session.prepare(session.default_view(), {}); !ready) return ready.error();
+        const Scene& scene = session.scene();
+        for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+            const auto own = uploads.levels(session.tree(i), [&] { return selection_chain(session, i, level_count); });
+            if (!own) return own.error();
+            const LevelChain& chain = (*own)->chain;
+            levels.push_back(*own);
+            spheres.push_back(world_sphere(scene.objects[i]));
+            auto& counts = triangles.emplace_back();
+            for (int level = 0; level < chain.size(); ++level) counts.push_back(chain.triangles(level));
+        }
+        return backdrop.load(scene, uploads);
+    }
+
+    Result<void> need_sheet(const vdtree::View& view) {
+        const int width = std::max(view.width, sheet_side), height = std::max(view.height, sheet_side);
+        if (sheet && sheet->width() == width && sheet->height() == height) return {};
+        sheet.reset();
+        auto made = render::Target::create(context, width, height, {.label = "level pictures"});
+        if (!made) return made.error();
+        sheet = std::move(*made);
+        return {};
+    }
+
+    Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const {
+        return lit_item(session, object, levels[object]->cuts[static_cast<std::size_t>(level)], view);
+    }
+
+    // One for all pictures of the view, so that their depths compare.
     Result<double> near_plane(const std::vector<std::size_t>& objects, const std::vector<render::Item>& background,
-                              const vdtree::View& view) const;
-    Result<void> clear_sheet();
+                              const vdtree::View& view) const {
+        std::vector<render::Item> all = background;
+        for (const std::size_t object : objects)
+            all.push_back({levels[object]->cuts.front(), session.scene().objects[object].placement});
+        return render::near_plane(all, view);
+    }
+
+    Result<void> clear_sheet() {
+        rows = SheetRows(sheet->width(), sheet->height());
+        placed.clear();
+        vdtree::View whole;
+        whole.width = sheet->width(), whole.height = sheet->height();
+        return render::draw({}, {.view = whole}, *sheet, {.colour = glm::vec4(session.background())});
+    }
+
+    // Draws a part of the view's window to a place on the sheet. The image gets its box now, and the rest when the sheet is
+    // read, until which it must stay where it is.
     Result<void> draw(std::span<const render::Item> items, const vdtree::View& view, double near,
-                      const render::PixelBox& part, LevelImage& image, bool is_trimmed = true);
-    Result<void> read_sheet();
-    float value_of(float luminance, SelectionQuality quality) const;
+                      const render::PixelBox& part, LevelImage& image, bool is_trimmed = true) {
+        image.box = {part.left, part.top, part.left + part.width, part.top + part.height};
+        if (image.box.is_empty()) return {};
+        auto at = rows.place(part.width, part.height);
+        if (!at) {
+            if (auto read = read_sheet(); !read) return read;
+            if (auto cleared = clear_sheet(); !cleared) return cleared;
+            at = rows.place(part.width, part.height); // no part is larger than the sheet
+        }
+        const auto start = vdtree::Clock::now();
+        const render::Camera camera{.view = view, .near_plane = near, .tile = render::Tile{part, at->x, at->y}};
+        if (auto drawn = render::draw(items, camera, *sheet, {.colour = {}, .depth = false}); !drawn) return drawn;
+        times.draw_ms += vdtree::ms_since(start);
+        ++times.drawings;
+        placed.push_back({&image, *at, is_trimmed});
+        return {};
+    }
+
+    // The images get luminance for values.
+    Result<void> read_sheet() {
+        if (placed.empty()) return {};
+        const auto start = vdtree::Clock::now();
+        const render::PixelBox used{0, 0, sheet->width(), rows.used()};
+        const auto pixels = render::read_pixels(*sheet, 0, used);
+        if (!pixels) return pixels.error();
+        const auto depth = render::read_depth(*sheet, used);
+        if (!depth) return depth.error();
+        for (const auto& [image, at, is_trimmed] : placed) {
+            for (int y = 0; y < image->box.height(); ++y) {
+                const auto row = (static_cast<std::size_t>(at.y) + static_cast<std::size_t>(y)) *
+                                     static_cast<std::size_t>(used.width) +
+                                 static_cast<std::size_t>(at.x);
+                for (std::size_t i = row; i < row + static_cast<std::size_t>(image->box.width()); ++i) {
+                    image->values.push_back((*pixels)[i].a);
+                    image->depth.push_back((*depth)[i]);
+                }
+            }
+            if (is_trimmed) *image = trimmed(*image);
+        }
+        placed.clear();
+        times.read_ms += vdtree::ms_since(start);
+        return {};
+    }
+
+    float value_of(float luminance, SelectionQuality quality) const {
+        const perception::Display& display = session.observer().display;
+        const auto relative = static_cast<double>(luminance);
+        if (quality != SelectionQuality::ssim)
+            return static_cast<float>(perception::to_luminance(display, relative).value());
+        return static_cast<float>(std::round(255 * std::clamp(perception::encode(display, relative), 0.0, 1.0)));
+    }
 
     render::Context context;
     Session session;
@@ -111,135 +193,13 @@ struct LevelPictures::Impl {
     std::vector<const UploadedLevels*> levels; // by object
     std::vector<WorldSphere> spheres;          // by object
     std::vector<std::vector<std::uint32_t>> triangles;
-    std::vector<render::GpuCut> backdrop;
+    UploadedBackdrop backdrop;
     std::optional<render::Target> sheet;
     SheetRows rows{0, 0};
     std::vector<Placed> placed;
     std::optional<render::SampleSum> sum; // of frames, for each of another size
-    LevelPictureTimes times;
+    Times times;
 };
-
-Result<void> LevelPictures::Impl::load(int level_count) {
-    if (auto ready = session.prepare(session.default_view(), {}); !ready) return ready.error();
-    const Scene& scene = session.scene();
-    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-        const auto own = uploads.levels(session.tree(i), [&] { return selection_chain(session, i, level_count); });
-        if (!own) return own.error();
-        const LevelChain& chain = (*own)->chain;
-        levels.push_back(*own);
-        spheres.push_back(world_sphere(scene.objects[i]));
-        auto& counts = triangles.emplace_back();
-        for (int level = 0; level < chain.size(); ++level) counts.push_back(chain.triangles(level));
-    }
-    for (const Object& part : scene.backdrop) {
-        auto whole = uploads.whole(part.tree);
-        if (!whole) return whole.error();
-        backdrop.push_back(std::move(*whole));
-    }
-    return {};
-}
-
-Result<void> LevelPictures::Impl::need_sheet(const vdtree::View& view) {
-    const int width = std::max(view.width, sheet_side), height = std::max(view.height, sheet_side);
-    if (sheet && sheet->width() == width && sheet->height() == height) return {};
-    sheet.reset();
-    auto made = render::Target::create(context, width, height, {.label = "level pictures"});
-    if (!made) return made.error();
-    sheet = std::move(*made);
-    return {};
-}
-
-Result<render::Item> LevelPictures::Impl::item(std::size_t object, int level, const vdtree::View& view) const {
-    auto lighting = session.lighting(view, object);
-    if (!lighting) return lighting.error();
-    render::Item made{levels[object]->cuts[static_cast<std::size_t>(level)], session.scene().objects[object].placement};
-    made.lighting = std::move(*lighting);
-    return made;
-}
-
-Result<std::vector<render::Item>> LevelPictures::Impl::backdrop_items(const vdtree::View& view) const {
-    std::vector<render::Item> items;
-    for (std::size_t i = 0; i < backdrop.size(); ++i) {
-        auto lighting = session.backdrop_lighting(view, i);
-        if (!lighting) return lighting.error();
-        render::Item& made = items.emplace_back(render::Item{backdrop[i], session.scene().backdrop[i].placement});
-        made.lighting = std::move(*lighting);
-    }
-    return items;
-}
-
-// One for all pictures of the view, so that their depths compare.
-Result<double> LevelPictures::Impl::near_plane(const std::vector<std::size_t>& objects,
-                                               const std::vector<render::Item>& background,
-                                               const vdtree::View& view) const {
-    std::vector<render::Item> all = background;
-    for (const std::size_t object : objects)
-        all.push_back({levels[object]->cuts.front(), session.scene().objects[object].placement});
-    return render::near_plane(all, view);
-}
-
-Result<void> LevelPictures::Impl::clear_sheet() {
-    rows = SheetRows(sheet->width(), sheet->height());
-    placed.clear();
-    vdtree::View whole;
-    whole.width = sheet->width(), whole.height = sheet->height();
-    return render::draw({}, {.view = whole}, *sheet, {.colour = glm::vec4(session.background())});
-}
-
-// Draws a part of the view's window to a place on the sheet. The image gets its box now, and the rest when the sheet is
-// read, until which it must stay where it is.
-Result<void> LevelPictures::Impl::draw(std::span<const render::Item> items, const vdtree::View& view, double near,
-                                       const render::PixelBox& part, LevelImage& image, bool is_trimmed) {
-    image.box = {part.left, part.top, part.left + part.width, part.top + part.height};
-    if (image.box.is_empty()) return {};
-    auto at = rows.place(part.width, part.height);
-    if (!at) {
-        if (auto read = read_sheet(); !read) return read;
-        if (auto cleared = clear_sheet(); !cleared) return cleared;
-        at = rows.place(part.width, part.height); // no part is larger than the sheet
-    }
-    const auto start = vdtree::Clock::now();
-    const render::Camera camera{.view = view, .near_plane = near, .tile = render::Tile{part, at->x, at->y}};
-    if (auto drawn = render::draw(items, camera, *sheet, {.colour = {}, .depth = false}); !drawn) return drawn;
-    times.draw_ms += vdtree::ms_since(start);
-    ++times.drawings;
-    placed.push_back({&image, *at, is_trimmed});
-    return {};
-}
-
-// The images get luminance for values.
-Result<void> LevelPictures::Impl::read_sheet() {
-    if (placed.empty()) return {};
-    const auto start = vdtree::Clock::now();
-    const render::PixelBox used{0, 0, sheet->width(), rows.used()};
-    const auto pixels = render::read_pixels(*sheet, 0, used);
-    if (!pixels) return pixels.error();
-    const auto depth = render::read_depth(*sheet, used);
-    if (!depth) return depth.error();
-    for (const auto& [image, at, is_trimmed] : placed) {
-        for (int y = 0; y < image->box.height(); ++y) {
-            const auto row =
-                (static_cast<std::size_t>(at.y) + static_cast<std::size_t>(y)) * static_cast<std::size_t>(used.width) +
-                static_cast<std::size_t>(at.x);
-            for (std::size_t i = row; i < row + static_cast<std::size_t>(image->box.width()); ++i) {
-                image->values.push_back((*pixels)[i].a);
-                image->depth.push_back((*depth)[i]);
-            }
-        }
-        if (is_trimmed) *image = trimmed(*image);
-    }
-    placed.clear();
-    times.read_ms += vdtree::ms_since(start);
-    return {};
-}
-
-float LevelPictures::Impl::value_of(float luminance, SelectionQuality quality) const {
-    const perception::Display& display = session.observer().display;
-    const auto relative = static_cast<double>(luminance);
-    if (quality != SelectionQuality::ssim)
-        return static_cast<float>(perception::to_luminance(display, relative).value());
-    return static_cast<float>(std::round(255 * std::clamp(perception::encode(display, relative), 0.0, 1.0)));
-}
 
 Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQuality quality) {
     if (auto valid = vdtree::validate_perspective(view, "A search for levels"); !valid) return valid.error();
@@ -248,7 +208,7 @@ Result<LayeredPicture> LevelPictures::draw(const vdtree::View& view, SelectionQu
     std::vector<std::size_t> objects;
     for (std::size_t i = 0; i < own.spheres.size(); ++i)
         if (is_in_sight(own.spheres[i], view)) objects.push_back(i);
-    const auto background = own.backdrop_items(view);
+    const auto background = own.backdrop.items(own.session, view);
     if (!background) return background.error();
     const auto near = own.near_plane(objects, *background, view);
     if (!near) return near.error();
@@ -308,29 +268,11 @@ Result<render::Frame> LevelPictures::draw_frame(const vdtree::View& view, std::s
         if (!item) return item.error();
         items.push_back(std::move(*item));
     }
-    const auto background = own.backdrop_items(view);
+    const auto background = own.backdrop.items(own.session, view);
     if (!background) return background.error();
     items.insert(items.end(), background->begin(), background->end());
-    auto& sum = own.sum;
-    if (!sum || sum->width() != view.width || sum->height() != view.height) {
-        sum.reset(); // the old one first, so that both sizes need not fit at a time
-        auto made = render::SampleSum::create(own.context, view.width, view.height);
-        if (!made) return made.error();
-        sum = std::move(*made);
-    }
-    const auto start = vdtree::Clock::now();
-    if (auto drawn = sum->draw(items, view, {.samples = samples, .background = own.session.background()}); !drawn)
-        return drawn.error();
-    const auto pixels = sum->mean();
-    if (!pixels) return pixels.error();
-    render::Frame frame;
-    frame.draw_ms = vdtree::ms_since(start);
-    frame.width = view.width, frame.height = view.height;
-    for (const glm::vec4& pixel : *pixels) {
-        frame.luminance.push_back(pixel.a);
-        frame.colour.insert(frame.colour.end(), {pixel.r, pixel.g, pixel.b});
-    }
-    return frame;
+    return render::draw_frame(own.sum, own.context, items, view,
+                              {.samples = samples, .background = own.session.background()});
 }
 
 float LevelPictures::value_of(float luminance, SelectionQuality quality) const {
@@ -339,17 +281,12 @@ float LevelPictures::value_of(float luminance, SelectionQuality quality) const {
 
 const std::vector<std::vector<std::uint32_t>>& LevelPictures::triangles() const noexcept { return impl_->triangles; }
 const LevelChain& LevelPictures::chain(std::size_t object) const noexcept { return impl_->levels[object]->chain; }
-const LevelPictureTimes& LevelPictures::times() const noexcept { return impl_->times; }
+const LevelPictures::Times& LevelPictures::times() const noexcept { return impl_->times; }
 
 Result<LevelPictures> LevelPictures::create(const render::Context& context, Session& session, int levels) {
     auto impl = std::make_unique<Impl>(context, session);
     if (auto loaded = impl->load(levels); !loaded) return loaded.error();
     return LevelPictures(std::move(impl));
 }
-
-LevelPictures::LevelPictures(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-LevelPictures::LevelPictures(LevelPictures&&) noexcept = default;
-LevelPictures& LevelPictures::operator=(LevelPictures&&) noexcept = default;
-LevelPictures::~LevelPictures() = default;
 
 } // namespace unseen::session

@@ -1,17 +1,13 @@
 #include <unseen/session_gpu/lod.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
-#include <map>
-#include <numbers>
 #include <random>
-#include <utility>
 
 #include <glm/geometric.hpp>
 
-#include <unseen/session_gpu/picture_judge.h>
+#include <unseen/session_gpu/tradeoff.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 
@@ -40,14 +36,6 @@ double coverage_of(const Lod& lod, double radius, double distance) {
     const double outline = outline_px(lod, radius, distance);
     return std::min(1.0, std::numbers::pi * outline * outline /
                              (static_cast<double>(lod.width_px) * static_cast<double>(lod.height_px)));
-}
-
-double shift_of(const vdtree::Cut& cut, double scale) {
-    const auto displacement = cut.tree().displacement();
-    float in_mesh = 0;
-    for (vdtree::NodeId node = 0; node < cut.tree().interior_count(); ++node)
-        if (cut.is_active(node)) in_mesh = std::max(in_mesh, displacement[node]);
-    return scale * static_cast<double>(in_mesh);
 }
 
 Result<void> check(const LodOptions& options, const perception::Display& display) {
@@ -122,7 +110,8 @@ public:
         merge(seen_through, made);
         for (LodLevel& level : seen_through) {
             level.coverage = coverage_of(lod_, made.sphere.radius, level.distance);
-            level.shift = shift_of(made.chain.cut(level.chain_level), scale_);
+            const vdtree::Cut cut = made.chain.cut(level.chain_level);
+            level.shift = largest_shift(session_, {&cut, 1});
             level.pixel_error = level.shift * focal_px(lod_) / (level.distance - made.sphere.radius);
             made.levels.push_back(std::move(level));
         }
@@ -184,8 +173,7 @@ private:
                 return Error{ErrorCode::cancelled, "Making levels of detail was stopped."};
             const auto verdict = look_from(made, direction, level.distance, cuts);
             if (!verdict) return verdict.error();
-            level.checks.push_back(
-                {direction, verdict->visible, verdict->second_visible, verdict->v, verdict->second_v});
+            level.checks.push_back({*verdict, direction});
             if (!is_unseen(*verdict)) return true;
         }
         return false;
@@ -288,56 +276,32 @@ Result<Lod> make_levels(Session& session, const render::Context& context, const 
     return lod;
 }
 
-namespace {
-
-// The objects' cuts of some levels, and what a file is to hold of them.
-class LodFile {
-public:
-    // `first` to `last`: of levels; objects that have fewer repeat their last one where there is one level alone.
-    LodFile(const Scene& scene, const Lod& lod, std::optional<std::size_t> only) : scene_(scene) {
-        std::map<std::pair<std::size_t, std::size_t>, const vdtree::Cut*> known; // by object and level
-        for (const LodObject& object : lod.objects) {
-            meshio::LevelCuts& levels = levels_.emplace_back();
-            levels.node = scene.objects[object.object].node, levels.mesh = scene.objects[object.object].mesh;
-            const std::size_t last = object.levels.size() - 1;
-            const std::size_t from = only ? std::min(*only, last) : 0, to = only ? from : last;
-            for (std::size_t level = from; level <= to; ++level) {
-                const vdtree::Cut*& cut = known[{object.same_as, level}];
-                if (!cut) cut = &cuts_.emplace_back(object.cut(level));
-                levels.cuts.push_back(cut);
-                // A level ends where the next one begins.
-                levels.coverages.push_back(level < to ? object.levels[level + 1].coverage : 0);
-            }
-        }
-        for (const Object& part : scene.backdrop) {
-            cuts_.emplace_back(part.tree).unfold_all();
-            levels_.push_back({part.node, part.mesh, {&cuts_.back()}, {0}});
-        }
-    }
-
-    Result<meshio::LevelsWritten> write(const std::filesystem::path& file, const meshio::GltfOptions& options) const {
-        if (scene_.source) return meshio::write_scene(file, *scene_.source, levels_, options);
-        if (levels_.size() == 1) return meshio::write_model_levels(file, levels_[0], options);
-        return invalid_argument("Cannot write '" + file.string() +
-                                "': scenes of several objects are written only where a glTF file is their source.");
-    }
-
-private:
-    const Scene& scene_;
-    std::deque<vdtree::Cut> cuts_;
-    std::vector<meshio::LevelCuts> levels_;
-};
-
-} // namespace
-
 Result<meshio::LevelsWritten> write_levels(const std::filesystem::path& file, const Scene& scene, const Lod& lod,
-                                           const meshio::GltfOptions& options) {
-    return LodFile(scene, lod, std::nullopt).write(file, options);
-}
-
-Result<meshio::LevelsWritten> write_level(const std::filesystem::path& file, const Scene& scene, const Lod& lod,
-                                          std::size_t level, const meshio::GltfOptions& options) {
-    return LodFile(scene, lod, level).write(file, options);
+                                           const meshio::GltfOptions& options, std::optional<std::size_t> only) {
+    std::deque<vdtree::Cut> cuts;
+    std::vector<meshio::LevelCuts> all;
+    std::map<std::pair<std::size_t, std::size_t>, const vdtree::Cut*> known; // by object and level
+    for (const LodObject& object : lod.objects) {
+        meshio::LevelCuts& levels = all.emplace_back();
+        levels.node = scene.objects[object.object].node, levels.mesh = scene.objects[object.object].mesh;
+        const std::size_t last = object.levels.size() - 1;
+        const std::size_t from = only ? std::min(*only, last) : 0, to = only ? from : last;
+        for (std::size_t level = from; level <= to; ++level) {
+            const vdtree::Cut*& cut = known[{object.same_as, level}];
+            if (!cut) cut = &cuts.emplace_back(object.cut(level));
+            levels.cuts.push_back(cut);
+            // A level ends where the next one begins.
+            levels.coverages.push_back(level < to ? object.levels[level + 1].coverage : 0);
+        }
+    }
+    for (const Object& part : scene.backdrop) {
+        cuts.emplace_back(part.tree).unfold_all();
+        all.push_back({part.node, part.mesh, {&cuts.back()}, {0}});
+    }
+    if (scene.source) return meshio::write_scene(file, *scene.source, all, options);
+    if (all.size() == 1) return meshio::write_model_levels(file, all[0], options);
+    return invalid_argument("Cannot write '" + file.string() +
+                            "': scenes of several objects are written only where a glTF file is their source.");
 }
 
 } // namespace unseen::session

@@ -1,10 +1,6 @@
 #include <unseen/session_gpu/picture_judge.h>
 
 #include <future>
-#include <limits>
-#include <utility>
-
-#include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::session {
 
@@ -12,12 +8,7 @@ PictureJudge::PictureJudge(const Session& session, const vdtree::View& view, int
                            std::shared_ptr<SceneRenderer> renderer)
     : session_(session.share()), view_(view), samples_(samples), renderer_(std::move(renderer)) {}
 
-render::DrawOptions PictureJudge::drawing() const {
-    render::DrawOptions drawing;
-    drawing.samples = samples_;
-    drawing.background = session_.background();
-    return drawing;
-}
+render::DrawOptions PictureJudge::drawing() const { return {.samples = samples_, .background = session_.background()}; }
 
 Result<PictureJudge> PictureJudge::create(const render::Context& context, const Session& session,
                                           const vdtree::View& view, int samples) {
@@ -67,8 +58,8 @@ Result<PictureVerdict> PictureJudge::judge(const render::Frame& frame) const {
     const auto [second, similarity] = other.get();
     if (!verdict) return verdict.error();
     if (!second) return second.error();
-    return PictureVerdict{.visible = verdict->visible_pixels,
-                          .second_visible = second->visible_pixels,
+    return PictureVerdict{.visible_pixels = verdict->visible_pixels,
+                          .second_visible_pixels = second->visible_pixels,
                           .v = verdict->max_ratio,
                           .second_v = second->max_ratio,
                           .ssim = similarity ? *similarity : std::numeric_limits<double>::quiet_NaN()};

@@ -5,10 +5,10 @@
 #include <cstring>
 #include <deque>
 #include <future>
-#include <map>
 #include <thread>
-#include <utility>
 
+#include <unseen/session/internal/selections.h>
+#include <unseen/session_gpu/internal/level_pictures.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 #include <unseen/vdtree/internal/team.h>
@@ -83,7 +83,7 @@ Result<SelectionGrid> grid_for(const Session& session, const PrecomputeOptions& 
     return grid;
 }
 
-vdtree::View camera_view(const Selections& s, const LatticePoint& at, std::size_t direction) {
+vdtree::View camera_view(const Selections::Data& s, const LatticePoint& at, std::size_t direction) {
     vdtree::View view;
     view.eye = s.grid.place(at);
     view.target = view.eye + selection_directions[direction];
@@ -96,7 +96,7 @@ vdtree::View camera_view(const Selections& s, const LatticePoint& at, std::size_
 // Draws on this thread and searches on others, or on this one where it is the only one.
 class Corners {
 public:
-    Corners(const Session& session, const Selections& frame, LevelPictures& pictures, int threads,
+    Corners(const Session& session, const Selections::Data& frame, LevelPictures& pictures, int threads,
             PrecomputeReport& report)
         : session_(session), frame_(frame), pictures_(pictures), report_(report),
           searching_(threads > 0 ? static_cast<std::size_t>(threads) - 1
@@ -152,7 +152,7 @@ private:
         const auto start = vdtree::Clock::now();
         Found result;
         const auto found =
-            select_greedily(picture, frame_.quality, session_.observer().display, {.budget = frame_.budget / 2}, true);
+            select_greedily(picture, frame_.quality, session_.observer().display, frame_.budget / 2, true);
         if (!found) {
             result.camera = found.error();
             return result;
@@ -173,14 +173,13 @@ private:
     }
 
     const Session& session_;
-    const Selections& frame_;
+    const Selections::Data& frame_;
     LevelPictures& pictures_;
     PrecomputeReport& report_;
     std::size_t searching_; // threads
 };
 
 // ---- several processes
-// ------------------------------------------------------------------------------------------------
 
 void append(std::vector<std::byte>& to, std::span<const std::byte> bytes) {
     const std::uint64_t length = bytes.size();
@@ -198,17 +197,16 @@ std::span<const std::byte> take(std::span<const std::byte>& from) {
     return bytes;
 }
 
+std::string text_of(std::span<const std::byte> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 // What a member answers: its corners, or what went wrong behind an empty one.
 Result<std::vector<SelectionCorner>> corners_of_answer(std::span<const std::byte> answer) {
     std::vector<SelectionCorner> corners;
     while (!answer.empty()) {
         const auto part = take(answer);
-        if (part.empty()) {
-            const auto complaint = take(answer);
-            return Error{ErrorCode::io_failure,
-                         "Another process: " +
-                             std::string(reinterpret_cast<const char*>(complaint.data()), complaint.size())};
-        }
+        if (part.empty()) return Error{ErrorCode::io_failure, "Another process: " + text_of(take(answer))};
         auto corner = corner_from(part);
         if (!corner) return corner.error();
         corners.push_back(std::move(*corner));
@@ -234,6 +232,36 @@ Result<void> help(Corners& corners, vdtree::Team& team) {
         }
         team.send(0, answer);
     }
+}
+
+// All members go on or none: those that are ready say what they search for.
+Result<void> agree(vdtree::Team& team, const Result<void>& ready, std::uint64_t key) {
+    const auto message = [key](const Result<void>& r) {
+        std::vector<std::byte> bytes;
+        const std::string text = r ? "" : r.error().message;
+        append(bytes, std::as_bytes(std::span(text)));
+        append(bytes, std::as_bytes(std::span(&key, 1)));
+        return bytes;
+    };
+    const std::vector<std::byte> own = message(ready);
+    const auto complaint = [](std::span<const std::byte> bytes) { return text_of(take(bytes)); };
+    if (team.rank() != 0) {
+        team.send(0, own);
+        const std::string text = complaint(team.receive(0));
+        return text.empty() ? Result<void>() : Error{ErrorCode::io_failure, text};
+    }
+    Result<void> together = ready;
+    for (int member = 1; member < team.size(); ++member) {
+        const std::vector<std::byte> theirs = team.receive(member);
+        const std::string text = complaint(theirs);
+        if (!together) continue;
+        if (!text.empty()) together = Error{ErrorCode::io_failure, "Another process: " + text};
+        else if (theirs != own)
+            together = Error{ErrorCode::malformed_data,
+                             "Another process has another scene or other options: give all the same."};
+    }
+    for (int member = 1; member < team.size(); ++member) team.send(member, message(together));
+    return together;
 }
 
 class FirstMember {
@@ -319,7 +347,7 @@ std::vector<SelectionCell> parts_of(const SelectionGrid& grid, const SelectionCe
 }
 
 // Round by round: corners of all cells, then those of the parts of cells whose corners differ.
-Result<void> search_all(FirstMember& first, const PrecomputeOptions& options, Selections& s) {
+Result<void> search_all(FirstMember& first, const PrecomputeOptions& options, Selections::Data& s) {
     std::vector<SelectionCell> open = cells_of(s.grid);
     std::vector<LatticePoint> all;
     while (!open.empty()) {
@@ -365,100 +393,59 @@ Result<PrecomputeReport> precompute_selections(const render::Context& context, S
     PrecomputeReport report;
     report.processes = team ? team->size() : 1;
     const bool is_first = !team || team->rank() == 0;
-    Selections s;
+    Selections::Data s;
     std::optional<LevelPictures> pictures;
     std::optional<SelectionJournal> journal;
-    std::filesystem::path part = file;
-    part += ".part";
-    const auto begin = [&]() -> Result<void> {
+    const auto prepare = [&]() -> Result<void> {
         if (auto valid = check(options); !valid) return valid;
         auto grid = grid_for(session, options);
         if (!grid) return grid.error();
         auto made = LevelPictures::create(context, session, options.levels);
         if (!made) return made.error();
         pictures.emplace(std::move(*made));
-        s.quality = options.quality;
-        s.budget = options.budget;
-        s.window_px = options.window_px;
-        s.levels = options.levels;
-        s.grid = *grid;
-        s.triangles = pictures->triangles();
+        s = {options.quality,
+             options.budget,
+             options.window_px,
+             options.levels,
+             *grid,
+             0,
+             pictures->triangles(),
+             {},
+             {}};
         s.scene = scene_fingerprint(session.scene(), s.triangles);
         if (!is_first) return {};
-        auto opened = SelectionJournal::open(part, search_key(s));
+        auto opened = SelectionJournal::open(file.string() + ".part", search_key(s));
         if (!opened) return opened.error();
         journal = std::move(*opened);
         report.resumed = journal->done().size();
         return {};
     };
-    const Result<void> ready = begin();
+    Result<void> ready = prepare();
     report.load_seconds = vdtree::seconds_since(start);
-    // All go on or none.
-    if (team && team->size() > 1) {
-        const auto complaint = [&](const Result<void>& r) {
-            const std::string text = r ? "" : r.error().message;
-            std::vector<std::byte> bytes;
-            append(bytes, std::as_bytes(std::span(text)));
-            const std::uint64_t key = r ? search_key(s) : 0;
-            append(bytes, std::as_bytes(std::span(&key, 1)));
-            return bytes;
-        };
-        Result<void> together = ready;
-        const std::vector<std::byte> own = complaint(ready);
-        if (is_first) {
-            for (int member = 1; member < team->size(); ++member) {
-                const std::vector<std::byte> theirs = team->receive(member);
-                std::span<const std::byte> rest(theirs);
-                const auto text = take(rest);
-                if (!together) continue;
-                if (!text.empty())
-                    together = Error{ErrorCode::io_failure,
-                                     "Another process: " +
-                                         std::string(reinterpret_cast<const char*>(text.data()), text.size())};
-                else if (theirs != own)
-                    together = Error{ErrorCode::malformed_data,
-                                     "Another process has another scene or other options: give all the same."};
-            }
-            for (int member = 1; member < team->size(); ++member) team->send(member, complaint(together));
-        } else {
-            team->send(0, own);
-            const std::vector<std::byte> answer = team->receive(0);
-            std::span<const std::byte> rest(answer);
-            const auto text = take(rest);
-            if (!text.empty())
-                return Error{ErrorCode::io_failure,
-                             std::string(reinterpret_cast<const char*>(text.data()), text.size())};
-        }
-        if (!together) return together.error();
-    } else if (!ready) {
-        return ready.error();
-    }
+    if (report.processes > 1) ready = agree(*team, ready, ready ? search_key(s) : 0);
+    if (!ready) return ready.error();
 
     Corners corners(session, s, *pictures, options.threads, report);
-    const auto finish = [&] {
-        const LevelPictureTimes& times = pictures->times();
-        report.seconds = vdtree::seconds_since(start);
-        report.draw_seconds = times.draw_ms / 1e3;
-        report.read_seconds = times.read_ms / 1e3;
-        report.drawings = times.drawings;
-        report.drawn_triangles = times.triangles;
-    };
-    if (!is_first) {
-        if (auto helped = help(corners, *team); !helped) return helped.error();
-        finish();
-        return report;
-    }
-    {
-        FirstMember first(corners, team, options, *journal);
-        if (auto done = search_all(first, options, s); !done) return done.error();
+    if (is_first) {
+        {
+            FirstMember first(corners, team, options, *journal);
+            if (auto done = search_all(first, options, s); !done) return done.error();
+        }
+        if (auto written = write_selections(file, s); !written) return written.error();
+        journal->remove();
+    } else if (auto helped = help(corners, *team); !helped) {
+        return helped.error();
     }
     report.corners = s.corners.size();
     report.cells = s.cells.size();
     for (const SelectionCorner& corner : s.corners)
         for (const SelectionCamera& camera : corner.cameras) report.cameras += !camera.objects.empty();
-    if (auto written = write_selections(file, s); !written) return written.error();
-    journal->remove();
-    finish();
+    const LevelPictures::Times& times = pictures->times();
+    report.seconds = vdtree::seconds_since(start);
+    report.draw_seconds = times.draw_ms / 1e3;
+    report.read_seconds = times.read_ms / 1e3;
+    report.drawings = times.drawings;
+    report.drawn_triangles = times.triangles;
     return report;
 }
 

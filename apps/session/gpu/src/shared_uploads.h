@@ -2,12 +2,9 @@
 #pragma once
 
 #include <unordered_map>
-#include <utility>
-#include <vector>
 
-#include <unseen/render/context.h>
-#include <unseen/render/draw.h>
-#include <unseen/session/level_chain.h>
+#include <unseen/render/renderer.h>
+#include <unseen/session/session.h>
 
 namespace unseen::session {
 
@@ -43,5 +40,23 @@ private:
     std::unordered_map<Key, render::GpuCut> whole_;
     std::unordered_map<Key, UploadedLevels> levels_;
 };
+
+// What surrounds a scene's objects, drawn whole.
+class UploadedBackdrop {
+public:
+    Result<void> load(const Scene& scene, SharedUploads& uploads);
+    // Lit as the session says, with the shading and wires of the options.
+    Result<std::vector<render::Item>> items(const Session& session, const vdtree::View& view,
+                                            const render::DrawOptions& options = {}) const;
+
+private:
+    std::vector<render::GpuCut> cuts_;
+};
+
+// An object of the session in its place and light.
+Result<render::Item> lit_item(const Session& session, std::size_t object, const render::GpuCut& cut,
+                              const vdtree::View& view, const render::DrawOptions& options = {});
+
+bool is_in_casting_light(const render::Item& item);
 
 } // namespace unseen::session

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/errors.h>
@@ -28,41 +27,27 @@ Result<void> validate(const StudyPicturesOptions& options) {
 }
 
 // Pictures of a session, as its display shows them.
-class Photographer {
-public:
-    static Result<Photographer> create(Session& session, const render::Context& context,
-                                       const StudyPicturesOptions& options) {
-        auto renderer = SceneRenderer::create(context, session);
-        if (!renderer) return renderer.error();
-        return Photographer(session, options, std::move(*renderer));
-    }
+struct Photographer {
+    Session& session;
+    const StudyPicturesOptions& options;
+    SceneRenderer renderer;
 
     Result<fs::path> take(std::span<const vdtree::Cut> cuts, const vdtree::View& view, const std::string& name) {
-        render::DrawOptions drawing;
-        drawing.samples = options_->samples;
-        drawing.background = session_->background();
-        const auto frame = renderer_.draw(drawn_cuts(cuts), view, drawing);
+        const auto frame =
+            renderer.draw(drawn_cuts(cuts), view, {.samples = options.samples, .background = session.background()});
         if (!frame) return frame.error();
-        fs::path file = options_->folder / (options_->prefix + name + ".png");
-        if (const auto ok = perception::write_image(file, code_image(*frame, session_->observer().display)); !ok)
+        fs::path file = options.folder / (options.prefix + name + ".png");
+        if (const auto ok = perception::write_image(file, code_image(*frame, session.observer().display)); !ok)
             return ok.error();
         return file;
     }
     // Of what a request makes of the view.
     Result<fs::path> take(Request request, const vdtree::View& view, const std::string& name) {
         request.purpose = Purpose::picture;
-        const auto made = session_->simplify(view, request);
+        const auto made = session.simplify(view, request);
         if (!made) return made.error();
         return take(made->cuts, view, name);
     }
-
-private:
-    Photographer(Session& session, const StudyPicturesOptions& options, SceneRenderer renderer)
-        : session_(&session), options_(&options), renderer_(std::move(renderer)) {}
-
-    Session* session_;
-    const StudyPicturesOptions* options_;
-    SceneRenderer renderer_;
 };
 
 // From each distance all around.
@@ -97,13 +82,14 @@ Result<std::vector<StudyPair>> draw_study_pairs(Session& session, const render::
     // Errors of folds are measured first, for trees must not change once they are on the GPU.
     for (const StudyCondition& condition : conditions)
         if (const auto ready = session.prepare(view, condition.request); !ready) return ready.error();
-    auto photographer = Photographer::create(session, context, options);
-    if (!photographer) return photographer.error();
+    auto renderer = SceneRenderer::create(context, session);
+    if (!renderer) return renderer.error();
+    Photographer photographer{session, options, std::move(*renderer)};
     std::vector<StudyPair> pairs;
     const std::vector<vdtree::View> views = views_of(view, options);
     for (std::size_t number = 0; number < views.size(); ++number) {
         const vdtree::View& from = views[number];
-        const auto original = photographer->take(Request{.goal = Goal::full()}, from, file_name(number, "original"));
+        const auto original = photographer.take(Request{.goal = Goal::full()}, from, file_name(number, "original"));
         if (!original) return original.error();
         if (options.pairs_original) pairs.push_back({"original", *original, *original, false, {}});
         for (std::size_t i = 0; i < conditions.size(); ++i) {
@@ -112,7 +98,7 @@ Result<std::vector<StudyPair>> draw_study_pairs(Session& session, const render::
                 !on)
                 return on.error();
             const StudyCondition& condition = conditions[i];
-            const auto other = photographer->take(condition.request, from, file_name(number, std::to_string(i + 1)));
+            const auto other = photographer.take(condition.request, from, file_name(number, std::to_string(i + 1)));
             if (!other) return other.error();
             pairs.push_back({condition.name, *original, *other, condition.is_training, {}});
         }
@@ -129,8 +115,9 @@ Result<std::vector<StudyPair>> draw_level_pairs(Session& session, const render::
                                 std::to_string(session.scene().objects.size()) + ".");
     auto control = LevelControl::create(context, session, view, levels);
     if (!control) return control.error();
-    auto photographer = Photographer::create(session, context, options);
-    if (!photographer) return photographer.error();
+    auto renderer = SceneRenderer::create(context, session);
+    if (!renderer) return renderer.error();
+    Photographer photographer{session, options, std::move(*renderer)};
     const LevelChain& chain = control->chain(0);
     std::vector<StudyPair> pairs;
     const std::vector<vdtree::View> views = views_of(view, options);
@@ -146,7 +133,7 @@ Result<std::vector<StudyPair>> draw_level_pairs(Session& session, const render::
             if (const auto there = pictures.find(level); there != pictures.end()) return there->second;
             const vdtree::Cut cut = chain.cut(level);
             auto taken =
-                photographer->take(std::span(&cut, 1), from, file_name(number, "level" + std::to_string(level)));
+                photographer.take(std::span(&cut, 1), from, file_name(number, "level" + std::to_string(level)));
             if (taken) pictures.emplace(level, *taken);
             return taken;
         };

@@ -1,11 +1,8 @@
 #include <unseen/session_gpu/tradeoff.h>
 
 #include <algorithm>
-#include <memory>
-#include <utility>
 
 #include <unseen/session_gpu/as_seen.h>
-#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
@@ -22,18 +19,13 @@ Timing timing(std::vector<double> ms) {
     return {ms[ms.size() / 2], ms[ms.size() / 4], ms[ms.size() - 1 - ms.size() / 4]};
 }
 
-struct Way {
-    std::string name;
-    Request request;
-    bool is_of_view = false;
-};
-
-// The most telling ones first.
-std::vector<Way> ways(const Session& session) {
-    std::vector<Way> all;
+// Points that are not measured yet, the most telling ones first.
+std::vector<TradeoffPoint> usual_points(const Session& session) {
+    std::vector<TradeoffPoint> all;
     const auto add = [&](std::string name, Goal goal, std::optional<FoldTest> test = {}, double threshold = 1) {
         all.push_back(
-            {std::move(name),
+            {{},
+             std::move(name),
              {.goal = goal, .fold_test = test, .threshold = threshold, .purpose = Purpose::picture, .reasons = false}});
     };
     const Goal imperceptible = Goal::imperceptible();
@@ -41,7 +33,7 @@ std::vector<Way> ways(const Session& session) {
     add("imperceptible", imperceptible);
     for (const double threshold : {2.0, 0.5})
         add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
-    all.push_back({"imperceptible, by this picture", all[1].request, true});
+    all.push_back({{}, "imperceptible, by this picture", all[1].request, true});
     add("luebke-hallen-safe", imperceptible, FoldTest::luebke_hallen_safe);
     for (const double pixels : {1.0, 0.5, 2.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
     add("luebke-hallen", imperceptible, FoldTest::luebke_hallen);
@@ -86,20 +78,17 @@ public:
         return samples;
     }
 
-    Result<TradeoffPoint> measure(const Way& way) {
-        TradeoffPoint point{.name = way.name, .request = way.request, .is_of_view = way.is_of_view};
+    Result<TradeoffPoint> measure(TradeoffPoint point) {
         const auto start = vdtree::Clock::now();
-        auto made = way.is_of_view ? simplify_as_seen(session_, context_, view_, way.request)
-                                   : session_.simplify(view_, way.request);
+        auto made = point.is_of_view ? simplify_as_seen(session_, context_, view_, point.request)
+                                     : session_.simplify(view_, point.request);
         if (!made) return made.error();
         point.make_ms = vdtree::ms_since(start);
         point.triangles = made->stats.triangles;
         point.shift = largest_shift(session_, made->cuts);
         const auto verdict = judge_->judge(made->cuts);
         if (!verdict) return verdict.error();
-        point.visible_pixels = verdict->visible, point.v = verdict->v;
-        point.second_visible_pixels = verdict->second_visible, point.second_v = verdict->second_v;
-        point.ssim = verdict->ssim;
+        static_cast<PictureVerdict&>(point) = *verdict;
         std::vector<double> drawn;
         for (int i = 0; i < timed_frames; ++i) {
             const auto one = draw(made->cuts, 1);
@@ -107,8 +96,8 @@ public:
             drawn.push_back(one->draw_ms);
         }
         point.draw_ms = timing(std::move(drawn));
-        if (way.is_of_view) return point;
-        const auto followed = follow(way.request);
+        if (point.is_of_view) return point;
+        const auto followed = follow(point.request);
         if (!followed) return followed.error();
         point.follow_ms = *followed;
         return point;
@@ -120,10 +109,7 @@ private:
         : session_(session), context_(context), view_(view), options_(options), renderer_(std::move(renderer)) {}
 
     Result<render::Frame> draw(const std::vector<vdtree::Cut>& cuts, int samples) {
-        render::DrawOptions drawing;
-        drawing.samples = samples;
-        drawing.background = session_.background();
-        return renderer_->draw(drawn_cuts(cuts), view_, drawing);
+        return renderer_->draw(drawn_cuts(cuts), view_, {.samples = samples, .background = session_.background()});
     }
 
     Result<Timing> follow(const Request& request) {
@@ -172,10 +158,9 @@ void recommend(std::vector<TradeoffPoint>& points) {
 double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts) {
     double most = 0;
     for (std::size_t i = 0; i < cuts.size(); ++i) {
-        const vdtree::VertexTree& tree = cuts[i].tree();
-        const auto displacement = tree.displacement();
+        const auto displacement = cuts[i].tree().displacement();
         float in_mesh = 0;
-        for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+        for (vdtree::NodeId node = 0; node < cuts[i].tree().interior_count(); ++node)
             if (cuts[i].is_active(node)) in_mesh = std::max(in_mesh, displacement[node]);
         most = std::max(most, session.scene().objects[i].placement.scale * static_cast<double>(in_mesh));
     }
@@ -197,9 +182,9 @@ Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& conte
     auto measurement = Measurement::create(session, context, view, options);
     if (!measurement) return measurement.error();
     const auto begin = vdtree::Clock::now();
-    std::vector<Way> all = ways(session);
+    std::vector<TradeoffPoint> all = usual_points(session);
     if (!options.requests.empty()) all.resize(1);
-    for (const auto& [name, request] : options.requests) all.push_back({name, request});
+    for (const auto& [name, request] : options.requests) all.push_back({{}, name, request});
     const auto samples = measurement->choose_samples(all.size());
     if (!samples) return samples.error();
     result.samples = *samples;

@@ -23,13 +23,6 @@ struct WindowOptions {
     int samples = 8;          // hardware samples a pixel, if available; 0: no multisampling
 };
 
-struct AdoptOptions {
-    // Makes the adopted context current on the calling thread, such as glfwMakeContextCurrent(). Unseen calls it when the
-    // context is not current. If empty, the caller must make the context current before every call, and before destroying
-    // what lives in it.
-    std::function<void()> make_current = {};
-};
-
 // A handle; copies are the same context. Every GPU object keeps a handle to its context, so the context and its window live
 // as long as the last of them. Belongs to the thread that made it, where it stays current until another one is made or
 // used. GL debug output of severity medium and high is collected as errors, except for performance hints; see
@@ -49,7 +42,11 @@ public:
     // read from flags alone; errors from before a call are kept for take_errors(). Fails if no context is current, or if it
     // is older than 4.5 or lost. Once it is gone, or not current and cannot be made so, calls fail with an error that says
     // so, and nothing is deleted in another context that is current in its place.
-    static Result<Context> adopt(const AdoptOptions& options = {});
+    //
+    // `make_current` makes the adopted context current on the calling thread, such as glfwMakeContextCurrent(). It is called
+    // when the context is not current. If empty, the caller must make the context current before every call, and before
+    // destroying what lives in it.
+    static Result<Context> adopt(const std::function<void()>& make_current = {});
 
     // Makes the context current again. Cheap if it already is. All functions of this library do so themselves.
     Result<void> make_current() const;

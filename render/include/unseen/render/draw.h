@@ -2,15 +2,9 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
-#include <utility>
 
 #include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
 
-#include <unseen/render/context.h>
 #include <unseen/render/target.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/geomorph.h>

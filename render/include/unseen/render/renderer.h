@@ -1,13 +1,7 @@
 // Renderer draws one tree in a few lines. For scenes, use draw() and SampleSum.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <vector>
-
-#include <unseen/render/context.h>
 #include <unseen/render/draw.h>
-#include <unseen/render/target.h>
 
 namespace unseen::render {
 
@@ -34,9 +28,8 @@ struct Frame {
 class Renderer {
 public:
     static Result<Renderer> create(const Context& context, const vdtree::VertexTree& tree);
-    Renderer(Renderer&&) noexcept;
-    Renderer& operator=(Renderer&&) noexcept;
-    ~Renderer();
+    Renderer(Renderer&&) noexcept = default;
+    Renderer& operator=(Renderer&&) noexcept = default;
 
     // Draws off screen and reads back. Fails on an invalid view or lights, if graphics memory runs out, and on a GL error.
     Result<Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
@@ -54,8 +47,8 @@ public:
 
 private:
     struct Impl;
-    explicit Renderer(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit Renderer(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -1,15 +1,6 @@
 // Antialiasing: the mean of many draws, each of which samples another point of the pixels.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
-
 #include <unseen/render/draw.h>
 
 namespace unseen::render {
@@ -31,21 +22,14 @@ struct Sampling {
 class SampleSum {
 public:
     static Result<SampleSum> create(const Context& context, int width, int height); // 36 bytes a pixel
-    SampleSum(SampleSum&&) noexcept;
-    SampleSum& operator=(SampleSum&&) noexcept;
-    ~SampleSum();
+    SampleSum(SampleSum&&) noexcept = default;
+    SampleSum& operator=(SampleSum&&) noexcept = default;
 
     int width() const noexcept;
     int height() const noexcept;
 
     // Starts over, and draws and adds all samples. Touches only pixels that may show an item.
     Result<void> draw(std::span<const Item> items, const vdtree::View& view, const Sampling& sampling);
-
-    // The same by hand, for frames of several draws: begin(), then for each sample any draws into sample(), of which the
-    // first clears it to the background, then add().
-    Result<void> begin(float background);
-    Target& sample() noexcept;
-    Result<void> add(); // fails after 256 samples
 
     // The mean of the samples: linear RGB and relative luminance, row-major from the top left. Waits for the GPU. Valid until
     // the next call.
@@ -56,8 +40,8 @@ public:
 
 private:
     struct Impl;
-    explicit SampleSum(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit SampleSum(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

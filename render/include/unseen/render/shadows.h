@@ -9,11 +9,6 @@
 // moves, and so do the shadows' edges, which are three texels wide. Without shadow-casting lights this costs nothing.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
-
 #include <unseen/render/draw.h>
 
 namespace unseen::render {
@@ -25,13 +20,6 @@ struct Ball {
 
 // Around all vertices that any cut of the items can have.
 Ball ball_around(std::span<const Item> items);
-
-struct ShadowOptions {
-    int size = 2048; // texels a side of a map, 16 or more
-    // The ball that the maps cover; default: around the casters of each update. Set it if not all items are casters at all
-    // times, because the texels shift when the ball changes.
-    std::optional<Ball> bounds = {};
-};
 
 // State after the last update.
 struct ShadowFacts {
@@ -46,11 +34,12 @@ struct ShadowFacts {
 // Move-only. Keeps a handle to its context, and to the cuts that it has drawn.
 class Shadows {
 public:
-    // Makes nothing on the GPU. Fails on a size below 16 or above what this GL can draw to.
-    static Result<Shadows> create(const Context& context, const ShadowOptions& options = {});
-    Shadows(Shadows&&) noexcept;
-    Shadows& operator=(Shadows&&) noexcept;
-    ~Shadows();
+    // Makes nothing on the GPU. `bounds`: the ball that the maps cover; default: around the casters of each update. Set
+    // it if not all items are casters at all times, because the texels shift when the ball changes. `size`: texels a side
+    // of a map. Fails on a size below 16 or above what this GL can draw to.
+    static Result<Shadows> create(const Context& context, const std::optional<Ball>& bounds = {}, int size = 2048);
+    Shadows(Shadows&&) noexcept = default;
+    Shadows& operator=(Shadows&&) noexcept = default;
 
     // Redraws the maps if the casters, their cuts or the lights have changed. The lights are those of the items' lighting,
     // which must be the same in the world for all lit items. Fails if they are not, like draw(), and if memory runs out.
@@ -67,8 +56,8 @@ public:
     Impl& impl() const noexcept { return *impl_; }
 
 private:
-    explicit Shadows(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit Shadows(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -1,14 +1,11 @@
 // Targets: framebuffers to draw into and to read back.
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <vector>
 
 #include <glm/vec4.hpp>
 
 #include <unseen/render/context.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::render {
 
@@ -23,7 +20,6 @@ enum class ColourFormat {
 struct TargetOptions {
     std::vector<ColourFormat> colours = {ColourFormat::rgba32f}; // the attachments; may be empty
     bool depth = true;
-    int samples = 0; // hardware samples a pixel, to be resolved before reading; 0: no multisampling
     const char* label = "";
 };
 
@@ -59,14 +55,13 @@ public:
     static Result<Target> foreign(const Context& context, int width, int height,
                                   const ForeignFramebuffer& framebuffer = {});
 
-    Target(Target&&) noexcept;
-    Target& operator=(Target&&) noexcept;
-    ~Target();
+    Target(Target&&) noexcept = default;
+    Target& operator=(Target&&) noexcept = default;
 
     int width() const noexcept;
     int height() const noexcept;
 
-    // GL names, for drawing of your own. 0 if there is none, or if the target has samples.
+    // GL names, for drawing of your own. 0 if there is none.
     unsigned id() const noexcept;
     unsigned colour_texture(int attachment = 0) const noexcept;
     unsigned depth_texture() const noexcept;
@@ -75,15 +70,12 @@ public:
     Impl& impl() const noexcept { return *impl_; }
 
 private:
-    explicit Target(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit Target(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
-// Resolves the hardware's samples of all attachments. Both targets have the same size and format; `to` has no samples.
-Result<void> resolve(const Target& from, Target& to);
-
-// Read a target back, row-major from the top left; waits for the GPU. Fail on targets with samples, and without such an
-// attachment. `part`: a box within the target; default: all of it.
+// Read a target back, row-major from the top left; waits for the GPU. Fail on foreign framebuffers with samples, and
+// without such an attachment. `part`: a box within the target; default: all of it.
 Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment = 0,
                                            const std::optional<PixelBox>& part = {});
 Result<std::vector<float>> read_luminance(const Target& target, int attachment = 0); // not of targets for displays

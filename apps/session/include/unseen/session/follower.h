@@ -1,13 +1,8 @@
 // Keeps the cuts of a session up to date while the view moves.
 #pragma once
 
-#include <memory>
-#include <optional>
-
-#include <unseen/session/request.h>
 #include <unseen/session/simplification.h>
 #include <unseen/vdtree/geomorph.h>
-#include <unseen/vdtree/view.h>
 
 namespace unseen::session {
 
@@ -19,9 +14,8 @@ class Session;
 class Follower {
 public:
     explicit Follower(const Session& session); // shares the session, which may be moved or destroyed
-    Follower(Follower&&) noexcept;
-    Follower& operator=(Follower&&) noexcept;
-    ~Follower();
+    Follower(Follower&&) noexcept = default;
+    Follower& operator=(Follower&&) noexcept = default;
 
     // From now on, vertices glide for this time when a cut changes; draw geomorph() instead of cut(). Fails if the time
     // is not above 0 and finite, and on trees with textures.
@@ -38,7 +32,7 @@ public:
 private:
     friend class Session;
     class State;
-    std::unique_ptr<State> state_;
+    std::shared_ptr<State> state_;
 };
 
 } // namespace unseen::session

@@ -1,10 +1,6 @@
 // The gaze in every frame: from the head alone, recorded, or simulated as an eye tracker would report it.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-
 #include <unseen/perception/gaze.h>
 #include <unseen/session/load.h>
 #include <unseen/session/observer.h>

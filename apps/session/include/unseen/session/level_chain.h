@@ -2,13 +2,8 @@
 // instead of cuts.
 #pragma once
 
-#include <memory>
-#include <vector>
-
 #include <unseen/session/request.h>
-#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
-#include <unseen/vdtree/view.h>
 
 namespace unseen::session {
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -38,20 +39,12 @@ std::string describe(const Observer& observer);
 // The options of the judges of pictures for this observer. The gaze's margin is ignored.
 perception::JudgeOptions judge_options(const Observer& observer);
 
-// A person by name (perception/csf.h), or the table of a viewer from a file.
-struct ObserverChoice {
-    perception::Person person = perception::default_person;
-    std::shared_ptr<const perception::CsfTable> csf = {}; // from the file; null for a person
-};
-Result<ObserverChoice> choose_observer(const std::string& name_or_file);
+// With a person by name (perception/csf.h), or the table of a viewer from a file; all else as by default.
+Result<Observer> choose_observer(const std::string& name_or_file);
 
 // Contrast sensitivity: a model by name (see perception::csf_model()), or a table from a file. Models must be of
 // luminance contrast.
-struct CsfChoice {
-    std::optional<perception::CsfModel> model = {};
-    std::optional<perception::CsfTable> table = {}; // from the file; empty for a model
-};
-Result<CsfChoice> choose_csf(const std::string& model_or_file);
+Result<std::variant<perception::CsfModel, perception::CsfTable>> choose_csf(const std::string& model_or_file);
 
 // The table of that choice. The table of a model is for the display's distance and multiplied by the person's gain.
 Result<std::shared_ptr<const perception::CsfTable>>

@@ -1,18 +1,10 @@
 // A scene: objects, their background, and the lights.
 #pragma once
 
-#include <filesystem>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include <unseen/calibration/light_rig.h>
 #include <unseen/meshio/scene_file.h>
 #include <unseen/perception/units.h>
 #include <unseen/session/load.h>
-#include <unseen/vdtree/vertex_tree.h>
-#include <unseen/vdtree/view.h>
 
 namespace unseen::session {
 

@@ -13,26 +13,9 @@
 // It needs no command line and no OpenGL, and prints nothing: Messages receive notes and warnings.
 #pragma once
 
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <unseen/perception/criterion.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
-#include <unseen/session/level_chain.h>
-#include <unseen/session/load.h>
-#include <unseen/session/observer.h>
-#include <unseen/session/request.h>
-#include <unseen/session/scene.h>
 #include <unseen/session/selection.h>
-#include <unseen/session/simplification.h>
-#include <unseen/vdtree/criteria.h>
-
-namespace unseen::perception {
-struct CutRings;
-}
 
 namespace unseen::session {
 
@@ -60,9 +43,8 @@ public:
     // Fails if the scene has no objects (unless it was read from a scene file), or if the display is invalid or cannot
     // show the background. `messages` say what takes long.
     static Result<Session> create(Scene scene, Observer observer = {}, Messages messages = {});
-    Session(Session&&) noexcept;
-    Session& operator=(Session&&) noexcept;
-    ~Session();
+    Session(Session&&) noexcept = default;
+    Session& operator=(Session&&) noexcept = default;
 
     // Another handle to the same session, which lives as long as any of its handles.
     Session share() const;
@@ -117,15 +99,11 @@ public:
 
     // The luminance that silhouettes can be seen against.
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;
-    // Spheres inside a solid, and rings of all cuts without their colours. Computed at the first call; they live as
-    // long as the session.
-    std::span<const vdtree::Sphere> inner_spheres(std::size_t object = 0) const;
-    Result<const perception::CutRings*> cut_rings(std::size_t object = 0) const;
 
 private:
     friend class Follower;
     class State;
-    explicit Session(std::shared_ptr<State> state);
+    explicit Session(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
     std::shared_ptr<State> state_; // shared by all handles and followers
 };

@@ -1,33 +1,21 @@
 // What a simplification does and why: the plan before it is made, and the report and the cuts afterwards.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include <unseen/session/request.h>
 #include <unseen/vdtree/cut.h>
 
 namespace unseen::session {
 
-// Something that may or may not take part in a cut, and the reason in a sentence.
+// Something that may or may not take part in a cut, or a rendering pass for it, and the reason in a sentence.
 struct Effect {
     std::string name;
     bool on = false;
     Message why = {};
-    std::size_t object = 0; // of the scene
-};
-
-// A rendering pass for a simplification: whether it ran, why, and what it cost. A pass that did not run costs nothing.
-struct PassEffect {
-    std::string name;
-    bool on = false;
-    Message why = {};
+    // Of passes alone, and of those that ran:
     int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, with one sample each; of planes
     std::uint64_t texture_bytes = 0;                // on the GPU, the most at a time
     double milliseconds = 0;                        // wall-clock time
+    std::size_t object = 0;                         // of the scene
 };
 
 // For one object. The default fold test is `error`, if the tree has the errors of its folds or they may be measured.
@@ -50,7 +38,7 @@ struct Report {
     double imperceptible_from_m = 0;       // infinite: from nowhere; NaN: the fold test does not tell
     std::vector<FoldTest> fold_tests = {}; // by object
     std::vector<Effect> effects = {};
-    std::vector<PassEffect> passes = {}; // of simplify_as_seen() in <unseen/session_gpu/as_seen.h>
+    std::vector<Effect> passes = {}; // of simplify_as_seen() in <unseen/session_gpu/as_seen.h>
     // With geomorphs:
     std::optional<vdtree::Index> drawn_triangles = {}; // with those that wait to be folded
     std::size_t gliding = 0;                           // vertices on their way

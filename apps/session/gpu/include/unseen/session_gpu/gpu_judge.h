@@ -6,11 +6,9 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 
 #include <unseen/perception/image.h>
 #include <unseen/perception/judge.h>
-#include <unseen/render/context.h>
 #include <unseen/render/target.h>
 
 namespace unseen::render {
@@ -29,9 +27,8 @@ public:
     // The reference is on the GPU already. Waits for the GPU once, for the reference's range of luminances.
     static Result<GpuJudge> create(const render::Context& context, const render::LuminanceTexture& reference,
                                    const perception::JudgeOptions& options);
-    GpuJudge(GpuJudge&&) noexcept;
-    GpuJudge& operator=(GpuJudge&&) noexcept;
-    ~GpuJudge();
+    GpuJudge(GpuJudge&&) noexcept = default;
+    GpuJudge& operator=(GpuJudge&&) noexcept = default;
 
     // Uploads, judges and reads V back. Fails like perception::Judge::judge().
     Result<perception::Judgement> judge(const perception::Image& test);
@@ -49,8 +46,8 @@ public:
 
 private:
     struct Impl;
-    explicit GpuJudge(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit GpuJudge(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::session

@@ -18,14 +18,7 @@
 // object as masking it. The fold tests of Session are stricter; use Follower for these.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include <unseen/render/context.h>
 #include <unseen/render/target.h>
-#include <unseen/session/level_chain.h>
 #include <unseen/session/session.h>
 
 namespace unseen::render {
@@ -58,11 +51,9 @@ struct LevelControlOptions {
     // Shares of all pixels that differ visibly: an object gets a better level above the upper, a coarser one below the
     // lower.
     double upper_share = 450.0 / (512 * 512), lower_share = 170.0 / (512 * 512);
-    int frames_a_layer =
-        4; // objects of the nearest layer are tested every so many frames, of the second every twice so many
-    bool maps_all_layers = false; // also those of which no object is tested
-    int fade_frames =
-        0; // that two levels of an object share its pixels for where it changes; it is not tested meanwhile
+    // Objects of the nearest layer are tested every so many frames, of the second every twice so many.
+    int frames_a_layer = 4;
+    int fade_frames = 0; // that two levels of an object share its pixels for where it changes; no tests meanwhile
 };
 
 enum class LevelDecision { better, keep, worse };
@@ -107,9 +98,8 @@ public:
     // and if graphics memory runs out.
     static Result<LevelControl> create(const render::Context& context, Session& session, const vdtree::View& view,
                                        const LevelControlOptions& options = {}, Request request = {});
-    LevelControl(LevelControl&&) noexcept;
-    LevelControl& operator=(LevelControl&&) noexcept;
-    ~LevelControl();
+    LevelControl(LevelControl&&) noexcept = default;
+    LevelControl& operator=(LevelControl&&) noexcept = default;
 
     // Draws one frame. Objects begin at the coarsest level and are tested against the best one in each frame until they
     // keep a level, then by turns. Fails where drawing does.
@@ -146,8 +136,8 @@ public:
 
 private:
     struct Impl;
-    explicit LevelControl(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit LevelControl(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::session

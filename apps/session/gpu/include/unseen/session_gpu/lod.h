@@ -5,16 +5,7 @@
 //     session::write_levels("out.glb", session->scene(), *lod);
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <unseen/meshio/scene_file.h>
-#include <unseen/render/context.h>
-#include <unseen/session/level_chain.h>
-#include <unseen/session/session.h>
+#include <unseen/session_gpu/picture_judge.h>
 
 namespace unseen::session {
 
@@ -34,10 +25,8 @@ struct LodOptions {
 };
 
 // The verdicts of both judges on a level from one direction, at its distance.
-struct LodCheck {
+struct LodCheck : PictureVerdict {
     glm::dvec3 direction = glm::dvec3(0, 0, 1); // unit, from the object towards the eye, in the world
-    std::uint64_t visible_pixels = 0, second_visible_pixels = 0;
-    double v = 0, second_v = 0; // the largest difference, in thresholds
 };
 
 struct LodLevel {
@@ -99,12 +88,10 @@ vdtree::View lod_view(const Lod& lod, const WorldSphere& sphere, glm::dvec3 dire
 std::vector<glm::dvec3> lod_directions(int count, std::uint64_t seed);
 
 // Writes all levels as one glTF file with the extension MSFT_lod. Viewers without it show the full meshes. Each
-// coverage says where a level ends; the last one ends at 0. The backdrop is written whole. Notes and errors are those
-// of meshio::write_scene().
+// coverage says where a level ends; the last one ends at 0. The backdrop is written whole. `only`: this level of all
+// objects; those with fewer levels have their last one. Notes and errors are those of meshio::write_scene().
 Result<meshio::LevelsWritten> write_levels(const std::filesystem::path& file, const Scene& scene, const Lod& lod,
-                                           const meshio::GltfOptions& options = {});
-// Writes one level of all objects; objects with fewer levels use their last one.
-Result<meshio::LevelsWritten> write_level(const std::filesystem::path& file, const Scene& scene, const Lod& lod,
-                                          std::size_t level, const meshio::GltfOptions& options = {});
+                                           const meshio::GltfOptions& options = {},
+                                           std::optional<std::size_t> only = {});
 
 } // namespace unseen::session

@@ -1,23 +1,16 @@
 // Judges pictures of a view against the picture of the full model: by both judges on the CPU, and by SSIM.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include <unseen/perception/judge.h>
-#include <unseen/session/session.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
 namespace unseen::session {
 
 struct PictureVerdict {
-    std::uint64_t visible = 0, second_visible = 0; // pixels, by the judge and by second_judge_options()
-    double v = 0, second_v = 0;                    // the largest difference, in thresholds
-    double ssim = 1;                               // of code values; NaN: the window is too small for it
+    std::uint64_t visible_pixels = 0, second_visible_pixels = 0; // by the judge and by second_judge_options()
+    double v = 0, second_v = 0;                                  // the largest difference, in thresholds
+    double ssim = 1;                                             // of code values; NaN: the window is too small for it
 
-    bool shows_nothing() const { return visible == 0 && second_visible == 0 && v < 1 && second_v < 1; }
+    bool shows_nothing() const { return visible_pixels == 0 && second_visible_pixels == 0 && v < 1 && second_v < 1; }
 };
 
 // Shares the session. Move-only.

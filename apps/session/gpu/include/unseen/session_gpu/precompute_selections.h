@@ -5,63 +5,14 @@
 // search resumes. Several processes may share the corners; the result is the same.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <memory>
-#include <optional>
-#include <vector>
-
 #include <unseen/render/context.h>
-#include <unseen/render/renderer.h>
-#include <unseen/session/selection.h>
 #include <unseen/session/session.h>
-#include <unseen/vdtree/function_ref.h>
 
 namespace unseen::vdtree {
 class Team;
 }
 
 namespace unseen::session {
-
-// Levels of an object of the session, each with half of the triangles of the one before, as in the paper. Small objects
-// have fewer. `levels`: 2 to most_levels.
-Result<LevelChain> selection_chain(Session& session, std::size_t object, int levels = default_selected_levels);
-
-struct LevelPictureTimes {
-    double draw_ms = 0, read_ms = 0; // of all pictures so far; reading waits for the GPU
-    std::uint64_t drawings = 0, triangles = 0;
-};
-
-// Move-only. Shares the session and the context, on whose thread it is used. Shadows are not drawn: whose they are
-// changes with the levels of others.
-class LevelPictures {
-public:
-    // Makes the levels of all objects with selection_chain() and uploads them: some seconds a million triangles.
-    static Result<LevelPictures> create(const render::Context& context, Session& session,
-                                        int levels = default_selected_levels);
-    LevelPictures(LevelPictures&&) noexcept;
-    LevelPictures& operator=(LevelPictures&&) noexcept;
-    ~LevelPictures();
-
-    // The objects in the view's window, with one sample in the middle of each pixel. Objects that no level shows are
-    // left out. Fails where drawing does.
-    Result<LayeredPicture> draw(const vdtree::View& view, SelectionQuality quality);
-
-    // A frame of these levels (by object; -1: not drawn), as SceneRenderer draws it but without shadows.
-    Result<render::Frame> draw_frame(const vdtree::View& view, std::span<const int> levels, int samples = 1);
-
-    // The value that the quality compares, from a pixel's relative luminance.
-    float value_of(float luminance, SelectionQuality quality) const;
-
-    const std::vector<std::vector<std::uint32_t>>& triangles() const noexcept; // by object, by level
-    const LevelChain& chain(std::size_t object) const noexcept;
-    const LevelPictureTimes& times() const noexcept;
-
-private:
-    struct Impl;
-    explicit LevelPictures(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
-};
 
 struct PrecomputeOptions {
     std::uint64_t budget = 0; // of a frame, triangles of objects; above 0
@@ -72,8 +23,8 @@ struct PrecomputeOptions {
     int depth = 1;       // how often a cell may be parted, 0 to most_selection_depth
     double differ = 0.5; // cells are split if their corners differ by more levels than this in the mean
     bool is_in_space = false;
-    std::optional<double> eye_height =
-        {}; // y of cameras on the ground, world units; none: the scene's camera's, or 1.7
+    // y of cameras on the ground, world units; not set: the scene's camera's, or 1.7
+    std::optional<double> eye_height = {};
     // The box of the grid, world units; none: around the middles of all objects.
     std::optional<glm::dvec3> low = {}, high = {};
     int threads = 0;        // one draws, the others search; 1: by turns; 0: as many as there are cores

@@ -1,14 +1,6 @@
 // Draws all objects of a session and what surrounds them.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <unseen/perception/display.h>
-#include <unseen/perception/image.h>
 #include <unseen/render/renderer.h>
 #include <unseen/render/shadows.h>
 #include <unseen/session/session.h>
@@ -39,9 +31,8 @@ struct SceneItems {
 class SceneRenderer {
 public:
     static Result<SceneRenderer> create(const render::Context& context, const Session& session);
-    SceneRenderer(SceneRenderer&&) noexcept;
-    SceneRenderer& operator=(SceneRenderer&&) noexcept;
-    ~SceneRenderer();
+    SceneRenderer(SceneRenderer&&) noexcept = default;
+    SceneRenderer& operator=(SceneRenderer&&) noexcept = default;
 
     // `cuts`: by object. The lighting of the options is ignored: the session knows how each object is lit.
     Result<render::Frame> draw(std::span<const DrawnCut> cuts, const vdtree::View& view,
@@ -60,8 +51,8 @@ public:
 
 private:
     struct Impl;
-    explicit SceneRenderer(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit SceneRenderer(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 // A frame's colours as code values for the display, and its luminance on the display in cd/m2.

@@ -1,13 +1,7 @@
 // Draws the pictures of a study: pairs of an original and a picture that people try to tell from it.
 #pragma once
 
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include <unseen/calibration/study.h>
-#include <unseen/render/context.h>
-#include <unseen/session/session.h>
 #include <unseen/session_gpu/level_control.h>
 
 namespace unseen::session {

@@ -1,16 +1,7 @@
 // What accuracy costs in one view: ways to simplify, the time each takes, and what is seen of it.
 #pragma once
 
-#include <cstdint>
-#include <limits>
-#include <optional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <unseen/render/context.h>
-#include <unseen/session/session.h>
+#include <unseen/session_gpu/picture_judge.h>
 
 namespace unseen::session {
 
@@ -31,7 +22,7 @@ struct Timing {
 };
 
 // One way and its results. The judges see as the session's observer does, on the CPU.
-struct TradeoffPoint {
+struct TradeoffPoint : PictureVerdict { // against the full model
     std::string name;
     Request request;
     bool is_of_view = false; // goes by what this view's picture shows, and holds for no other
@@ -39,12 +30,8 @@ struct TradeoffPoint {
     double make_ms = 0;    // from nothing, errors of folds measured before
     Timing follow_ms = {}; // a frame of an eye that moves around the scene by a tenth of a degree; unknown for stills
     Timing draw_ms = {};   // a frame with one sample a pixel
-    std::uint64_t visible_pixels = 0,
-                  second_visible_pixels = 0; // against the full model, by the judge and the second one
-    double v = 0, second_v = 0;              // the largest difference, in thresholds
-    double ssim = 1;                         // of code values
-    double shift = 0;                        // see largest_shift()
-    bool is_on_front = false;                // no other point has fewer triangles and a smaller V
+    double shift = 0;      // see largest_shift()
+    bool is_on_front = false; // no other point has fewer triangles and a smaller V
     bool is_recommended = false;
 };
 

@@ -2,12 +2,6 @@
 // later (Drettakis and others 2007, section 5).
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
 #include <unseen/render/draw.h>
 #include <unseen/render/internal/visibility_passes.h>
 
@@ -25,9 +19,8 @@ class DifferenceCounts {
 public:
     // Fails on sizes as Target::create() does.
     static Result<DifferenceCounts> create(const Context& context, int width, int height);
-    DifferenceCounts(DifferenceCounts&&) noexcept;
-    DifferenceCounts& operator=(DifferenceCounts&&) noexcept;
-    ~DifferenceCounts();
+    DifferenceCounts(DifferenceCounts&&) noexcept = default;
+    DifferenceCounts& operator=(DifferenceCounts&&) noexcept = default;
 
     // Draws the depth of the items that hide each other in counts until the next call. Chooses the near plane of counts.
     Result<void> draw_depth(std::span<const Item> items, const Camera& camera);
@@ -48,8 +41,8 @@ public:
 
 private:
     struct Impl;
-    explicit DifferenceCounts(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit DifferenceCounts(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -2,13 +2,7 @@
 // passes know neither display nor observer: perception::rpg99_tables() makes their tables.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <vector>
-
-#include <unseen/render/context.h>
 #include <unseen/render/internal/visibility_passes.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen {
 struct Rpg99Tables;
@@ -21,13 +15,11 @@ class ElevationPasses {
 public:
     // For pictures of one size. Fails beyond this GL's limits, and if memory runs out.
     static Result<ElevationPasses> create(const Context& context, int width, int height, const Rpg99Tables& tables);
-    ElevationPasses(ElevationPasses&&) noexcept;
-    ElevationPasses& operator=(ElevationPasses&&) noexcept;
-    ~ElevationPasses();
+    ElevationPasses(ElevationPasses&&) noexcept = default;
+    ElevationPasses& operator=(ElevationPasses&&) noexcept = default;
 
     // Maps the just visible step of luminance, cd/m2, by pixel of the picture. Does not wait. Maps are kept by number as in
     // VisibilityPasses. Fails on a picture of another size.
-    static constexpr int most_maps = VisibilityPasses::most_maps;
     Result<void> map_thresholds(const LuminanceTexture& picture, int number = 0);
     Result<std::vector<float>> read_thresholds(int number = 0) const; // waits; fails where there is no map yet
     unsigned thresholds_texture(int number = 0) const noexcept;       // one 32-bit float; 0 before there is a map
@@ -37,8 +29,8 @@ public:
 
 private:
     struct Impl;
-    explicit ElevationPasses(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit ElevationPasses(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -8,16 +8,7 @@
 //         passes->combine(i); // then passes->combination() shows all layers but i
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
 #include <unseen/render/draw.h>
-#include <unseen/render/target.h>
-#include <unseen/vdtree/view.h>
 
 namespace unseen::render {
 
@@ -62,9 +53,8 @@ class LayerPasses {
 public:
     // Fails on options out of range, on sizes as Target::create() does, and when memory runs out.
     static Result<LayerPasses> create(const Context& context, int width, int height, const LayerOptions& options = {});
-    LayerPasses(LayerPasses&&) noexcept;
-    LayerPasses& operator=(LayerPasses&&) noexcept;
-    ~LayerPasses();
+    LayerPasses(LayerPasses&&) noexcept = default;
+    LayerPasses& operator=(LayerPasses&&) noexcept = default;
 
     // Draws each layer and the background separately, and composes them by depth. Without layers, draws everything at once.
     // `split`: of these objects. `clear`: linear RGB and luminance of empty pixels. Fails like draw() of
@@ -93,8 +83,8 @@ public:
 
 private:
     struct Impl;
-    explicit LayerPasses(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit LayerPasses(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

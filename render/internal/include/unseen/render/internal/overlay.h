@@ -1,15 +1,10 @@
 // An image over a picture, such as text and marks.
 #pragma once
 
-#include <memory>
-#include <span>
-
 #include <glm/gtc/type_precision.hpp>
 #include <glm/vec2.hpp>
 
-#include <unseen/render/context.h>
 #include <unseen/render/target.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::render {
 
@@ -29,9 +24,8 @@ struct OverlayImage {
 class Overlay {
 public:
     explicit Overlay(const Context& context);
-    Overlay(Overlay&&) noexcept;
-    Overlay& operator=(Overlay&&) noexcept;
-    ~Overlay();
+    Overlay(Overlay&&) noexcept = default;
+    Overlay& operator=(Overlay&&) noexcept = default;
 
     // Copies the image. One of the same size reuses the memory; an empty one frees it. Fails if there are not width x height
     // pixels, and beyond this GL's limits for textures.
@@ -45,7 +39,7 @@ public:
 
 private:
     struct Impl;
-    std::unique_ptr<Impl> impl_;
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -1,12 +1,9 @@
 // GPU times of a frame's stages, available some frames later.
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <vector>
 
 #include <unseen/render/context.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::render {
 
@@ -20,9 +17,8 @@ namespace unseen::render {
 class StageTimes {
 public:
     static Result<StageTimes> create(const Context& context);
-    StageTimes(StageTimes&&) noexcept;
-    StageTimes& operator=(StageTimes&&) noexcept;
-    ~StageTimes();
+    StageTimes(StageTimes&&) noexcept = default;
+    StageTimes& operator=(StageTimes&&) noexcept = default;
 
     void begin();     // begins a frame; one that was not ended is discarded
     void end_stage(); // a stage begins at the end of the one before
@@ -33,8 +29,8 @@ public:
 
 private:
     struct Impl;
-    explicit StageTimes(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit StageTimes(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

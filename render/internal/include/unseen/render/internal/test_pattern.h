@@ -2,15 +2,10 @@
 // matches.
 #pragma once
 
-#include <memory>
-#include <span>
-#include <vector>
-
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
 #include <unseen/render/context.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen::render {
 
@@ -51,9 +46,8 @@ class TestPatternDrawer {
 public:
     // `code_luminances`: cd/m2 of the 256 codes, finite and ascending. Keeps a handle to the context.
     static Result<TestPatternDrawer> create(const Context& context, std::span<const double> code_luminances);
-    TestPatternDrawer(TestPatternDrawer&&) noexcept;
-    TestPatternDrawer& operator=(TestPatternDrawer&&) noexcept;
-    ~TestPatternDrawer();
+    TestPatternDrawer(TestPatternDrawer&&) noexcept = default;
+    TestPatternDrawer& operator=(TestPatternDrawer&&) noexcept = default;
 
     // Draws codes to the window's framebuffer, without conversion.
     Result<void> draw_to_window(const TestPattern& pattern, int width, int height);
@@ -62,8 +56,8 @@ public:
 
 private:
     struct Impl;
-    explicit TestPatternDrawer(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit TestPatternDrawer(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -3,13 +3,8 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
 
-#include <unseen/render/context.h>
 #include <unseen/render/target.h>
-#include <unseen/vdtree/result.h>
 
 namespace unseen {
 struct JudgeTables;
@@ -23,17 +18,16 @@ public:
     // Row-major from the top left. Fails on a size below 1x1 or beyond this GL's limits, on another number of values, and if
     // memory runs out. Does not check the values.
     static Result<LuminanceImage> create(const Context& context, int width, int height, std::span<const float> cdm2);
-    LuminanceImage(LuminanceImage&&) noexcept;
-    LuminanceImage& operator=(LuminanceImage&&) noexcept;
-    ~LuminanceImage();
+    LuminanceImage(LuminanceImage&&) noexcept = default;
+    LuminanceImage& operator=(LuminanceImage&&) noexcept = default;
 
     Result<void> set(std::span<const float> cdm2); // of the same size
     LuminanceTexture texture() const noexcept;
 
 private:
     struct Impl;
-    explicit LuminanceImage(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit LuminanceImage(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 struct LuminanceExtent {
@@ -67,9 +61,8 @@ public:
     // runs out. The tables' luminances must span the reference's; see luminance_extent().
     static Result<VisibilityPasses> create(const Context& context, const JudgeTables& tables,
                                            const LuminanceTexture& reference);
-    VisibilityPasses(VisibilityPasses&&) noexcept;
-    VisibilityPasses& operator=(VisibilityPasses&&) noexcept;
-    ~VisibilityPasses();
+    VisibilityPasses(VisibilityPasses&&) noexcept = default;
+    VisibilityPasses& operator=(VisibilityPasses&&) noexcept = default;
 
     // Sets another reference, of the same size and within the tables' luminances. Does not wait, and makes no textures from
     // the second time on. Fails like create(); then the reference stays.
@@ -84,8 +77,7 @@ public:
     Result<std::vector<float>> read_visibility() const; // V by pixel, row-major from the top left
 
     // Maps the just visible step of luminance, cd/m2, by pixel of this reference. Maps of several references are kept by
-    // number, 0 to most_maps - 1; one of the same number is overwritten.
-    static constexpr int most_maps = 16;
+    // number, 0 to 15; one of the same number is overwritten.
     Result<void> map_thresholds(int number = 0);
     Result<std::vector<float>> read_thresholds(int number = 0) const; // fails where there is no map yet
     unsigned thresholds_texture(int number = 0) const noexcept;       // 0 before there is a map
@@ -101,8 +93,8 @@ public:
 
 private:
     struct Impl;
-    explicit VisibilityPasses(std::unique_ptr<Impl> impl);
-    std::unique_ptr<Impl> impl_;
+    explicit VisibilityPasses(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -1,13 +1,14 @@
-// The depths that a view shows, for vdtree::DepthPicture.
+// Frames of any items, and the depths that a view shows, for vdtree::DepthPicture.
 #pragma once
 
-#include <cstdint>
-#include <span>
-#include <vector>
-
-#include <unseen/render/draw.h>
+#include <unseen/render/renderer.h>
+#include <unseen/render/sample_sum.h>
 
 namespace unseen::render {
+
+// Draws items and reads the mean of their samples back. `sum`: made for the first frame, and for each of another size.
+Result<Frame> draw_frame(std::optional<SampleSum>& sum, const Context& context, std::span<const Item> items,
+                         const vdtree::View& view, const Sampling& sampling);
 
 // By pixel of the view's window, row-major from the top left: the farthest depth of its samples along the view's axis, in
 // world units; infinite if a sample shows no surface. `samples`: N-rooks points a pixel, 1 to 256. Draws depth alone for
