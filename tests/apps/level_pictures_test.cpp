@@ -117,8 +117,7 @@ TEST_F(PrecomputeTest, OfSpaceHasSixDirectionsAndCanBeFollowed) {
     const auto selections = require(read_selections(folder / "space.sel"));
     EXPECT_EQ(selections->directions(), 6);
     auto pictures = require(LevelPictures::create(context(), session));
-    auto follower =
-        require(SelectionFollower::create(Selections(*selections), session.scene(), pictures->triangles()));
+    auto follower = require(SelectionFollower::create(Selections(*selections), session.scene(), pictures->triangles()));
     for (int i = 0; i < 40; ++i) {
         vdtree::View view = ahead();
         view.eye = {0, 0.1 * i, 0.2 * i}, view.target = view.eye + glm::dvec3(std::sin(0.2 * i), 0, -std::cos(0.2 * i));

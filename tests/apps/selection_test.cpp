@@ -466,9 +466,8 @@ TEST(SelectionFollower, ComesToRestAndDoesNotChangeManyAtOnce) {
 TEST(SelectionFollower, RefusesAnotherScene) {
     const Scene scene = row();
     const Selections::Data s = before(scene);
-    EXPECT_THAT(
-        error_in(SelectionFollower::create(Selections(s), balls({{0, 0, 0}}), std::span(s.triangles).first(1))),
-        HasSubstr("another scene"));
+    EXPECT_THAT(error_in(SelectionFollower::create(Selections(s), balls({{0, 0, 0}}), std::span(s.triangles).first(1))),
+                HasSubstr("another scene"));
     auto levels = s.triangles;
     levels[0][1] = 700;
     EXPECT_FALSE(SelectionFollower::create(Selections(s), scene, levels));
