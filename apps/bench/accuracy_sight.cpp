@@ -163,8 +163,8 @@ public:
     explicit MapMaker(AccuracySubject& subject) : context_(subject.context), observer_(subject.session.observer()) {}
 
     perception::JudgeOptions judging() const { return session::judge_options(observer_); }
-    perception::Rpg99Options rpg99_options(int width, int block) const {
-        return {.field_degrees = perception::physical_field(display(block), width).value(), .masked_by_both = false};
+    double field_degrees(int width, int block) const {
+        return perception::physical_field(display(block), width).value();
     }
 
     GpuMap make(const perception::Image& picture, const MapVariant& variant) const {
@@ -188,7 +188,7 @@ private:
     }
     GpuMap rpg99(const perception::Image& picture, const MapVariant& variant) const {
         const auto tables =
-            require(perception::rpg99_tables(picture.width, rpg99_options(picture.width, variant.block)));
+            require(perception::rpg99_tables(picture.width, field_degrees(picture.width, variant.block)));
         auto up = upload(picture);
         auto passes = require(render::ElevationPasses::create(context_, picture.width, picture.height, tables));
         return timed(passes, "against rpg99's", [&] { require(passes.map_thresholds(up.texture())); });
@@ -301,7 +301,7 @@ AccuracyPoints map_points(AccuracySubject& subject) {
     const double modern_s =
         seconds_of([&] { modern = require(perception::threshold_map_modern(picture, maker.judging())); });
     const double rpg99_s = seconds_of(
-        [&] { rpg99 = require(perception::rpg99_map(picture, picture, maker.rpg99_options(picture.width, 1))); });
+        [&] { rpg99 = require(perception::rpg99_map(picture, picture, maker.field_degrees(picture.width, 1))); });
     AccuracyPoints points = {{.name = "modern, CPU", .values = {1e3 * modern_s, 0, 0, 4}},
                              {.name = "rpg99, CPU",
                               .values = {1e3 * rpg99_s, 0, 0, 4},

@@ -106,9 +106,9 @@ Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, cons
 
 Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
     const Image reference = perception::to_luminance(pair.reference, display);
-    perception::Rpg99Options options;
-    options.field_degrees = a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
-    auto judgement = perception::judge_rpg99(reference, perception::to_luminance(pair.test, display), options);
+    auto judgement =
+        perception::judge_rpg99(reference, perception::to_luminance(pair.test, display),
+                                a.field_degrees.value_or(perception::physical_field(display, reference.width).value()));
     if (!judgement) return judgement.error();
     return Verdict{std::move(*judgement), {}};
 }

@@ -1,14 +1,13 @@
 // A luminance for each pixel, and for that one of the two codes around it.
 layout(std430, binding = 0) readonly buffer Levels { float levels[256]; }; // cd/m2, ascending
 
-layout(location = 0) uniform uint kind; // 0 grating, 1 chart, 2 match
+layout(location = 0) uniform uint kind; // 0 grating, 1 match
 layout(location = 1) uniform vec4 screen;  // width, height, tangent per pixel, 1 if the first row of the target is the top
 layout(location = 2) uniform vec4 grating; // mean, contrast, cycles per degree, sigma in degrees
 layout(location = 3) uniform vec4 place;   // phase in radians, centre (tangents), code
-layout(location = 4) uniform vec4 chart;   // octaves of frequency, decades of contrast, rows, white rows
-layout(location = 5) uniform vec4 overlay; // number of marks, their code
-layout(location = 6) uniform uint frame;
-layout(location = 7) uniform vec4 marks[8];
+layout(location = 4) uniform vec4 overlay; // number of marks, their code; rows, white rows
+layout(location = 5) uniform uint frame;
+layout(location = 6) uniform vec4 marks[8];
 
 layout(location = 0) out vec4 result;
 
@@ -35,16 +34,6 @@ float grating_luminance(vec2 pixel) {
     return grating.x * (1.0 + grating.y * envelope * cos(2.0 * pi * grating.z * angle.x + place.x));
 }
 
-float chart_luminance(vec2 pixel) {
-    // From the left edge on, degrees; the frequency is grating.z * 2^(rate * x), the phase its integral.
-    float left = atan(tangents(vec2(0.0)).x), right = -left;
-    float x = (atan(tangents(pixel).x) - left) * degrees_per_radian;
-    float rate = chart.x / ((right - left) * degrees_per_radian) * log(2.0);
-    float cycles = grating.z * (exp(rate * x) - 1.0) / rate;
-    float contrast = pow(10.0, -chart.y * (1.0 - pixel.y / screen.y));
-    return grating.x * (1.0 + contrast * cos(2.0 * pi * fract(cycles)));
-}
-
 // The highest code that is not brighter, and a share of the way to the next.
 uint code_for(float luminance, float random) {
     uint below = 0u;
@@ -59,12 +48,11 @@ void main() {
     vec2 pixel = gl_FragCoord.xy;
     if (screen.w < 0.5) pixel.y = screen.y - pixel.y;
     float code;
-    if (kind == 2u) {
-        bool is_white = mod(floor(pixel.y), chart.z) < chart.w;
+    if (kind == 1u) {
+        bool is_white = mod(floor(pixel.y), overlay.z) < overlay.w;
         code = pixel.x < screen.x * 0.5 ? (is_white ? 1.0 : 0.0) : round(place.w * 255.0) / 255.0;
     } else {
-        float luminance = kind == 1u ? chart_luminance(pixel) : grating_luminance(pixel);
-        code = float(code_for(luminance, noise(uvec3(uvec2(pixel), frame)))) / 255.0;
+        code = float(code_for(grating_luminance(pixel), noise(uvec3(uvec2(pixel), frame)))) / 255.0;
     }
     for (int i = 0; i < int(overlay.x); ++i)
         if (all(greaterThanEqual(pixel, marks[i].xy)) && all(lessThan(pixel, marks[i].zw))) code = overlay.y;

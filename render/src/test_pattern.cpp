@@ -20,26 +20,20 @@ enum UniformLocation {
     screen_location,
     grating_location,
     place_location,
-    chart_location,
     overlay_location,
     frame_location,
     marks_location
 };
 
 Result<void> check(const TestPattern& p) {
-    const double finite[] = {p.mean,     p.frequency_cpd,    p.highest_frequency_cpd,
-                             p.decades,  p.sigma_deg,        p.phase_deg,
-                             p.centre.x, p.centre.y,         p.mark_code,
-                             p.code,     p.tangent_per_pixel};
-    for (const double value : finite)
+    for (const double value : {p.mean, p.frequency_cpd, p.sigma_deg, p.phase_deg, p.centre.x, p.centre.y, p.mark_code,
+                               p.code, p.tangent_per_pixel})
         if (!std::isfinite(value)) return invalid_argument("A test pattern's numbers must be finite.");
     if (!(p.tangent_per_pixel > 0)) return invalid_argument("A test pattern's pixels must have a size above 0.");
     if (!(p.contrast >= 0 && p.contrast <= 1)) return invalid_argument("A test pattern's contrast must lie in 0..1.");
     if (!(p.mean > 0)) return invalid_argument("A test pattern's mean luminance must be above 0.");
     if (!(p.frequency_cpd > 0 && p.sigma_deg > 0))
         return invalid_argument("A grating's frequency and size must be above 0.");
-    if (p.kind == TestPattern::Kind::chart && !(p.highest_frequency_cpd > p.frequency_cpd))
-        return invalid_argument("A chart's frequencies must ascend.");
     if (!(p.rows >= 1 && p.white_rows >= 0 && p.white_rows <= p.rows))
         return invalid_argument("White rows must be 0 to all of the rows.");
     if (p.marks.size() > most_marks) return invalid_argument("A test pattern has at most 8 marks.");
@@ -66,9 +60,7 @@ struct TestPatternDrawer::Impl {
         program->set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
         program->set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
         program->set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
-        program->set(chart_location,
-                     vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
-        program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
+        program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, p.rows, p.white_rows));
         program->set(frame_location, p.frame);
         for (std::size_t i = 0; i < p.marks.size(); ++i)
             program->set(marks_location + static_cast<int>(i),

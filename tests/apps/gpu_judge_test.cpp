@@ -71,6 +71,12 @@ double error_of(const std::vector<float>& is, const std::vector<float>& wanted, 
     return *nth;
 }
 
+// Of the reference, as perception::threshold_map_modern().
+std::vector<float> thresholds_of(GpuJudge& judge) {
+    EXPECT_TRUE(judge.passes().map_thresholds());
+    return *require(judge.passes().read_thresholds());
+}
+
 void expect_alike(const render::Context& context, const Pair& pair, const JudgeOptions& options) {
     const auto cpu = perception::judge_modern(pair.reference, pair.test, options);
     const auto cpu_map = perception::threshold_map_modern(pair.reference, options);
@@ -87,7 +93,7 @@ void expect_alike(const render::Context& context, const Pair& pair, const JudgeO
     EXPECT_EQ(judged->visible_pixels,
               static_cast<std::uint64_t>(std::count_if(v.begin(), v.end(), [](float x) { return !(x < 1); })))
         << what;
-    EXPECT_LE(error_of(require(gpu->threshold_map())->values, cpu_map->values, 0), full_tolerance) << what;
+    EXPECT_LE(error_of(thresholds_of(*gpu), cpu_map->values, 0), full_tolerance) << what;
     EXPECT_EQ(context.take_errors(), "") << what;
 }
 
@@ -219,14 +225,13 @@ TEST_F(GpuJudgeTest, StaysFiniteInTheDarkAndInTheSun) {
                 for (const auto& [reference, test] : {std::pair(a, b), std::pair(b, a)}) {
                     auto judge = require(GpuJudge::create(context(), reference, options));
                     const auto judged = require(judge->judge(test));
-                    const auto map = require(judge->threshold_map());
+                    const std::vector<float> map = thresholds_of(*judge);
                     const auto is_sound = [](float v) { return v >= 0 && std::isfinite(v); };
                     EXPECT_TRUE(std::isfinite(judged->max_ratio));
                     EXPECT_TRUE(
                         std::all_of(judged->visibility.values.begin(), judged->visibility.values.end(), is_sound))
                         << dots << " on " << ground;
-                    EXPECT_TRUE(std::all_of(map->values.begin(), map->values.end(), is_sound))
-                        << dots << " on " << ground;
+                    EXPECT_TRUE(std::all_of(map.begin(), map.end(), is_sound)) << dots << " on " << ground;
                     const auto cpu = perception::judge_modern(reference, test, options);
                     if (dots <= 1e5F)
                         EXPECT_NEAR(judged->max_ratio, cpu->max_ratio,
@@ -244,7 +249,7 @@ TEST_F(GpuJudgeTest, ThresholdsOfFlatFieldsAreTheClosedForm) {
     for (const double luminance : {0.7, 21.0, 95.0}) {
         auto judge = require(GpuJudge::create(context(), flat(1024, 1024, static_cast<float>(luminance)),
                                               {.gain = perception::median_person.gain}));
-        const auto map = require(judge->threshold_map());
+        const std::vector<float> map = thresholds_of(*judge);
         double best = 0;
         for (int k = 0; k < 8; ++k) {
             perception::Stimulus s;
@@ -253,7 +258,7 @@ TEST_F(GpuJudgeTest, ThresholdsOfFlatFieldsAreTheClosedForm) {
             s.area = perception::patch_area(s.frequency);
             best = std::max(best, perception::sensitivity(perception::CsfModel::castle, s));
         }
-        const double at_corner = map->at(0, 0) * best / luminance, in_the_middle = map->at(511, 613) * best / luminance;
+        const double at_corner = map[0] * best / luminance, in_the_middle = map[613 * 1024 + 511] * best / luminance;
         EXPECT_NEAR(at_corner, 1, tolerance + base_band) << luminance;
         EXPECT_NEAR(at_corner, in_the_middle, tolerance) << luminance;
     }

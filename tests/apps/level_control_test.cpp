@@ -300,7 +300,7 @@ TEST_F(LevelControlTest, MapsAreThoseOfTheCpu) {
             const double field = perception::physical_field(options.display, picture.width).value();
             std::vector<float> wanted;
             if (maps == MapRecipe::modern) wanted = perception::threshold_map_modern(picture, options)->values;
-            else wanted = perception::rpg99_map(picture, picture, {field, false})->threshold.values;
+            else wanted = perception::rpg99_map(picture, picture, field)->threshold.values;
             std::vector<double> errors;
             for (std::size_t i = 0; i < wanted.size(); ++i)
                 errors.push_back(std::abs(static_cast<double>((*map)[i]) / static_cast<double>(wanted[i]) - 1));

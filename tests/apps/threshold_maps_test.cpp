@@ -172,27 +172,23 @@ TEST_F(ThresholdMapsTest, KeepsWhatTheNextReferenceNeeds) {
     EXPECT_EQ(passes->full_screen_passes() - before, 3 * static_cast<int>(1 + 4 * tables.bands.size() - 2 + 2));
 }
 
-perception::Rpg99Options of_reference(double field_degrees) {
-    return {.field_degrees = field_degrees, .masked_by_both = false};
-}
-
 TEST_F(ThresholdMapsTest, Rpg99IsTheCpus) {
     for (const double field : {14.9, 45.0})
         for (const auto& [width, height] : shapes_of_all_kinds) {
-            const auto tables = require(perception::rpg99_tables(width, of_reference(field)));
+            const auto tables = require(perception::rpg99_tables(width, field));
             auto passes = require(render::ElevationPasses::create(context(), width, height, *tables));
             const auto all = pictures(width, height);
             for (const bool is_half : {false, true})
                 for (std::size_t i = 0; i < all.size(); ++i) {
                     const Texture texture(all[i].second, is_half);
                     ASSERT_TRUE(passes->map_thresholds(texture.texture(), static_cast<int>(i)));
-                    const auto wanted = perception::rpg99_map(all[i].second, all[i].second, of_reference(field));
+                    const auto wanted = perception::rpg99_map(all[i].second, all[i].second, field);
                     const auto map = passes->read_thresholds(static_cast<int>(i));
                     ASSERT_TRUE(wanted && map);
                     const std::string what = all[i].first + " of " + std::to_string(width) + "x" +
                                              std::to_string(height) + (is_half ? " in half floats" : "");
                     const Image as_it_lies = texture.read();
-                    const auto of_that = perception::rpg99_map(as_it_lies, as_it_lies, of_reference(field));
+                    const auto of_that = perception::rpg99_map(as_it_lies, as_it_lies, field);
                     EXPECT_LE(error_of(*map, of_that->threshold.values), full_tolerance) << what;
                     // The bands' shares of the contrast are what elevates, however little of it there is. So what half
                     // floats round counts in smooth pictures, by 5 to 8% here.
@@ -207,7 +203,7 @@ TEST_F(ThresholdMapsTest, Rpg99IsTheCpus) {
 TEST_F(ThresholdMapsTest, StayFiniteInTheDarkAndInTheSun) {
     constexpr float denormal = 1e-41F;
     for (const auto& [width, height] : {std::pair{66, 50}, {1, 1}, {5, 3}}) {
-        const auto field = of_reference(20);
+        constexpr double field = 20;
         auto elevation =
             render::ElevationPasses::create(context(), width, height, *perception::rpg99_tables(width, field));
         const auto first = LuminanceImage::create(context(), width, height, flat(width, height, 1).values);
@@ -234,10 +230,10 @@ TEST_F(ThresholdMapsTest, StayFiniteInTheDarkAndInTheSun) {
 }
 
 TEST_F(ThresholdMapsTest, RefuseWhatIsNone) {
-    const auto good = *perception::rpg99_tables(8, of_reference(20));
-    EXPECT_FALSE(perception::rpg99_tables(0, of_reference(20)));
-    EXPECT_FALSE(perception::rpg99_tables(8, of_reference(180)));
-    EXPECT_FALSE(perception::rpg99_tables(8, of_reference(std::nan(""))));
+    const auto good = *perception::rpg99_tables(8, 20);
+    EXPECT_FALSE(perception::rpg99_tables(0, 20));
+    EXPECT_FALSE(perception::rpg99_tables(8, 180));
+    EXPECT_FALSE(perception::rpg99_tables(8, std::nan("")));
     EXPECT_FALSE(render::ElevationPasses::create(context(), 0, 8, good));
     EXPECT_THAT(render::ElevationPasses::create(context(), render::largest_target_side() + 1, 8, good).error().message,
                 HasSubstr("textures"));

@@ -109,35 +109,6 @@ TEST_F(TestPatternTest, PatchesLieAtTheirAngle) {
     EXPECT_NEAR(first / energy, 10, 0.05);
 }
 
-TEST_F(TestPatternTest, TheChartGrowsFinerToTheRightAndStrongerToTheBottom) {
-    TestPattern pattern;
-    pattern.kind = TestPattern::Kind::chart;
-    pattern.frequency_cpd = 0.5;
-    pattern.highest_frequency_cpd = 8;
-    pattern.decades = 2.5;
-    const int width = 512, height = 256;
-    const auto image = luminances(pattern, width, height);
-    const auto row = [&](int y) {
-        return std::vector<double>(image.begin() + y * width, image.begin() + (y + 1) * width);
-    };
-    const auto crossings = [&](const std::vector<double>& r, int from, int to) {
-        int count = 0;
-        for (int x = from + 1; x < to; ++x)
-            count += (r[static_cast<std::size_t>(x - 1)] < 50) != (r[static_cast<std::size_t>(x)] < 50);
-        return count;
-    };
-    const auto bottom = row(height - 1), top = row(0);
-    EXPECT_GT(crossings(bottom, width / 2, width), 3 * crossings(bottom, 0, width / 2));
-    // Cycles in all: the integral of an exponential from 0.5 to 8 cpd over the field.
-    const double field = 2 * std::atan(width / 2.0 * tangent_per_pixel) * degrees;
-    EXPECT_NEAR(crossings(bottom, 0, width), 2 * (8 - 0.5) * field / std::log(16.0), 2.5);
-    const auto spread = [](const std::vector<double>& r) {
-        return *std::max_element(r.begin(), r.end()) - *std::min_element(r.begin(), r.end());
-    };
-    EXPECT_GT(spread(bottom), 95);
-    EXPECT_LT(spread(top), 3);
-}
-
 TEST_F(TestPatternTest, MatchesAndMarks) {
     TestPattern pattern;
     pattern.kind = TestPattern::Kind::match;

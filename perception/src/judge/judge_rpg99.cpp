@@ -1,7 +1,7 @@
 // The threshold map of Ramasubramanian, Pattanaik and Greenberg 1999 with the choices of Yee's PerceptualDiff 2.1,
 // for comparison with older results. Three of its faults are kept on purpose, since without them it would be another
 // judge: the field in degrees, not the pixels of a degree, chooses the adaptation level; its "pyramid" blurs at full
-// resolution, so the bands are no octaves; with `masked_by_both` the error masks itself.
+// resolution, so the bands are no octaves; the error masks itself.
 #include <unseen/perception/internal/judge_tables.h>
 
 #include <limits>
@@ -23,9 +23,6 @@ constexpr std::array<double, 5> kernel = {0.05, 0.25, 0.4, 0.25, 0.05};
 constexpr int nodes_an_octave = 128;
 constexpr int first_octave = -17, last_octave = 20; // 0.8e-5 to 1e6 cd/m2: around the floor, and beyond the sun on snow
 constexpr float least_log2 = -126;                  // of a float: a sensitivity below it is none
-
-constexpr double adobe_weights[3] = {0.297361, 0.627355, 0.0752847};
-constexpr double program_gamma = 2.2;
 
 // Threshold versus intensity, cd/m2 (Ward Larson et al. 1997 after Ferwerda et al. 1996).
 double tvi(double luminance) {
@@ -114,20 +111,24 @@ double elevation(const std::array<double, band_count>& contrast, const Bands& ba
     return std::clamp(weighted / std::max(sum, contrast_floor), 1.0, largest_elevation);
 }
 
-Result<void> check(const Image& reference, const Image& test, const Rpg99Options& options) {
-    if (auto ok = check_luminance_pair("rpg99", reference, test); !ok) return ok;
-    if (options.field_degrees > 0 && options.field_degrees < 180) return {};
+Result<void> check_field(double field_degrees) {
+    if (field_degrees > 0 && field_degrees < 180) return {};
     return judge_argument_error("rpg99", "field_degrees must lie between 0 and 180");
+}
+
+Result<void> check(const Image& reference, const Image& test, double field_degrees) {
+    if (auto ok = check_luminance_pair("rpg99", reference, test); !ok) return ok;
+    return check_field(field_degrees);
 }
 
 struct ExactMap {
     Plane adaptation, elevation, threshold;
 };
 
-ExactMap exact_map(const Image& reference, const Image& test, const Rpg99Options& options) {
-    const Bands bands = make_bands(options.field_degrees, reference.width);
+ExactMap exact_map(const Image& reference, const Image& test, double field_degrees) {
+    const Bands bands = make_bands(field_degrees, reference.width);
     const std::vector<Plane> a = blur_levels(reference);
-    const bool one_image = !options.masked_by_both || reference.values == test.values;
+    const bool one_image = reference.values == test.values;
     const std::vector<Plane> own_b = one_image ? std::vector<Plane>() : blur_levels(test);
     const std::vector<Plane>& b = one_image ? a : own_b;
 
@@ -156,16 +157,16 @@ Image as_image(const Plane& plane, const Image& like) {
 
 } // namespace
 
-Result<Rpg99Map> rpg99_map(const Image& reference, const Image& test, const Rpg99Options& options) {
-    if (auto ok = check(reference, test, options); !ok) return ok.error();
-    const ExactMap map = exact_map(reference, test, options);
+Result<Rpg99Map> rpg99_map(const Image& reference, const Image& test, double field_degrees) {
+    if (auto ok = check(reference, test, field_degrees); !ok) return ok.error();
+    const ExactMap map = exact_map(reference, test, field_degrees);
     return Rpg99Map{as_image(map.adaptation, reference), as_image(map.elevation, reference),
                     as_image(map.threshold, reference)};
 }
 
-Result<Judgement> judge_rpg99(const Image& reference, const Image& test, const Rpg99Options& options) {
-    if (auto ok = check(reference, test, options); !ok) return ok.error();
-    const ExactMap map = exact_map(reference, test, options);
+Result<Judgement> judge_rpg99(const Image& reference, const Image& test, double field_degrees) {
+    if (auto ok = check(reference, test, field_degrees); !ok) return ok.error();
+    const ExactMap map = exact_map(reference, test, field_degrees);
     Judgement judgement;
     judgement.pixels = map.threshold.size();
     Plane ratio(map.threshold.size());
@@ -179,11 +180,10 @@ Result<Judgement> judge_rpg99(const Image& reference, const Image& test, const R
     return judgement;
 }
 
-Result<Rpg99Tables> rpg99_tables(int width, const Rpg99Options& options) {
-    if (!(options.field_degrees > 0 && options.field_degrees < 180))
-        return judge_argument_error("rpg99", "field_degrees must lie between 0 and 180");
+Result<Rpg99Tables> rpg99_tables(int width, double field_degrees) {
+    if (auto ok = check_field(field_degrees); !ok) return ok.error();
     if (width < 1) return judge_argument_error("rpg99", "a picture has a width of at least 1 pixel");
-    const Bands bands = make_bands(options.field_degrees, width);
+    const Bands bands = make_bands(field_degrees, width);
     Rpg99Tables tables;
     tables.kernel = {static_cast<float>(kernel[2]), static_cast<float>(kernel[3]), static_cast<float>(kernel[4])};
     for (std::size_t i = 0; i < band_count; ++i)
@@ -208,22 +208,6 @@ Result<Rpg99Tables> rpg99_tables(int width, const Rpg99Options& options) {
                 std::max(static_cast<float>(std::log2(csf(bands.frequency[i]))), least_log2);
     }
     return tables;
-}
-
-Image perceptualdiff_luminance(const Image& codes, double peak_cdm2) {
-    Image out{codes.width, codes.height, 1, {}};
-    const auto channels = static_cast<std::size_t>(codes.channels);
-    const std::size_t pixels = channels == 0 ? 0 : codes.values.size() / channels;
-    out.values.reserve(pixels);
-    for (std::size_t p = 0; p < pixels; ++p) {
-        double y = 0;
-        for (std::size_t c = 0; c < 3; ++c) {
-            const double code = codes.values[p * channels + (channels == 3 ? c : 0)];
-            y += adobe_weights[c] * std::pow(std::clamp(code, 0.0, 1.0), program_gamma);
-        }
-        out.values.push_back(static_cast<float>(y * peak_cdm2));
-    }
-    return out;
 }
 
 } // namespace unseen::perception

@@ -84,13 +84,6 @@ Result<GpuJudge::Summary> GpuJudge::judge(const render::LuminanceTexture& test) 
     return Summary{summary->largest, summary->visible_pixels};
 }
 
-Result<perception::Image> GpuJudge::threshold_map() {
-    if (auto mapped = impl_->passes.map_thresholds(); !mapped) return mapped.error();
-    auto thresholds = impl_->passes.read_thresholds();
-    if (!thresholds) return thresholds.error();
-    return perception::Image{impl_->width, impl_->height, 1, std::move(*thresholds)};
-}
-
 render::VisibilityPasses& GpuJudge::passes() noexcept { return impl_->passes; }
 
 } // namespace unseen::session

@@ -188,8 +188,7 @@ struct LevelControl::Impl {
             // Nothing is mapped.
         } else if (options.maps == MapRecipe::rpg99) {
             const auto tables = perception::rpg99_tables(
-                combination.width(), {.field_degrees = perception::physical_field(display, combination.width()).value(),
-                                      .masked_by_both = false});
+                combination.width(), perception::physical_field(display, combination.width()).value());
             if (!tables) return tables.error();
             auto maps = render::ElevationPasses::create(context, combination.width(), combination.height(), *tables);
             if (!maps) return maps.error();

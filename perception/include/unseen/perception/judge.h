@@ -67,21 +67,15 @@ JudgeOptions second_judge_options(const Person& person, const Display& display =
 
 // Ramasubramanian, Pattanaik and Greenberg 1999 as Yee's PerceptualDiff computes it, for comparison. It is almost blind
 // to high-frequency changes, so it proves nothing.
-struct Rpg99Options {
-    double field_degrees = 45; // horizontal field of the image: physical_field(display, width)
-    // Elevation is the larger and adaptation the mean of both images', as in that program; otherwise the reference's.
-    bool masked_by_both = true;
-};
+// `field_degrees`: the horizontal field of the image, physical_field(display, width). Elevation is the larger and
+// adaptation the mean of both images'.
 struct Rpg99Map {
     Image adaptation; // cd/m2
     Image elevation;  // F, 1..10
     Image threshold;  // cd/m2
 };
-Result<Rpg99Map> rpg99_map(const Image& reference, const Image& test, const Rpg99Options& options);
-Result<Judgement> judge_rpg99(const Image& reference, const Image& test, const Rpg99Options& options);
-
-// Luminance as PerceptualDiff computes it from code values 0..1: gamma 2.2, AdobeRGB weights, black 0.
-Image perceptualdiff_luminance(const Image& codes, double peak_cdm2);
+Result<Rpg99Map> rpg99_map(const Image& reference, const Image& test, double field_degrees);
+Result<Judgement> judge_rpg99(const Image& reference, const Image& test, double field_degrees);
 
 // Wang et al. 2004 on Rec. 601 luma of 8-bit codes: Gaussian window of sigma 1.5, 11 x 11, K1 = 0.01, K2 = 0.03, biased
 // covariance, mean over the image without the window's margin. Images are code values 0..1.

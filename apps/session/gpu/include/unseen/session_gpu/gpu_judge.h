@@ -39,9 +39,6 @@ public:
     };
     Result<Summary> judge(const render::LuminanceTexture& test);
 
-    // perception::threshold_map_modern() of the reference.
-    Result<perception::Image> threshold_map();
-
     render::VisibilityPasses& passes() noexcept; // for the library's own passes
 
 private:

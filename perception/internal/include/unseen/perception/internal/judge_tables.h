@@ -13,6 +13,6 @@ Result<JudgeTables> judge_tables(int width, int height, float darkest_cdm2, floa
                                  const JudgeOptions& options);
 
 // For pictures of this width. Fails like rpg99_map(), and on widths below 1.
-Result<Rpg99Tables> rpg99_tables(int width, const Rpg99Options& options);
+Result<Rpg99Tables> rpg99_tables(int width, double field_degrees);
 
 } // namespace unseen::perception

@@ -1,4 +1,4 @@
-// Patterns for measuring displays and their viewers, exact to a fraction of a code: gratings, a chart, brightness
+// Patterns for measuring displays and their viewers, exact to a fraction of a code: gratings and brightness
 // matches.
 #pragma once
 
@@ -15,10 +15,6 @@ struct TestPattern {
         // A Gabor patch: mean (1 + contrast exp(-r^2 / 2 sigma^2) cos(2 pi frequency x + phase)), angles about its
         // centre.
         grating,
-        // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom. The frequency
-        // goes from `frequency` at the left to `highest_frequency` at the right, as an exponential. The phase is its
-        // integral.
-        chart,
         // Left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`.
         match,
     };
@@ -27,8 +23,6 @@ struct TestPattern {
     double mean = 50;    // cd/m2
     double contrast = 0; // Michelson, 0..1
     double frequency_cpd = 4;
-    double highest_frequency_cpd = 16;
-    double decades = 3;
     double sigma_deg = 0.4;
     double phase_deg = 0;
     glm::dvec2 centre = glm::dvec2(0); // of the patch

@@ -70,7 +70,7 @@ struct JudgeTables {
     std::vector<Band> bands;
 };
 
-// What rpg99_map() of a reference alone (Rpg99Options::masked_by_both off) knows of an observer. Its steps:
+// What rpg99_map() of a picture and itself knows of an observer. Its steps:
 //
 //   a_0 = picture,  a_i+1 = a_i blurred by the kernel along both axes,
 //   c_i = |a_i - a_i+1| / max(a_i+2, floor),  A = max(a_adaptation_level, floor),
