@@ -221,25 +221,210 @@ class TreeBuilder {
 public:
     TreeBuilder(const MeshView& source, const BuildOptions& options) : source_(source), options_(options) {}
 
-    Result<VertexTree> build(const Clusterer& clusterer);
-    Result<void> help();
+    Result<VertexTree> build(const Clusterer& clusterer) {
+        if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+        if (is_cancelled(0.0, "analysing")) return cancelled_error();
+        analyse();
+        if (is_cancelled(clustering_begins, "clustering")) return cancelled_error();
+        {
+            const Result<Clustering> clustering = cluster(clusterer);
+            if (!clustering) return clustering.error();
+            if (options_.team) limit_threads(options_.threads_alone);
+            if (is_cancelled(clustering_ends, "ordering")) return cancelled_error();
+            order(*clustering);
+            place_vertices(*clustering);
+            release(surface_.areas); // bounding is what takes most memory
+            release(surface_.normals);
+        }
+        if (is_cancelled(0.8, "bounding")) return cancelled_error();
+        bound();
+        if (is_textured()) lay_texture();
+
+        g_->closedness = surface_.closedness;
+        g_->dropped_triangles = clean_.dropped + options_.dropped_before;
+        g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
+        g_->document = std::vector<std::byte>(source_.document.begin(), source_.document.end());
+        auto data = std::make_shared<VertexTree::Data>();
+        data->light = std::make_shared<TreeLuminance>(
+            derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured(), nullptr));
+        data->geometry = std::move(g_);
+        if (is_cancelled(1.0, "done")) return cancelled_error();
+        return VertexTree(std::move(data));
+    }
+
+    Result<void> help() {
+        if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+        analyse();
+        const std::vector<float> luminance = find_luminance();
+        const auto helped =
+            cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, {}, options_.team);
+        return helped ? Result<void>() : helped.error();
+    }
 
 private:
     bool is_cancelled(double share, const char* stage) const {
         return options_.progress && !options_.progress(share, stage);
     }
-    void limit_threads(int threads);
-    Result<void> clean_up();
-    void analyse();
-    std::vector<float> find_luminance() const;
-    Result<Clustering> cluster(const Clusterer& clusterer);
-    void order(const Clustering& clustering);
-    void place_vertices(const Clustering& clustering);
-    void bound();
-    LeafPlaces find_places() const;
+
+    // 0: no limit. Until the tree is built.
+    void limit_threads(int threads) {
+        limit_.reset();
+        if (threads > 0)
+            limit_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    }
+
+    Result<void> clean_up() {
+        if (const auto valid = check_buildable(source_, options_); !valid) return valid.error();
+        limit_threads(options_.threads);
+        clean_ = clean(source_);
+        if (mesh_.triangles.empty())
+            return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
+        return {};
+    }
+
+    void analyse() {
+        prelit_ = options_.prelit && (!mesh_.colours.empty() || is_textured());
+        coincident_ = find_coincident(mesh_.positions);
+        surface_ = analyse_surface(mesh_, coincident_);
+    }
+
+    std::vector<float> find_luminance() const {
+        std::vector<float> luminance(mesh_.positions.size());
+        parallel_loop(std::size_t{0}, luminance.size(), [&](std::size_t v) {
+            luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v],
+                                            options_.light, prelit_, is_textured());
+        });
+        return luminance;
+    }
+
+    Result<Clustering> cluster(const Clusterer& clusterer) {
+        const std::vector<float> luminance = find_luminance();
+        Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
+        if (clustering)
+            if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
+        return clustering;
+    }
+
+    void order(const Clustering& clustering) {
+        const Index vertices = static_cast<Index>(mesh_.positions.size());
+        nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
+        std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
+        parallel_loop(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
+            source_vertices[nodes_.leaf_of_vertex[v]] =
+                v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
+        });
+        g_->source_vertices = std::move(source_vertices);
+        parts_.emplace(links_of(nodes_.shape));
+    }
+
+    void place_vertices(const Clustering& clustering) {
+        const Index vertices = static_cast<Index>(mesh_.positions.size());
+        g_->origin = choose_origin(source_.positions);
+        // By leaf: weights, and normals of the leaves.
+        ParallelArray<double> weights(nodes_.shape.leaves());
+        ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
+        parallel_loop(Index{0}, vertices, [&](Index v) {
+            weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
+            normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
+        });
+        ProxyVertices proxies =
+            place_proxies(nodes_.shape, *parts_, {source_, g_->source_vertices, weights, normals, g_->origin},
+                          {clustering.positions, nodes_.node_of_cluster});
+        g_->positions = std::move(proxies.positions);
+        g_->normals = std::move(proxies.normals);
+        g_->colours = std::move(proxies.colours);
+        g_->uvs = std::move(proxies.uvs);
+    }
+
+    void bound() {
+        TreeShape& shape = nodes_.shape;
+        const Ancestors ancestors(shape);
+        TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
+        if (!source_.ranges.empty()) {
+            for (Index& t : triangles.sources) t = clean_.source_triangle(t);
+            g_->source_triangles = std::move(triangles.sources);
+        }
+        release(triangles.sources);
+        const LeafPlaces places = find_places();
+        release(coincident_);
+        release(surface_.irregular);
+        release(nodes_.leaf_of_vertex);
+        release(nodes_.node_of_cluster);
+        TreeParts& parts = *parts_;
+        parts.assign_triangles(triangles.first_triangle, triangles.triangles);
+        const LeafRings rings = find_rings(triangles.triangles, places, parts);
+        const BoundInput input{shape, parts, rings, g_->positions};
+
+        NodeSpheres spheres = bound_spheres(input);
+        g_->bounding_sphere = bound_corners(input);
+        g_->displacement = bound_displacements(input, spheres.support);
+        const ParallelArray<Directions> facing =
+            bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+        g_->support_spheres = std::move(spheres.support);
+        const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
+        std::vector<NodeBounds> bounds(shape.interior());
+        parallel_loop(NodeId{0}, shape.interior(), [&](NodeId node) {
+            const int irregular = facing[node].marked() ? irregular_ring : 0;
+            const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
+            bounds[node] = {spheres.ring[node], facing[node].slabs(),
+                            static_cast<std::uint8_t>(irregular | translucent), 0};
+        });
+        PooledMasks masks = pool_masks(facing, shape.parents);
+        g_->bounds = std::move(bounds);
+        g_->mask_at = std::move(masks.at);
+        g_->mask_records = std::move(masks.records);
+        g_->parents = std::move(shape.parents);
+        g_->first_leaf = std::move(shape.first_leaf);
+        g_->leaf_end = std::move(shape.leaf_end);
+        g_->subtree_end = std::move(shape.subtree_end);
+        g_->first_triangle = std::move(triangles.first_triangle);
+        g_->triangles = std::move(triangles.triangles);
+    }
+
+    LeafPlaces find_places() const {
+        const std::size_t leaves = nodes_.shape.leaves();
+        LeafPlaces places;
+        places.weld.resize(leaves);
+        std::iota(places.weld.begin(), places.weld.end(), Index{0});
+        places.irregular.assign(leaves, 0);
+        places.alone.assign(leaves, 1);
+        parallel_loop(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
+            const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
+            places.weld[leaf] = place;
+            places.irregular[leaf] = surface_.irregular[v];
+            if (leaf == place) return;
+            places.alone[leaf] = 0;
+            std::atomic_ref(places.alone[place]).store(0, std::memory_order_relaxed);
+        });
+        return places;
+    }
+
     bool is_textured() const { return !source_.texture.empty(); }
-    void lay_texture();
-    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
+
+    void lay_texture() {
+        const TextureView& texture = source_.texture;
+        g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
+        g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
+        std::vector<glm::vec2> uvs = TextureFits(*g_, *parts_).fitted_uvs(bound_footprints(*g_, *parts_));
+        g_->uvs = std::move(uvs);
+        g_->ring_texture = bound_ring_texture(*g_, *parts_);
+    }
+
+    // By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
+    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const {
+        const TreeShape& shape = nodes_.shape;
+        const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
+        const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
+        bool any = false;
+        for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
+        if (!any) return {};
+        std::vector<std::uint8_t> translucent(shape.interior(), 0);
+        for (const Triangle& t : triangles)
+            if (std::any_of(t.begin(), t.end(), shows_through))
+                for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
+        for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
+        return translucent;
+    }
 
     const MeshView& source_;
     const BuildOptions& options_;
@@ -254,203 +439,6 @@ private:
     std::optional<TreeParts> parts_;
     std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
 };
-
-// 0: no limit. Until the tree is built.
-void TreeBuilder::limit_threads(int threads) {
-    limit_.reset();
-    if (threads > 0) limit_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-}
-
-Result<void> TreeBuilder::clean_up() {
-    if (const auto valid = check_buildable(source_, options_); !valid) return valid.error();
-    limit_threads(options_.threads);
-    clean_ = clean(source_);
-    if (mesh_.triangles.empty())
-        return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
-    return {};
-}
-
-Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
-    if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
-    if (is_cancelled(0.0, "analysing")) return cancelled_error();
-    analyse();
-    if (is_cancelled(clustering_begins, "clustering")) return cancelled_error();
-    {
-        const Result<Clustering> clustering = cluster(clusterer);
-        if (!clustering) return clustering.error();
-        if (options_.team) limit_threads(options_.threads_alone);
-        if (is_cancelled(clustering_ends, "ordering")) return cancelled_error();
-        order(*clustering);
-        place_vertices(*clustering);
-        release(surface_.areas); // bounding is what takes most memory
-        release(surface_.normals);
-    }
-    if (is_cancelled(0.8, "bounding")) return cancelled_error();
-    bound();
-    if (is_textured()) lay_texture();
-
-    g_->closedness = surface_.closedness;
-    g_->dropped_triangles = clean_.dropped + options_.dropped_before;
-    g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
-    g_->document = std::vector<std::byte>(source_.document.begin(), source_.document.end());
-    auto data = std::make_shared<VertexTree::Data>();
-    data->light = std::make_shared<TreeLuminance>(
-        derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured(), nullptr));
-    data->geometry = std::move(g_);
-    if (is_cancelled(1.0, "done")) return cancelled_error();
-    return VertexTree(std::move(data));
-}
-
-Result<void> TreeBuilder::help() {
-    if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
-    analyse();
-    const std::vector<float> luminance = find_luminance();
-    const auto helped =
-        cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, {}, options_.team);
-    return helped ? Result<void>() : helped.error();
-}
-
-void TreeBuilder::analyse() {
-    prelit_ = options_.prelit && (!mesh_.colours.empty() || is_textured());
-    coincident_ = find_coincident(mesh_.positions);
-    surface_ = analyse_surface(mesh_, coincident_);
-}
-
-std::vector<float> TreeBuilder::find_luminance() const {
-    std::vector<float> luminance(mesh_.positions.size());
-    parallel_loop(std::size_t{0}, luminance.size(), [&](std::size_t v) {
-        luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v],
-                                        options_.light, prelit_, is_textured());
-    });
-    return luminance;
-}
-
-Result<Clustering> TreeBuilder::cluster(const Clusterer& clusterer) {
-    const std::vector<float> luminance = find_luminance();
-    Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
-    if (clustering)
-        if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
-    return clustering;
-}
-
-void TreeBuilder::order(const Clustering& clustering) {
-    const Index vertices = static_cast<Index>(mesh_.positions.size());
-    nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
-    std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
-    parallel_loop(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
-        source_vertices[nodes_.leaf_of_vertex[v]] =
-            v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
-    });
-    g_->source_vertices = std::move(source_vertices);
-    parts_.emplace(nodes_.shape.links());
-}
-
-void TreeBuilder::place_vertices(const Clustering& clustering) {
-    const Index vertices = static_cast<Index>(mesh_.positions.size());
-    g_->origin = choose_origin(source_.positions);
-    // By leaf: weights, and normals of the leaves.
-    ParallelArray<double> weights(nodes_.shape.leaves());
-    ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
-    parallel_loop(Index{0}, vertices, [&](Index v) {
-        weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
-        normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
-    });
-    ProxyVertices proxies =
-        place_proxies(nodes_.shape, *parts_, {source_, g_->source_vertices, weights, normals, g_->origin},
-                      {clustering.positions, nodes_.node_of_cluster});
-    g_->positions = std::move(proxies.positions);
-    g_->normals = std::move(proxies.normals);
-    g_->colours = std::move(proxies.colours);
-    g_->uvs = std::move(proxies.uvs);
-}
-
-void TreeBuilder::lay_texture() {
-    const TextureView& texture = source_.texture;
-    g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
-    g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
-    std::vector<glm::vec2> uvs = TextureFits(*g_, *parts_).fitted_uvs(bound_footprints(*g_, *parts_));
-    g_->uvs = std::move(uvs);
-    g_->ring_texture = bound_ring_texture(*g_, *parts_);
-}
-
-LeafPlaces TreeBuilder::find_places() const {
-    const std::size_t leaves = nodes_.shape.leaves();
-    LeafPlaces places;
-    places.weld.resize(leaves);
-    std::iota(places.weld.begin(), places.weld.end(), Index{0});
-    places.irregular.assign(leaves, 0);
-    places.alone.assign(leaves, 1);
-    parallel_loop(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
-        const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
-        places.weld[leaf] = place;
-        places.irregular[leaf] = surface_.irregular[v];
-        if (leaf == place) return;
-        places.alone[leaf] = 0;
-        std::atomic_ref(places.alone[place]).store(0, std::memory_order_relaxed);
-    });
-    return places;
-}
-
-// By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
-std::vector<std::uint8_t> TreeBuilder::find_translucent(std::span<const Triangle> triangles) const {
-    const TreeShape& shape = nodes_.shape;
-    const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
-    const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
-    bool any = false;
-    for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
-    if (!any) return {};
-    std::vector<std::uint8_t> translucent(shape.interior(), 0);
-    for (const Triangle& t : triangles)
-        if (std::any_of(t.begin(), t.end(), shows_through))
-            for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
-    for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
-    return translucent;
-}
-
-void TreeBuilder::bound() {
-    TreeShape& shape = nodes_.shape;
-    const Ancestors ancestors(shape);
-    TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
-    if (!source_.ranges.empty()) {
-        for (Index& t : triangles.sources) t = clean_.source_triangle(t);
-        g_->source_triangles = std::move(triangles.sources);
-    }
-    release(triangles.sources);
-    const LeafPlaces places = find_places();
-    release(coincident_);
-    release(surface_.irregular);
-    release(nodes_.leaf_of_vertex);
-    release(nodes_.node_of_cluster);
-    TreeParts& parts = *parts_;
-    parts.assign_triangles(triangles.first_triangle, triangles.triangles);
-    const LeafRings rings = find_rings(triangles.triangles, places, parts);
-    const BoundInput input{shape, parts, rings, g_->positions};
-
-    NodeSpheres spheres = bound_spheres(input);
-    g_->bounding_sphere = bound_corners(input);
-    g_->displacement = bound_displacements(input, spheres.support);
-    const ParallelArray<Directions> facing =
-        bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
-    g_->support_spheres = std::move(spheres.support);
-    const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
-    std::vector<NodeBounds> bounds(shape.interior());
-    parallel_loop(NodeId{0}, shape.interior(), [&](NodeId node) {
-        const int irregular = facing[node].marked() ? irregular_ring : 0;
-        const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
-        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent),
-                        0};
-    });
-    PooledMasks masks = pool_masks(facing, shape.parents);
-    g_->bounds = std::move(bounds);
-    g_->mask_at = std::move(masks.at);
-    g_->mask_records = std::move(masks.records);
-    g_->parents = std::move(shape.parents);
-    g_->first_leaf = std::move(shape.first_leaf);
-    g_->leaf_end = std::move(shape.leaf_end);
-    g_->subtree_end = std::move(shape.subtree_end);
-    g_->first_triangle = std::move(triangles.first_triangle);
-    g_->triangles = std::move(triangles.triangles);
-}
 
 } // namespace
 

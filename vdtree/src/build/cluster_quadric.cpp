@@ -222,15 +222,134 @@ public:
         list_triangles();
     }
 
-    PartMesh make(std::size_t part) const;
+    PartMesh make(std::size_t part) const {
+        PartMesh out;
+        const Index first_slot = part_begin(part, numbering_.parts, slots()),
+                    end_slot = part_begin(part + 1, numbering_.parts, slots());
+        const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
+        const auto is_own = [&](Index place) { return place >= first && place < end; };
+        const auto triangles =
+            std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
+
+        std::vector<Index> ghosts; // places of other parts' vertices, by slot
+        for (const Index t : triangles)
+            for (const Index v : input_.mesh.triangles[t])
+                if (!is_own(numbering_.place[v])) ghosts.push_back(numbering_.place[v]);
+        std::sort(ghosts.begin(), ghosts.end());
+        ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
+
+        out.first_slot = first_slot;
+        out.own_slots = end_slot - first_slot;
+        out.area_scale = area_scale_;
+        out.channels = 1 + (has_normals_ ? 3 : 0) + (texture_unit_ > 0 ? 2 : 0) + (input_.mesh.colours.empty() ? 0 : 3);
+        const std::size_t vertices = end - first + ghosts.size();
+        out.channel_values.reserve(vertices * out.channels);
+        out.slot_of_vertex.reserve(vertices);
+        out.positions.reserve(out.own_slots + ghosts.size());
+        const auto push_position = [&](Index slot) {
+            out.positions.push_back((input_.mesh.positions[numbering_.vertex_of_slot[slot]] - centre_) * scale_);
+        };
+        for (Index s = first_slot; s < end_slot; ++s) {
+            push_position(s);
+            for (Index i = numbering_.first_member[s]; i < numbering_.first_member[s + 1]; ++i) {
+                out.slot_of_vertex.push_back(s - first_slot);
+                push_channels(numbering_.members[i], out.channel_values);
+            }
+        }
+        for (const Index place : ghosts) {
+            const Index slot = static_cast<Index>(
+                std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
+                numbering_.first_member.begin() - 1);
+            if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
+                out.ghost_slots.push_back(slot);
+                push_position(slot);
+            }
+            out.slot_of_vertex.push_back(static_cast<Index>(out.positions.size() - 1));
+            push_channels(numbering_.members[place], out.channel_values);
+        }
+        out.triangles.reserve(triangles.size());
+        for (const Index t : triangles) {
+            Triangle local = input_.mesh.triangles[t];
+            for (Index& v : local) {
+                const Index place = numbering_.place[v];
+                v = is_own(place) ? place - first
+                                  : end - first +
+                                        static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) -
+                                                           ghosts.begin());
+            }
+            out.triangles.push_back(local);
+        }
+        return out;
+    }
+
     glm::dvec3 from_unit_box(glm::dvec3 p) const { return p / scale_ + centre_; }
     float length_from_unit_box(float length) const { return static_cast<float>(length / scale_); }
 
 private:
-    void measure();
-    double texture_density() const;
-    void list_triangles();
-    void push_channels(Index vertex, std::vector<float>& to) const;
+    void measure() {
+        const Box box = box_around(input_.mesh.positions);
+        const double extent = box.extent();
+        centre_ = box.low + box.size() * 0.5;
+        scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
+        double largest = 0;
+        for (const double a : input_.areas) largest = std::max(largest, a);
+        largest *= scale_ * scale_;
+        area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
+        has_normals_ = !input_.mesh.normals.empty();
+        texture_unit_ = texture_density() * texture_scale;
+    }
+
+    // The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
+    double texture_density() const {
+        if (input_.mesh.uvs.empty()) return 0;
+        double surface = 0, texture = 0;
+        for (const Triangle& t : input_.mesh.triangles) {
+            const auto p = [&](std::size_t k) { return input_.mesh.positions[t[k]] * scale_; };
+            const auto uv = [&](std::size_t k) { return glm::dvec2(input_.mesh.uvs[t[k]]); };
+            surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
+            const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
+            texture += std::abs(e.x * f.y - e.y * f.x);
+        }
+        const double density = std::sqrt(surface / texture);
+        return density > 0 && std::isfinite(density) ? density : 0;
+    }
+
+    void list_triangles() {
+        const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
+        first_triangle_.assign(parts + 1, 0);
+        std::vector<Index> part_of(input_.mesh.positions.size());
+        parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
+            for (Index i = first_place(part); i < first_place(part + 1); ++i)
+                part_of[numbering_.members[i]] = static_cast<Index>(part);
+        });
+        const auto for_each_use = [&](auto&& f) {
+            for (std::size_t t = 0; t < count; ++t) {
+                const Triangle& tri = input_.mesh.triangles[t];
+                const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
+                f(t, a);
+                if (b != a) f(t, b);
+                if (c != a && c != b) f(t, c);
+            }
+        };
+        for_each_use([&](std::size_t, Index part) { ++first_triangle_[part + 1]; });
+        std::partial_sum(first_triangle_.begin(), first_triangle_.end(), first_triangle_.begin());
+        triangles_.resize(first_triangle_.back());
+        std::vector<std::size_t> next(first_triangle_);
+        for_each_use([&](std::size_t t, Index part) { triangles_[next[part]++] = static_cast<Index>(t); });
+    }
+
+    void push_channels(Index v, std::vector<float>& to) const {
+        const auto push = [&](double value) {
+            to.push_back(static_cast<float>(std::clamp(value, -largest_value, largest_value)));
+        };
+        push(input_.luminance[v] * luminance_scale);
+        if (has_normals_)
+            for (int k = 0; k < 3; ++k) push(input_.normals[v][k] * normal_scale);
+        if (texture_unit_ > 0)
+            for (int k = 0; k < 2; ++k) push(input_.mesh.uvs[v][k] * texture_unit_);
+        if (!input_.mesh.colours.empty())
+            for (int k = 0; k < 3; ++k) push(input_.mesh.colours[v][k] * colour_scale);
+    }
 
     std::size_t slots() const { return numbering_.vertex_of_slot.size(); }
     Index first_place(std::size_t part) const {
@@ -247,131 +366,6 @@ private:
     std::vector<std::size_t> first_triangle_; // by part, one longer
     std::vector<Index> triangles_;            // those that touch a vertex of the part, by part
 };
-
-void PartMaker::measure() {
-    const Box box = box_around(input_.mesh.positions);
-    const double extent = box.extent();
-    centre_ = box.low + box.size() * 0.5;
-    scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
-    double largest = 0;
-    for (const double a : input_.areas) largest = std::max(largest, a);
-    largest *= scale_ * scale_;
-    area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
-    has_normals_ = !input_.mesh.normals.empty();
-    texture_unit_ = texture_density() * texture_scale;
-}
-
-// The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
-double PartMaker::texture_density() const {
-    if (input_.mesh.uvs.empty()) return 0;
-    double surface = 0, texture = 0;
-    for (const Triangle& t : input_.mesh.triangles) {
-        const auto p = [&](std::size_t k) { return input_.mesh.positions[t[k]] * scale_; };
-        const auto uv = [&](std::size_t k) { return glm::dvec2(input_.mesh.uvs[t[k]]); };
-        surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
-        const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
-        texture += std::abs(e.x * f.y - e.y * f.x);
-    }
-    const double density = std::sqrt(surface / texture);
-    return density > 0 && std::isfinite(density) ? density : 0;
-}
-
-void PartMaker::list_triangles() {
-    const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
-    first_triangle_.assign(parts + 1, 0);
-    std::vector<Index> part_of(input_.mesh.positions.size());
-    parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
-        for (Index i = first_place(part); i < first_place(part + 1); ++i)
-            part_of[numbering_.members[i]] = static_cast<Index>(part);
-    });
-    const auto for_each_use = [&](auto&& f) {
-        for (std::size_t t = 0; t < count; ++t) {
-            const Triangle& tri = input_.mesh.triangles[t];
-            const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
-            f(t, a);
-            if (b != a) f(t, b);
-            if (c != a && c != b) f(t, c);
-        }
-    };
-    for_each_use([&](std::size_t, Index part) { ++first_triangle_[part + 1]; });
-    std::partial_sum(first_triangle_.begin(), first_triangle_.end(), first_triangle_.begin());
-    triangles_.resize(first_triangle_.back());
-    std::vector<std::size_t> next(first_triangle_);
-    for_each_use([&](std::size_t t, Index part) { triangles_[next[part]++] = static_cast<Index>(t); });
-}
-
-void PartMaker::push_channels(Index v, std::vector<float>& to) const {
-    const auto push = [&](double value) {
-        to.push_back(static_cast<float>(std::clamp(value, -largest_value, largest_value)));
-    };
-    push(input_.luminance[v] * luminance_scale);
-    if (has_normals_)
-        for (int k = 0; k < 3; ++k) push(input_.normals[v][k] * normal_scale);
-    if (texture_unit_ > 0)
-        for (int k = 0; k < 2; ++k) push(input_.mesh.uvs[v][k] * texture_unit_);
-    if (!input_.mesh.colours.empty())
-        for (int k = 0; k < 3; ++k) push(input_.mesh.colours[v][k] * colour_scale);
-}
-
-PartMesh PartMaker::make(std::size_t part) const {
-    PartMesh out;
-    const Index first_slot = part_begin(part, numbering_.parts, slots()),
-                end_slot = part_begin(part + 1, numbering_.parts, slots());
-    const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
-    const auto is_own = [&](Index place) { return place >= first && place < end; };
-    const auto triangles =
-        std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
-
-    std::vector<Index> ghosts; // places of other parts' vertices, by slot
-    for (const Index t : triangles)
-        for (const Index v : input_.mesh.triangles[t])
-            if (!is_own(numbering_.place[v])) ghosts.push_back(numbering_.place[v]);
-    std::sort(ghosts.begin(), ghosts.end());
-    ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
-
-    out.first_slot = first_slot;
-    out.own_slots = end_slot - first_slot;
-    out.area_scale = area_scale_;
-    out.channels = 1 + (has_normals_ ? 3 : 0) + (texture_unit_ > 0 ? 2 : 0) + (input_.mesh.colours.empty() ? 0 : 3);
-    const std::size_t vertices = end - first + ghosts.size();
-    out.channel_values.reserve(vertices * out.channels);
-    out.slot_of_vertex.reserve(vertices);
-    out.positions.reserve(out.own_slots + ghosts.size());
-    const auto push_position = [&](Index slot) {
-        out.positions.push_back((input_.mesh.positions[numbering_.vertex_of_slot[slot]] - centre_) * scale_);
-    };
-    for (Index s = first_slot; s < end_slot; ++s) {
-        push_position(s);
-        for (Index i = numbering_.first_member[s]; i < numbering_.first_member[s + 1]; ++i) {
-            out.slot_of_vertex.push_back(s - first_slot);
-            push_channels(numbering_.members[i], out.channel_values);
-        }
-    }
-    for (const Index place : ghosts) {
-        const Index slot =
-            static_cast<Index>(std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
-                               numbering_.first_member.begin() - 1);
-        if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
-            out.ghost_slots.push_back(slot);
-            push_position(slot);
-        }
-        out.slot_of_vertex.push_back(static_cast<Index>(out.positions.size() - 1));
-        push_channels(numbering_.members[place], out.channel_values);
-    }
-    out.triangles.reserve(triangles.size());
-    for (const Index t : triangles) {
-        Triangle local = input_.mesh.triangles[t];
-        for (Index& v : local) {
-            const Index place = numbering_.place[v];
-            v = is_own(place)
-                    ? place - first
-                    : end - first +
-                          static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) - ghosts.begin());
-        }
-        out.triangles.push_back(local);
-    }
-    return out;
-}
 
 // ---- the whole
 

@@ -256,28 +256,274 @@ public:
     Reader(const std::filesystem::path& file, bool maps, const Progress& progress)
         : file_(file), maps_(maps), progress_(progress) {}
 
-    Result<VertexTree> read();
+    Result<VertexTree> read() {
+        if (const auto r = read_table(); !r) return r.error();
+        if (maps_) {
+            auto mapping = MappedFile::open(file_);
+            if (!mapping) return mapping.error();
+            mapping_ = std::move(*mapping);
+        }
+        auto geometry = std::make_shared<TreeGeometry>();
+        auto data = std::make_shared<VertexTree::Data>();
+        TreeGeometry& g = *geometry;
+        const auto light = std::make_shared<TreeLuminance>();
+        TreeLuminance& l = *light;
+        g.mapping = mapping_;
+        Result<void> state;
+        std::size_t done = 0;
+        for_each_array(g, l, [&](std::string_view name, auto& values) {
+            if (!state) return;
+            if (progress_ && !progress_(static_cast<double>(done++) / static_cast<double>(sections_.size()), "reading"))
+                state = Error{ErrorCode::cancelled, "Reading " + file_.string() + " was cancelled."};
+            else state = open_section(name, values);
+        });
+        if (!state) return state.error();
+        if (const auto r = read_facts(g, l); !r) return r.error();
+        if (const auto r = check_counts(g, l); !r) return r.error();
+        if (const auto r = check_ranges(g); !r) return r.error();
+        if (const auto r = read_attributes(g.first_leaf.size(), g.parents.size(), data->attributes); !r)
+            return r.error();
+        l.textured = !g.texture.empty();
+        if (maps_) {
+            data->checks = std::make_shared<NodeChecks>(g, l);
+            if (const char* fault = fault_in_root(g)) return fail(std::string("Node 0 ") + fault);
+            if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
+        } else {
+            if (const auto r = check_structure(g); !r) return r.error();
+            if (const std::string fault = fault_in_sections(g, l); !fault.empty()) return fail(fault);
+        }
+        data->geometry = std::move(geometry);
+        data->light = light;
+        return VertexTree(std::move(data));
+    }
 
 private:
     Error fail(const std::string& what) const {
         return {ErrorCode::malformed_data, file_.string() + ": " + what + " Build the tree again from its mesh."};
     }
-    Result<void> read_table();
-    const Section* find(std::string_view name) const;
+
+    Result<void> read_table() {
+        std::error_code error;
+        // Not opened before: a pipe would wait for its writer.
+        if (std::filesystem::is_regular_file(file_, error)) in_.open(file_, std::ios::binary);
+        if (!in_.is_open()) return Error{ErrorCode::io_failure, "Cannot open " + file_.string() + "; does it exist?"};
+        file_bytes_ = std::filesystem::file_size(file_, error);
+        if (error) return Error{ErrorCode::io_failure, "Cannot tell the size of " + file_.string() + "."};
+        Header h;
+        if (!in_.read(reinterpret_cast<char*>(&h), sizeof h)) return fail("The file ends within its header.");
+        if (h.magic != magic) return fail("This is no vertex tree (.vdt).");
+        const std::uint64_t sum = checksum(&h, offsetof(Header, header_checksum));
+        if (h.version != format_version)
+            return Error{ErrorCode::unsupported,
+                         file_.string() +
+                             (h.version < format_version
+                                  ? " was written by an earlier version; build it again with: unseen build MESH -o FILE"
+                                  : ": version " + std::to_string(h.version) +
+                                        " of the format is not known to this program, which reads version " +
+                                        std::to_string(format_version) + ". Build the tree again from its mesh.")};
+        if (h.header_checksum != sum) return fail("The header is damaged.");
+        if (h.file_bytes != file_bytes_)
+            return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
+                        std::to_string(h.file_bytes) + "; it was cut short or changed.");
+        if (h.section_count > most_sections || h.page_count > file_bytes_ / sizeof(std::uint64_t))
+            return fail("The section table is larger than the file.");
+        std::vector<std::byte> bytes(h.section_count * sizeof(Section) + h.page_count * 8);
+        if (!in_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size())))
+            return fail("The file ends within its section table.");
+        if (checksum(bytes.data(), bytes.size()) != h.table_checksum) return fail("The section table is damaged.");
+        sections_.resize(h.section_count);
+        checksums_.resize(h.page_count);
+        if (h.section_count > 0) std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
+        if (h.page_count > 0)
+            std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
+        std::uint64_t pages = 0;
+        for (const Section& s : sections_) {
+            const std::string name(name_of(s));
+            if (s.element_bytes == 0 || s.offset > file_bytes_ || s.count > (file_bytes_ - s.offset) / s.element_bytes)
+                return fail("Section " + name + " does not fit in the file.");
+            pages += pages_of(s);
+        }
+        if (pages != checksums_.size()) return fail("The number of pages does not match the sections.");
+        return {};
+    }
+
+    const Section* find(std::string_view name) const {
+        for (const Section& s : sections_)
+            if (s.domain == part_of_tree && name_of(s) == name) return &s;
+        return nullptr;
+    }
+
     template <class T>
-    Result<const Section*> section_of(std::string_view name) const;
+    Result<const Section*> section_of(std::string_view name) const {
+        const Section* section = find(name);
+        if (!section) return fail("Section " + std::string(name) + " is missing.");
+        if (section->element_bytes != sizeof(T))
+            return fail("Section " + std::string(name) + " has elements of another size.");
+        return section;
+    }
+
     template <class T>
-    Result<void> read_section(std::string_view name, std::vector<T>& out);
-    Result<void> read_pages(const Section& section, std::byte* bytes);
-    Result<std::span<const std::byte>> mapped_bytes(const Section& section) const;
+    Result<void> read_section(std::string_view name, std::vector<T>& out) {
+        const auto section = section_of<T>(name);
+        if (!section) return section.error();
+        out.resize((*section)->count);
+        return read_pages(**section, reinterpret_cast<std::byte*>(out.data()));
+    }
+
+    Result<void> read_pages(const Section& section, std::byte* bytes) {
+        const std::string name(name_of(section));
+        in_.clear();
+        in_.seekg(static_cast<std::streamoff>(section.offset));
+        std::uint64_t page = 0;
+        for (const Section* before = sections_.data(); before != &section; ++before) page += pages_of(*before);
+        const std::uint64_t total = section.count * section.element_bytes;
+        for (std::uint64_t at = 0; at < total; at += page_bytes, ++page) {
+            const std::uint64_t size = std::min(page_bytes, total - at);
+            if (!in_.read(reinterpret_cast<char*>(bytes + at), static_cast<std::streamsize>(size)))
+                return fail("The file ends within section " + name + "; it was cut short while it was read.");
+            if (checksum(bytes + at, size) != checksums_[page])
+                return fail("Page " + std::to_string(at / page_bytes) + " of section " + name + " is damaged.");
+        }
+        return {};
+    }
+
+    Result<std::span<const std::byte>> mapped_bytes(const Section& section) const {
+        const std::string name(name_of(section));
+        if (section.offset % section_alignment != 0)
+            return fail("Section " + name + " does not begin at a multiple of 64.");
+        // The mapping was made after the table was read: the file may have been replaced in between.
+        const auto bytes = mapping_->bytes();
+        const std::uint64_t size = section.count * section.element_bytes;
+        if (section.offset > bytes.size() || size > bytes.size() - section.offset)
+            return fail("Section " + name + " does not fit in the file.");
+        return bytes.subspan(section.offset, size);
+    }
+
+    // Attributes of names that nobody here knows, too. Their values are their owners' to check.
     Result<void> read_attributes(std::size_t interior_count, std::size_t node_count,
-                                 std::vector<Attribute>& attributes);
+                                 std::vector<Attribute>& attributes) {
+        for (const Section& s : sections_) {
+            if (s.domain == part_of_tree) continue;
+            Attribute a{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes,
+                        s.count};
+            if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty())
+                return fail(fault);
+            for (const Attribute& before : attributes)
+                if (before.name == a.name) return fail("Attribute " + a.name + " is there twice.");
+            if (attributes.size() == most_attributes) return fail("There are more attributes than a tree can have.");
+            if (maps_) {
+                const auto bytes = mapped_bytes(s);
+                if (!bytes) return bytes.error();
+                a.owner = mapping_;
+                a.bytes = *bytes;
+            } else {
+                const auto bytes = std::make_shared<std::vector<std::byte>>(s.count * s.element_bytes);
+                if (const auto r = read_pages(s, bytes->data()); !r) return r;
+                a.bytes = *bytes;
+                a.owner = bytes;
+            }
+            attributes.push_back(std::move(a));
+        }
+        return {};
+    }
+
     template <class T>
-    Result<void> open_section(std::string_view name, Array<T>& out);
-    Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
-    Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const;
-    Result<void> check_structure(const TreeGeometry& g) const;
-    Result<void> check_ranges(const TreeGeometry& g) const;
+    Result<void> open_section(std::string_view name, Array<T>& out) {
+        if (is_optional(name) && !find(name)) return {};
+        if (!maps_) {
+            std::vector<T> values;
+            const auto r = read_section(name, values);
+            out = std::move(values);
+            return r;
+        }
+        const auto section = section_of<T>(name);
+        if (!section) return section.error();
+        const auto bytes = mapped_bytes(**section);
+        if (!bytes) return bytes.error();
+        out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), (*section)->count));
+        return {};
+    }
+
+    Result<void> read_facts(TreeGeometry& g, TreeLuminance& l) {
+        std::vector<Facts> facts;
+        std::vector<std::byte> ranges;
+        if (const auto r = read_section("facts", facts); !r) return r.error();
+        if (const auto r = read_section("ranges", ranges); !r) return r.error();
+        if (facts.size() != 1) return fail("Section facts has the wrong length.");
+        const Facts& f = facts[0];
+        if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
+        if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward))
+            return fail("Section facts is malformed.");
+        g.origin = {f.origin[0], f.origin[1], f.origin[2]};
+        g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
+        g.dropped_triangles = f.dropped_triangles;
+        g.closedness = static_cast<Closedness>(f.closedness);
+        l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3], f.fill};
+        l.prelit = f.prelit != 0;
+        l.range = {f.luminance_range[0], f.luminance_range[1]};
+        const double sum = g.origin.x + g.origin.y + g.origin.z;
+        const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
+        const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
+                                  is_finite(l.light.direction, l.light.ambient + l.light.fill) && l.range.lo >= 0 &&
+                                  l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
+        if (!facts_finite) return fail("Section facts has a value out of range.");
+        return {};
+    }
+
+    Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const {
+        const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
+        if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
+            return fail("The tree has no nodes or no triangles.");
+        const std::size_t leaves = nodes - interior;
+        const std::pair<bool, const char*> checks[] = {
+            {g.positions.size() == nodes, "positions"},
+            {g.normals.size() == nodes, "normals"},
+            {g.colours.empty() || g.colours.size() == nodes, "colours"},
+            {g.uvs.empty() || g.uvs.size() == nodes, "uvs"},
+            {l.luminance.size() == nodes, "luminance"},
+            {g.leaf_end.size() == interior, "leaf_end"},
+            {g.subtree_end.size() == interior, "subtree_end"},
+            {g.first_triangle.size() == interior + 1, "first_triangle"},
+            {g.support_spheres.size() == interior, "support_spheres"},
+            {g.bounds.size() == interior, "bounds"},
+            {g.mask_at.size() == interior, "mask_at"},
+            {g.mask_records.size() > most_mask_bytes, "mask_records"},
+            {g.displacement.size() == interior, "displacement"},
+            {l.support_range.size() == interior, "support_range"},
+            {l.ring_range.size() == interior, "ring_range"},
+            {l.adaptation.size() == interior, "adaptation"},
+            {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
+            {g.source_vertices.size() == leaves, "source_vertices"},
+            {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
+            {g.texels.empty() == g.texture.empty(), "texels"},
+            {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
+        for (const auto& [holds, name] : checks)
+            if (!holds) return fail("Section " + std::string(name) + " has the wrong length.");
+        if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
+        return {};
+    }
+
+    // That walking the tree stays within it: every interior node's children lie side by side and cover it.
+    Result<void> check_structure(const TreeGeometry& g) const {
+        const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+        const auto broken = [&](NodeId node, const char* fault) {
+            return fail("Node " + std::to_string(node) + " " + fault);
+        };
+        if (const char* fault = fault_in_root(g)) return broken(0, fault);
+        for (NodeId node = 0; node < interior; ++node)
+            if (const char* fault = fault_in_links(g, node)) return broken(node, fault);
+        return {};
+    }
+
+    // That the ranges lie in the mesh that the tree was built from.
+    Result<void> check_ranges(const TreeGeometry& g) const {
+        if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
+        const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
+        for (const MeshRange& r : g.ranges)
+            if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
+                return fail("Range '" + r.name + "' ends after the last triangle.");
+        return {};
+    }
 
     const std::filesystem::path& file_;
     const bool maps_;
@@ -288,268 +534,6 @@ private:
     std::vector<Section> sections_;
     std::vector<std::uint64_t> checksums_;
 };
-
-Result<void> Reader::read_table() {
-    std::error_code error;
-    // Not opened before: a pipe would wait for its writer.
-    if (std::filesystem::is_regular_file(file_, error)) in_.open(file_, std::ios::binary);
-    if (!in_.is_open()) return Error{ErrorCode::io_failure, "Cannot open " + file_.string() + "; does it exist?"};
-    file_bytes_ = std::filesystem::file_size(file_, error);
-    if (error) return Error{ErrorCode::io_failure, "Cannot tell the size of " + file_.string() + "."};
-    Header h;
-    if (!in_.read(reinterpret_cast<char*>(&h), sizeof h)) return fail("The file ends within its header.");
-    if (h.magic != magic) return fail("This is no vertex tree (.vdt).");
-    const std::uint64_t sum = checksum(&h, offsetof(Header, header_checksum));
-    if (h.version != format_version)
-        return Error{ErrorCode::unsupported,
-                     file_.string() +
-                         (h.version < format_version
-                              ? " was written by an earlier version; build it again with: unseen build MESH -o FILE"
-                              : ": version " + std::to_string(h.version) +
-                                    " of the format is not known to this program, which reads version " +
-                                    std::to_string(format_version) + ". Build the tree again from its mesh.")};
-    if (h.header_checksum != sum) return fail("The header is damaged.");
-    if (h.file_bytes != file_bytes_)
-        return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
-                    std::to_string(h.file_bytes) + "; it was cut short or changed.");
-    if (h.section_count > most_sections || h.page_count > file_bytes_ / sizeof(std::uint64_t))
-        return fail("The section table is larger than the file.");
-    std::vector<std::byte> bytes(h.section_count * sizeof(Section) + h.page_count * 8);
-    if (!in_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size())))
-        return fail("The file ends within its section table.");
-    if (checksum(bytes.data(), bytes.size()) != h.table_checksum) return fail("The section table is damaged.");
-    sections_.resize(h.section_count);
-    checksums_.resize(h.page_count);
-    if (h.section_count > 0) std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
-    if (h.page_count > 0)
-        std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
-    std::uint64_t pages = 0;
-    for (const Section& s : sections_) {
-        const std::string name(name_of(s));
-        if (s.element_bytes == 0 || s.offset > file_bytes_ || s.count > (file_bytes_ - s.offset) / s.element_bytes)
-            return fail("Section " + name + " does not fit in the file.");
-        pages += pages_of(s);
-    }
-    if (pages != checksums_.size()) return fail("The number of pages does not match the sections.");
-    return {};
-}
-
-const Section* Reader::find(std::string_view name) const {
-    for (const Section& s : sections_)
-        if (s.domain == part_of_tree && name_of(s) == name) return &s;
-    return nullptr;
-}
-
-template <class T>
-Result<const Section*> Reader::section_of(std::string_view name) const {
-    const Section* section = find(name);
-    if (!section) return fail("Section " + std::string(name) + " is missing.");
-    if (section->element_bytes != sizeof(T))
-        return fail("Section " + std::string(name) + " has elements of another size.");
-    return section;
-}
-
-template <class T>
-Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
-    const auto section = section_of<T>(name);
-    if (!section) return section.error();
-    out.resize((*section)->count);
-    return read_pages(**section, reinterpret_cast<std::byte*>(out.data()));
-}
-
-Result<void> Reader::read_pages(const Section& section, std::byte* bytes) {
-    const std::string name(name_of(section));
-    in_.clear();
-    in_.seekg(static_cast<std::streamoff>(section.offset));
-    std::uint64_t page = 0;
-    for (const Section* before = sections_.data(); before != &section; ++before) page += pages_of(*before);
-    const std::uint64_t total = section.count * section.element_bytes;
-    for (std::uint64_t at = 0; at < total; at += page_bytes, ++page) {
-        const std::uint64_t size = std::min(page_bytes, total - at);
-        if (!in_.read(reinterpret_cast<char*>(bytes + at), static_cast<std::streamsize>(size)))
-            return fail("The file ends within section " + name + "; it was cut short while it was read.");
-        if (checksum(bytes + at, size) != checksums_[page])
-            return fail("Page " + std::to_string(at / page_bytes) + " of section " + name + " is damaged.");
-    }
-    return {};
-}
-
-Result<std::span<const std::byte>> Reader::mapped_bytes(const Section& section) const {
-    const std::string name(name_of(section));
-    if (section.offset % section_alignment != 0)
-        return fail("Section " + name + " does not begin at a multiple of 64.");
-    // The mapping was made after the table was read: the file may have been replaced in between.
-    const auto bytes = mapping_->bytes();
-    const std::uint64_t size = section.count * section.element_bytes;
-    if (section.offset > bytes.size() || size > bytes.size() - section.offset)
-        return fail("Section " + name + " does not fit in the file.");
-    return bytes.subspan(section.offset, size);
-}
-
-// Attributes of names that nobody here knows, too. Their values are their owners' to check.
-Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t node_count,
-                                     std::vector<Attribute>& attributes) {
-    for (const Section& s : sections_) {
-        if (s.domain == part_of_tree) continue;
-        Attribute a{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count};
-        if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty())
-            return fail(fault);
-        for (const Attribute& before : attributes)
-            if (before.name == a.name) return fail("Attribute " + a.name + " is there twice.");
-        if (attributes.size() == most_attributes) return fail("There are more attributes than a tree can have.");
-        if (maps_) {
-            const auto bytes = mapped_bytes(s);
-            if (!bytes) return bytes.error();
-            a.owner = mapping_;
-            a.bytes = *bytes;
-        } else {
-            const auto bytes = std::make_shared<std::vector<std::byte>>(s.count * s.element_bytes);
-            if (const auto r = read_pages(s, bytes->data()); !r) return r;
-            a.bytes = *bytes;
-            a.owner = bytes;
-        }
-        attributes.push_back(std::move(a));
-    }
-    return {};
-}
-
-template <class T>
-Result<void> Reader::open_section(std::string_view name, Array<T>& out) {
-    if (is_optional(name) && !find(name)) return {};
-    if (!maps_) {
-        std::vector<T> values;
-        const auto r = read_section(name, values);
-        out = std::move(values);
-        return r;
-    }
-    const auto section = section_of<T>(name);
-    if (!section) return section.error();
-    const auto bytes = mapped_bytes(**section);
-    if (!bytes) return bytes.error();
-    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), (*section)->count));
-    return {};
-}
-
-Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l) const {
-    const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
-    if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
-        return fail("The tree has no nodes or no triangles.");
-    const std::size_t leaves = nodes - interior;
-    const std::pair<bool, const char*> checks[] = {
-        {g.positions.size() == nodes, "positions"},
-        {g.normals.size() == nodes, "normals"},
-        {g.colours.empty() || g.colours.size() == nodes, "colours"},
-        {g.uvs.empty() || g.uvs.size() == nodes, "uvs"},
-        {l.luminance.size() == nodes, "luminance"},
-        {g.leaf_end.size() == interior, "leaf_end"},
-        {g.subtree_end.size() == interior, "subtree_end"},
-        {g.first_triangle.size() == interior + 1, "first_triangle"},
-        {g.support_spheres.size() == interior, "support_spheres"},
-        {g.bounds.size() == interior, "bounds"},
-        {g.mask_at.size() == interior, "mask_at"},
-        {g.mask_records.size() > most_mask_bytes, "mask_records"},
-        {g.displacement.size() == interior, "displacement"},
-        {l.support_range.size() == interior, "support_range"},
-        {l.ring_range.size() == interior, "ring_range"},
-        {l.adaptation.size() == interior, "adaptation"},
-        {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
-        {g.source_vertices.size() == leaves, "source_vertices"},
-        {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
-        {g.texels.empty() == g.texture.empty(), "texels"},
-        {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
-    for (const auto& [holds, name] : checks)
-        if (!holds) return fail("Section " + std::string(name) + " has the wrong length.");
-    if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
-    return {};
-}
-
-// That walking the tree stays within it: every interior node's children lie side by side and cover it.
-Result<void> Reader::check_structure(const TreeGeometry& g) const {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const auto broken = [&](NodeId node, const char* fault) {
-        return fail("Node " + std::to_string(node) + " " + fault);
-    };
-    if (const char* fault = fault_in_root(g)) return broken(0, fault);
-    for (NodeId node = 0; node < interior; ++node)
-        if (const char* fault = fault_in_links(g, node)) return broken(node, fault);
-    return {};
-}
-
-// That the ranges lie in the mesh that the tree was built from.
-Result<void> Reader::check_ranges(const TreeGeometry& g) const {
-    if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
-    const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
-    for (const MeshRange& r : g.ranges)
-        if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
-            return fail("Range '" + r.name + "' ends after the last triangle.");
-    return {};
-}
-
-Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
-    std::vector<Facts> facts;
-    std::vector<std::byte> ranges;
-    if (const auto r = read_section("facts", facts); !r) return r.error();
-    if (const auto r = read_section("ranges", ranges); !r) return r.error();
-    if (facts.size() != 1) return fail("Section facts has the wrong length.");
-    const Facts& f = facts[0];
-    if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
-    if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward))
-        return fail("Section facts is malformed.");
-    g.origin = {f.origin[0], f.origin[1], f.origin[2]};
-    g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
-    g.dropped_triangles = f.dropped_triangles;
-    g.closedness = static_cast<Closedness>(f.closedness);
-    l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3], f.fill};
-    l.prelit = f.prelit != 0;
-    l.range = {f.luminance_range[0], f.luminance_range[1]};
-    const double sum = g.origin.x + g.origin.y + g.origin.z;
-    const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
-    const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
-                              is_finite(l.light.direction, l.light.ambient + l.light.fill) && l.range.lo >= 0 &&
-                              l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
-    if (!facts_finite) return fail("Section facts has a value out of range.");
-    return {};
-}
-
-Result<VertexTree> Reader::read() {
-    if (const auto r = read_table(); !r) return r.error();
-    if (maps_) {
-        auto mapping = MappedFile::open(file_);
-        if (!mapping) return mapping.error();
-        mapping_ = std::move(*mapping);
-    }
-    auto geometry = std::make_shared<TreeGeometry>();
-    auto data = std::make_shared<VertexTree::Data>();
-    TreeGeometry& g = *geometry;
-    const auto light = std::make_shared<TreeLuminance>();
-    TreeLuminance& l = *light;
-    g.mapping = mapping_;
-    Result<void> state;
-    std::size_t done = 0;
-    for_each_array(g, l, [&](std::string_view name, auto& values) {
-        if (!state) return;
-        if (progress_ && !progress_(static_cast<double>(done++) / static_cast<double>(sections_.size()), "reading"))
-            state = Error{ErrorCode::cancelled, "Reading " + file_.string() + " was cancelled."};
-        else state = open_section(name, values);
-    });
-    if (!state) return state.error();
-    if (const auto r = read_facts(g, l); !r) return r.error();
-    if (const auto r = check_counts(g, l); !r) return r.error();
-    if (const auto r = check_ranges(g); !r) return r.error();
-    if (const auto r = read_attributes(g.first_leaf.size(), g.parents.size(), data->attributes); !r) return r.error();
-    l.textured = !g.texture.empty();
-    if (maps_) {
-        data->checks = std::make_shared<NodeChecks>(g, l);
-        if (const char* fault = fault_in_root(g)) return fail(std::string("Node 0 ") + fault);
-        if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
-    } else {
-        if (const auto r = check_structure(g); !r) return r.error();
-        if (const std::string fault = fault_in_sections(g, l); !fault.empty()) return fail(fault);
-    }
-    data->geometry = std::move(geometry);
-    data->light = light;
-    return VertexTree(std::move(data));
-}
 
 } // namespace
 

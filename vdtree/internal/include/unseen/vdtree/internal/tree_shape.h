@@ -9,11 +9,12 @@
 namespace unseen::vdtree {
 
 // How the nodes hang together; numbered as in <unseen/vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
-struct TreeLinks {
-    std::span<const NodeId> parents;   // by node
-    std::span<const Index> first_leaf; // by interior node, and so on
-    std::span<const Index> leaf_end;
-    std::span<const NodeId> subtree_end;
+template <class Numbers>
+struct LinksIn {
+    Numbers parents;    // by node
+    Numbers first_leaf; // by interior node, and so on
+    Numbers leaf_end;
+    Numbers subtree_end;
 
     NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
     Index leaves() const { return static_cast<Index>(parents.size() - first_leaf.size()); }
@@ -38,28 +39,15 @@ struct TreeLinks {
 };
 
 // Views of a tree's arrays.
+using TreeLinks = LinksIn<std::span<const NodeId>>;
 template <class Arrays>
 TreeLinks links_of(const Arrays& tree) {
     return {tree.parents, tree.first_leaf, tree.leaf_end, tree.subtree_end};
 }
 
 // The same while the tree is being built.
-struct TreeShape {
-    std::vector<NodeId> parents;
-    std::vector<Index> first_leaf;
-    std::vector<Index> leaf_end;
-    std::vector<NodeId> subtree_end;
-    std::vector<Index>
-        made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
-
-    TreeLinks links() const { return links_of(*this); }
-    NodeId interior() const { return links().interior(); }
-    Index leaves() const { return links().leaves(); }
-    NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }
-    template <class Child, class Leaf>
-    void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
-        links().for_each_child(node, on_child, on_leaf);
-    }
+struct TreeShape : LinksIn<std::vector<NodeId>> {
+    std::vector<Index> made; // by interior node: the number of its cluster, higher than its children's
 };
 
 // Shortcuts up the tree, so that looking for an ancestor costs the logarithm of the depth however deep the tree is.
