@@ -1,8 +1,5 @@
 #include <unseen/exact/exact.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 #include <optional>
 #include <string>

@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

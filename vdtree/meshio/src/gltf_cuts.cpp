@@ -1,13 +1,10 @@
 // Cuts as glTF: scenes and models, with one level of detail or several.
 #include <algorithm>
-#include <string_view>
-#include <utility>
 
 #include <unseen/meshio/scene_file.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 #include "file_output.h"
 #include "gltf_data.h"

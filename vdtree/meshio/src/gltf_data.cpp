@@ -1,5 +1,3 @@
-#include <utility>
-
 #include "gltf_data.h"
 
 #ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER

@@ -1,5 +1,3 @@
-#include <utility>
-
 #include "gltf_document.h"
 
 #include <set>

@@ -3,15 +3,12 @@
 // (gltf_data.h), so that files cannot make it allocate, decode images or touch the file system.
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
-#include <string_view>
 #include <unordered_map>
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"

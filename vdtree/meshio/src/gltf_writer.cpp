@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <string_view>
 #include <system_error>
-#include <utility>
 
 #include <glm/common.hpp>
-#include <glm/vec3.hpp>
 
 #ifdef UNSEEN_MESHIO_WITH_MESHOPTIMIZER
 #include <meshoptimizer.h>

@@ -1,10 +1,8 @@
 #include "kept_arrays.h"
 
 #include <set>
-#include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 #include "mesh_readers.h"
 #include "restore.h"

@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <sstream>
-#include <string_view>
-#include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 

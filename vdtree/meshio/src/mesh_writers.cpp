@@ -8,11 +8,9 @@
 
 #include <map>
 #include <set>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 namespace unseen::meshio {
 

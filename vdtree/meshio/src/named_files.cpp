@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <string_view>
 #include <system_error>
 #include <utility>
 

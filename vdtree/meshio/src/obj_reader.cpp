@@ -11,8 +11,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include <glm/vec3.hpp>
-
 namespace unseen::meshio {
 
 namespace fs = std::filesystem;

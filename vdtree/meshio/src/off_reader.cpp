@@ -2,8 +2,6 @@
 #include <array>
 #include <utility>
 
-#include <glm/vec3.hpp>
-
 #include "face_collector.h"
 #include "text_scanner.h"
 

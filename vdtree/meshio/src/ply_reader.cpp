@@ -1,5 +1,4 @@
 // PLY: G. Turk, The PLY polygon file format (1994). ASCII and both byte orders; any properties in any order.
-#include <utility>
 
 #include "face_collector.h"
 #include "kept_arrays.h"

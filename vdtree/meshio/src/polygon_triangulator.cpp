@@ -2,15 +2,9 @@
 #include "polygon_triangulator.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
-#include <span>
 #include <utility>
-
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 
 namespace unseen::meshio {
 

@@ -2,16 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
-#include <glm/vec3.hpp>
 
 #include "gltf_document.h"
 #include "mesh_readers.h"

@@ -2,10 +2,8 @@
 
 #include <numbers>
 #include <set>
-#include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 

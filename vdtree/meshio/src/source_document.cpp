@@ -1,7 +1,6 @@
 #include <unseen/meshio/source_document.h>
 
 #include <set>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 

@@ -1,7 +1,4 @@
 // STL, ASCII and binary. Facets have three vertices of their own, which are welded unless the options say no.
-#include <utility>
-
-#include <glm/vec3.hpp>
 
 #include "mesh_readers.h"
 #include "text_scanner.h"

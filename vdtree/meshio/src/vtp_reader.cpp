@@ -2,9 +2,6 @@
 // XML makes the file no XML, so it is cut off first.
 #include <map>
 #include <set>
-#include <utility>
-
-#include <glm/vec3.hpp>
 
 #include <pugixml.hpp>
 

@@ -1,9 +1,6 @@
 // VTK's polygons in its XML format: VTK File Formats, https://docs.vtk.org, "XML File Formats".
 #include <functional>
 #include <set>
-#include <utility>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/colour.h>
 

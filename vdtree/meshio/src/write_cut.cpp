@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <map>
-#include <string_view>
 #include <system_error>
-#include <utility>
 
 #include <unseen/meshio/scene_file.h>
 

@@ -1,15 +1,11 @@
 #include "build/bound_facing.h"
 
-#include <algorithm>
-#include <array>
-#include <cstring>
 #include <limits>
 #include <numeric>
 
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/parallel.h>
 
-#include "build/parallel_array.h"
 #include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {

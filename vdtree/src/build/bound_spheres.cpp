@@ -1,8 +1,5 @@
 #include "build/bound_spheres.h"
 
-#include <algorithm>
-#include <array>
-
 #include <glm/geometric.hpp>
 
 #include "build/bounding_sphere.h"

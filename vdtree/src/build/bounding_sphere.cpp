@@ -1,11 +1,6 @@
 #include "build/bounding_sphere.h"
 
-#include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <limits>
 
 #include <glm/geometric.hpp>

@@ -1,13 +1,9 @@
 // From a mesh and a clustering to a vertex tree: order the nodes, find where triangles vanish, bound every fold.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <limits>
 #include <numeric>
 #include <optional>
-#include <string>
 
 #include <glm/geometric.hpp>
 #include <tbb/global_control.h>

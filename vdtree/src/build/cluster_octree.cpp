@@ -5,10 +5,7 @@
 // made a subtree by itself, in parallel, and the subtrees are joined by the digits that tell the buckets apart.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
 #include <bit>
-#include <span>
-#include <utility>
 
 #include <unseen/vdtree/internal/parallel.h>
 

@@ -9,12 +9,8 @@
 // balanced.
 #include <unseen/vdtree/builder.h>
 
-#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
-#include <span>
-#include <utility>
 
 #include <glm/geometric.hpp>
 

@@ -1,6 +1,5 @@
 #include "build/order_nodes.h"
 
-#include <algorithm>
 #include <limits>
 #include <numeric>
 

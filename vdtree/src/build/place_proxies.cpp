@@ -1,7 +1,5 @@
 #include "build/place_proxies.h"
 
-#include <algorithm>
-
 #include "build/parallel_array.h"
 #include <unseen/vdtree/internal/simd.h>
 

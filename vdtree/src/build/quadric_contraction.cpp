@@ -1,12 +1,10 @@
 #include "build/quadric_contraction.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <numeric>
-#include <span>
 #include <utility>
 
 #include <glm/geometric.hpp>

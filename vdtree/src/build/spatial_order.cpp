@@ -1,6 +1,5 @@
 #include "build/spatial_order.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace unseen::vdtree {

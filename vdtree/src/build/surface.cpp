@@ -1,14 +1,9 @@
 #include "build/surface.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
-#include <cstddef>
-#include <functional>
 #include <numeric>
 #include <tuple>
 
-#include <glm/geometric.hpp>
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
 

@@ -4,8 +4,6 @@
 #include <numbers>
 #include <string>
 
-#include <glm/geometric.hpp>
-
 #include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/node_bits.h>

@@ -6,11 +6,9 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <climits>
 #include <random>
 #include <string>
 #include <system_error>
-#include <utility>
 
 #include <fcntl.h>
 #include <sys/file.h>

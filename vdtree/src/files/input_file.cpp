@@ -7,7 +7,6 @@
 
 #include <poll.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "files/descriptor.h"
 

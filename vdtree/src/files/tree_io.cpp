@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <string>
 #include <type_traits>
 
 #define XXH_INLINE_ALL

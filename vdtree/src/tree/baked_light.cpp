@@ -1,7 +1,6 @@
 #include <unseen/vdtree/internal/baked_light.h>
 
 #include <bitset>
-#include <cmath>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>

@@ -1,7 +1,6 @@
 // Checks and repairs of triangle soups.
 #include <unseen/vdtree/mesh.h>
 
-#include <algorithm>
 #include <utility>
 
 #include <unseen/vdtree/internal/vectors.h>

@@ -1,6 +1,5 @@
 #include <unseen/vdtree/internal/normal_mask.h>
 
-#include <algorithm>
 #include <numbers>
 
 #include <glm/geometric.hpp>

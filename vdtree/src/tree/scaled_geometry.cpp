@@ -1,9 +1,7 @@
 #include <unseen/vdtree/internal/fold_sequence.h>
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
-#include <vector>
 
 namespace unseen::vdtree {
 
