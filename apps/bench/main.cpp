@@ -72,7 +72,7 @@ Command bench_verb(CLI::App& app, const char* name, const char* about, const cha
 }
 
 void add_window_option(CLI::App& verb, int& window_px, const std::string& text) {
-    verb.add_option("--window", window_px, text)->type_name("PIXELS")->check(whole(64, 4096));
+    add_value(verb, "--window", window_px, whole(64, 4096), "PIXELS", text);
 }
 
 // "70k" or "3.5M" or "871414".
@@ -123,13 +123,11 @@ void add_perception_options(CLI::App& verb, PerceptionOptions& o) {
         ->type_name("MESH");
     verb.add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
     const std::vector<std::string> groups(perception_groups.begin(), perception_groups.end());
-    verb.add_option("--only", o.only, "Groups: " + listed(groups) + " (default: all)")
-        ->type_name("LIST")
+    add_value(verb, "--only", o.only, one_of(groups), "LIST", "Groups: " + listed(groups) + " (default: all)")
         ->delimiter(',')
-        ->allow_extra_args(false)
-        ->check(one_of(groups));
+        ->allow_extra_args(false);
     add_window_option(verb, o.window_px, "Its side; promises are about 1024 (default)");
-    verb.add_option("--views", o.random_views, "Random views (default: 72)")->type_name("N")->check(whole(1, 100000));
+    add_value(verb, "--views", o.random_views, whole(1, 100000), "N", "Random views (default: 72)");
     verb.add_option("--seed", o.seed, "Of the random views, displays and backgrounds (default: drawn anew, and told)")
         ->type_name("N");
     verb.add_flag("--quick", o.quick, "Few views: rough figures");
@@ -143,10 +141,10 @@ void add_scenes_options(CLI::App& verb, ScenesOptions& o) {
     verb.add_option("SCENE", o.inputs,
                     "Scenes with cameras (default: museum, treasure, house and forest of 'unseen make scene')")
         ->type_name("SCENE.glb");
-    verb.add_option("--triangles", o.triangles, "Of each of the default scenes, about (default: 500000)")
-        ->type_name("N")
-        ->check(whole(static_cast<double>(MakeSceneOptions::least_triangles),
-                      static_cast<double>(MakeSceneOptions::most_triangles)));
+    add_value(verb, "--triangles", o.triangles,
+              whole(static_cast<double>(MakeSceneOptions::least_triangles),
+                    static_cast<double>(MakeSceneOptions::most_triangles)),
+              "N", "Of each of the default scenes, about (default: 500000)");
     add_window_option(verb, o.window_px, "Its side (default: 512)");
     verb.add_flag("!--no-shadows", o.has_shadows, "No light casts shadows");
     verb.add_flag("--quick", o.quick, "Fewer samples a pixel, and a short walk");
@@ -160,34 +158,27 @@ void add_selection_options(CLI::App& verb, SelectionOptions& o) {
             ->type_name("FILE.sel")
             ->allow_extra_args(false);
     const auto qualities = std::make_shared<std::vector<std::string>>();
-    verb.add_option("--quality", *qualities,
-                    "What selected levels lose least of: ssim (default), pixels or contrast; may be given again, and "
-                    "each is flown")
-        ->type_name("NAME")
+    add_value(verb, "--quality", *qualities, one_of({"ssim", "pixels", "contrast"}), "NAME",
+              "What selected levels lose least of: ssim (default), pixels or contrast; may be given again, and "
+              "each is flown")
         ->allow_extra_args(false)
-        ->check(one_of({"ssim", "pixels", "contrast"}))
         ->excludes(selections);
-    verb.add_option("--spacing", o.spacing,
-                    "Of the search's corners, world units (default: a tenth of the scene's longer side)")
-        ->type_name("X")
-        ->check(positive())
+    add_value(verb, "--spacing", o.spacing, positive(), "X",
+              "Of the search's corners, world units (default: a tenth of the scene's longer side)")
         ->excludes(selections);
-    verb.add_option("--window", o.window_px, "Of the search's cameras, a side (default: 256)")
-        ->type_name("PIXELS")
-        ->check(whole(11, 8192))
+    add_value(verb, "--window", o.window_px, whole(11, 8192), "PIXELS",
+              "Of the search's cameras, a side (default: 256)")
         ->excludes(selections);
     verb.add_option("--mesh", o.statues, "A statue of the default scenes; may be given again")
         ->type_name("FILE")
         ->allow_extra_args(false);
-    verb.add_option("--triangles", o.budget, "The budget (default: 300000)")->type_name("N")->check(whole(1, 1e9));
-    verb.add_option("--frames", o.frames, "Of the flight (default: 1000)")->type_name("N")->check(whole(2, 100000));
-    verb.add_option("--every", o.judged_every, "Frames of which one is drawn and judged (default: 10)")
-        ->type_name("N")
-        ->check(whole(1, 100000));
-    verb.add_option("--size", o.size, "Of the frames (default: 640 360; the thesis has 1920 1080)")
-        ->type_name("W H")
-        ->check(whole(16, 8192));
-    verb.add_option("--samples", o.samples, "A pixel (default: 4)")->type_name("N")->check(whole(1, 256));
+    add_value(verb, "--triangles", o.budget, whole(1, 1e9), "N", "The budget (default: 300000)");
+    add_value(verb, "--frames", o.frames, whole(2, 100000), "N", "Of the flight (default: 1000)");
+    add_value(verb, "--every", o.judged_every, whole(1, 100000), "N",
+              "Frames of which one is drawn and judged (default: 10)");
+    add_value(verb, "--size", o.size, whole(16, 8192), "W H",
+              "Of the frames (default: 640 360; the thesis has 1920 1080)");
+    add_value(verb, "--samples", o.samples, whole(1, 256), "N", "A pixel (default: 4)");
     verb.add_flag("--masked-tree", o.has_masked_tree, "The tree's budget with masking, too: seconds a frame");
     verb.add_flag("--quick", o.quick, "Few frames, one sample a pixel");
     verb.callback([&o, qualities] {
@@ -212,12 +203,10 @@ void add_accuracy_options(CLI::App& verb, AccuracyOptions& o) {
     verb.add_option("--csv", o.csv, "One line a point")->type_name("FILE.csv");
     verb.add_option("--plots", o.plots, "A folder for a plot of each axis, accuracy_AXIS.png")->type_name("FOLDER");
     const std::vector<std::string> keys = accuracy_axis_keys();
-    verb.add_option("--only", o.only, "These axes alone, of " + listed(keys) + "; may be given again (default: all)")
-        ->type_name("AXIS")
-        ->check(one_of(keys));
-    verb.add_option("--seconds", o.seconds, "For the ways to fold of each model, at most (default: 300)")
-        ->type_name("T")
-        ->check(positive());
+    add_value(verb, "--only", o.only, one_of(keys), "AXIS",
+              "These axes alone, of " + listed(keys) + "; may be given again (default: all)");
+    add_value(verb, "--seconds", o.seconds, positive(), "T",
+              "For the ways to fold of each model, at most (default: 300)");
     add_window_option(verb, o.window_px, "Its side (default: 512)");
     verb.add_flag("--brief", o.is_brief, "Print the first table alone: what the defaults buy and cost");
     verb.add_flag("--quick", o.quick, "Fewer nodes of each tree, which takes less time");
@@ -253,18 +242,16 @@ std::vector<Command> verbs(CLI::App& app) {
                    "Examples:\n  unseen-bench fit --quick --factor contact_reach\n  unseen-bench fit --json fit.json",
                    bench_fit,
                    [](CLI::App& verb, FitOptions& o) {
-                       verb.add_option("--factor", o.factor, "That one alone (default: each, one after the other)")
-                           ->type_name("NAME")
-                           ->check(one_of(fit_factors()));
+                       add_value(verb, "--factor", o.factor, one_of(fit_factors()), "NAME",
+                                 "That one alone (default: each, one after the other)");
                        verb.add_flag("--quick", o.quick, "Few views of small meshes: rough figures");
                    }),
         bench_verb(app, "people", "How observers and models of sight compare with people's thresholds, and their fit",
                    "Examples:\n  unseen-bench people\n  unseen-bench people --table mine.csv --json -", bench_people,
                    [](CLI::App& verb, BenchOptions& o) {
-                       verb.add_option("--table", o.inputs, "The thresholds (default: data/people in the checkout)")
-                           ->type_name("FILE.csv")
-                           ->expected(1)
-                           ->check(CLI::Validator(CLI::ExistingFile).description(""));
+                       add_value(verb, "--table", o.inputs, CLI::Validator(CLI::ExistingFile).description(""),
+                                 "FILE.csv", "The thresholds (default: data/people in the checkout)")
+                           ->expected(1);
                    }),
         bench_verb(app, "scenes",
                    "What masking and occlusion save in scenes, and what discrete levels of detail make of the same",

@@ -104,15 +104,6 @@ CLI::Validator whole(double low, double high) {
         "");
 }
 
-CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
-                        const CLI::Validator& validator, const std::string& unit, const std::string& text) {
-    return verb
-        .add_option_function<double>(
-            name, [&value](const double& v) { value = v; }, text)
-        ->type_name(unit)
-        ->check(validator);
-}
-
 CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
                         const std::string& text) {
     return verb
@@ -150,8 +141,8 @@ CLI::Validator ending_in(std::vector<std::string> endings) {
 }
 
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds, std::vector<Rule>& rules) {
-    add_number(verb, "--geomorph", seconds, within(0, 60), "SECONDS",
-               "Where the cut changes, vertices glide for this long, up to 60 s (default: they jump)");
+    add_value(verb, "--geomorph", seconds, within(0, 60), "SECONDS",
+              "Where the cut changes, vertices glide for this long, up to 60 s (default: they jump)");
     rules.push_back({"--geomorph", Rule::excludes, {"--lights"}, "vertices that glide are not lit"});
 }
 
@@ -165,15 +156,13 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
 }
 
 void add_velocity_option(CLI::App& verb, std::optional<double>& degrees_a_second) {
-    add_number(
+    add_value(
         verb, "--velocity", degrees_a_second, within(0, perception::fastest_velocity.value()), "DEG/S",
         "How fast everything moves on the retina: fine detail blurs, coarse patterns are seen better (default: 0)");
 }
 
 void add_samples_option(CLI::App& verb, int& samples, const std::string& defaults) {
-    verb.add_option("--samples", samples, "Samples a pixel, 1 to 256 (default: " + defaults + ")")
-        ->type_name("N")
-        ->check(whole(1, 256));
+    add_value(verb, "--samples", samples, whole(1, 256), "N", "Samples a pixel, 1 to 256 (default: " + defaults + ")");
 }
 
 void add_seed_option(CLI::App& verb, std::uint64_t& seed, const std::string& of) {
@@ -355,17 +344,12 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
         "--full", [&goal](std::int64_t) { goal.kind = Goal::Kind::full; }, "Fold nothing");
     add_triangles_option(group, o.budget, "At most N triangles, or P% of them, as inconspicuous as possible");
     group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
-    add_number(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
-               "The best cut that T milliseconds are enough for");
-    group.add_option("--pixels", goal.tolerance_px, "Fold what is smaller than E pixels, seen or not")
-        ->type_name("E")
-        ->check(positive());
-    group
-        .add_option("--threshold", o.request.threshold,
-                    "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the "
-                    "distance")
-        ->type_name("X")
-        ->check(positive());
+    add_value(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
+              "The best cut that T milliseconds are enough for");
+    add_value(group, "--pixels", goal.tolerance_px, positive(), "E", "Fold what is smaller than E pixels, seen or not");
+    add_value(group, "--threshold", o.request.threshold, positive(), "X",
+              "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the "
+              "distance");
     add_fold_test_option(group, o.request.fold_test);
     group.add_flag("--chroma", o.request.chroma, "Also keep changes of colour that can be seen, not only of luminance");
     add_gaze_option(group, o.gaze_px);

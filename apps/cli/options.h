@@ -166,9 +166,18 @@ CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& targe
         ->check(one_of(std::move(names)));
 }
 
-// An option that takes a number.
-CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
-                        const CLI::Validator& validator, const std::string& unit, const std::string& text);
+// An option that takes a value of this kind, or values.
+template <class Value>
+CLI::Option* add_value(CLI::App& verb, const std::string& name, Value& value, const CLI::Validator& validator,
+                       const std::string& unit, const std::string& text) {
+    return verb.add_option(name, value, text)->type_name(unit)->check(validator);
+}
+template <class Value>
+CLI::Option* add_value(CLI::App& verb, const std::string& name, std::optional<Value>& value,
+                       const CLI::Validator& validator, const std::string& unit, const std::string& text) {
+    const auto take = [&value](const Value& given) { value = given; };
+    return verb.add_option_function<Value>(name, take, text)->type_name(unit)->check(validator);
+}
 
 // An option that takes three numbers.
 CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,

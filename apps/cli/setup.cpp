@@ -110,10 +110,10 @@ void Setup::add_view() {
     add_vector(group, "--target", o.target, "What it looks at (default: the model's centre)");
     add_vector(group, "--up", o.up, "Up in the picture (default: 0 1 0)");
     add_vector(group, "--direction", o.direction, "In place of --eye: from the model towards the eye (default: 0 0 1)");
-    add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
-               "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
-    add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
-               "Vertical field of view (default: that of the scene's camera, or what the window fills on the display)");
+    add_value(group, "--fill", o.fill, within(1e-6, 1e6), "F",
+              "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
+    add_value(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
+              "Vertical field of view (default: that of the scene's camera, or what the window fills on the display)");
     group
         .add_option_function<std::string>(
             "--size",
@@ -143,10 +143,10 @@ void Setup::add_display() {
     DisplayOptions& o = display_;
     CLI::App& group = add_section("display", "On what display, for whom (default: 20 inch, 1600x1200, at 0.5 m)");
     group.add_option("--display", o.file, "A display profile")->type_name("FILE.json");
-    add_number(group, "--ppd", o.pixels_per_degree, within(0.1, 1e5), "N", "Pixels per degree at the display's centre");
-    add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
-    add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
-    add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black")->group(in_file_alone);
+    add_value(group, "--ppd", o.pixels_per_degree, within(0.1, 1e5), "N", "Pixels per degree at the display's centre");
+    add_value(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
+    add_value(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
+    add_value(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black")->group(in_file_alone);
     mark(group, display);
     group
         .add_option("--observer", o.observer,
@@ -166,10 +166,10 @@ void Setup::add_light() {
     ViewOptions& o = view_;
     CLI::App& group = add_section("light", "What is around the model");
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6)");
-    add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)")
+    add_value(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)")
         ->group(in_file_alone);
-    add_number(group, "--fill-light", o.fill_light, within(0, 1), "F",
-               "Share of the light that also comes from the opposite side, 0..1 (default: 0.25)")
+    add_value(group, "--fill-light", o.fill_light, within(0, 1), "F",
+              "Share of the light that also comes from the opposite side, 0..1 (default: 0.25)")
         ->group(in_file_alone);
     group
         .add_option("--lights", o.lights,
@@ -181,10 +181,8 @@ void Setup::add_light() {
         "--shadows,!--no-shadows", [&o](std::int64_t count) { o.shadows = count > 0; },
         "All lights but headlights cast shadows, or none does (default: those that say so: \"shadow\" in --lights, "
         "extras.casts_shadow in glTF); at most 4");
-    add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
-    group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
-        ->type_name("METRES")
-        ->check(positive());
+    add_value(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
+    add_value(group, "--unit", o.unit_metres, positive(), "METRES", "Metres a mesh unit (default: 1)");
     mark(group, light);
 }
 

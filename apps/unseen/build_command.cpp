@@ -271,7 +271,7 @@ Command build_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<BuildArguments>(BuildArguments{setup.view_options().texture});
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTP")->required()->type_name("FILE");
-    verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".vdt"}), "TREE.vdt", "The tree")->required();
     add_choice<std::string, std::string>(*verb, "--clusterer", a->clusterer_name,
                                          {{"quadric", "quadric"}, {"octree", "octree"}, {"openmesh", "openmesh"}},
                                          "quadric (best; default), octree (fast), or openmesh (the decimater of that "
@@ -282,20 +282,14 @@ Command build_command(CLI::App& app, Setup& setup) {
         "How the file's colours are encoded: srgb (default) or linear");
     CLI::Option* repairs = verb->add_flag("--repair", a->repairs,
                                           "Before building: give parts one orientation, close cracks, cap small holes");
-    verb->add_option(
-            "--stitch", a->gap,
-            "With --repair: borders up to so far apart are joined, a share of the mesh's diagonal (default: 1e-6)")
-        ->type_name("SHARE")
-        ->check(CLI::Range(0.0, 0.01))
+    add_value(*verb, "--stitch", a->gap, CLI::Range(0.0, 0.01), "SHARE",
+              "With --repair: borders up to so far apart are joined, a share of the mesh's diagonal (default: 1e-6)")
         ->needs(repairs);
-    verb->add_option("--largest-hole", a->largest_hole,
-                     "With --repair: holes up to so large are capped, a share of their part's diagonal (default: 0.1)")
-        ->type_name("SHARE")
-        ->check(CLI::Range(0.0, 1.0))
+    add_value(*verb, "--largest-hole", a->largest_hole, CLI::Range(0.0, 1.0), "SHARE",
+              "With --repair: holes up to so large are capped, a share of their part's diagonal (default: 0.1)")
         ->needs(repairs);
-    verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
-        ->type_name("N")
-        ->check(whole(1, most_threads));
+    add_value(*verb, "--threads", a->threads, whole(1, most_threads), "N",
+              "Threads of each process; the tree is the same (default: all cores)");
     CLI::Option* leave =
         verb->add_flag("--no-fold-errors", a->no_fold_errors,
                        "Do not measure what every fold changes: faster, and a smaller file; the default "

@@ -410,13 +410,13 @@ void add_plan_options(CLI::App& verb, CalibrateArguments& a) {
     add_choice<std::optional<Method>, Method>(
         verb, "--method", a.method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
         "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
-    add_number(verb, "--trials", a.trials, whole(1, 1e5), "N",
-               "Trials of 2ifc (default: 200, and 10 for each wide patch)");
-    add_number(verb, "--settings", a.settings, whole(2, 1000), "N",
-               "Settings of adjustment at each place; the first does not count (default: 7)");
+    add_value(verb, "--trials", a.trials, whole(1, 1e5), "N",
+              "Trials of 2ifc (default: 200, and 10 for each wide patch)");
+    add_value(verb, "--settings", a.settings, whole(2, 1000), "N",
+              "Settings of adjustment at each place; the first does not count (default: 7)");
     constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
-    add_number(verb, "--seed", a.seed, whole(0, most_seed), "N",
-               "For the order of trials, and for simulated observers (default: 1)");
+    add_value(verb, "--seed", a.seed, whole(0, most_seed), "N",
+              "For the order of trials, and for simulated observers (default: 1)");
     verb.add_option("--simulate", a.simulate,
                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, "
                     "summation=, slope=, lapse=, scatter=, delay=")
@@ -424,18 +424,16 @@ void add_plan_options(CLI::App& verb, CalibrateArguments& a) {
     verb.add_option("--resume", a.state,
                     "Keep all answers in this file, and resume those that are there, by the plan that is there")
         ->type_name("STATE.json");
-    verb.add_option("--frequencies", a.frequencies, "To measure at (default: octaves that fit the display)")
-        ->type_name("CPD")
-        ->check(positive());
-    verb.add_option("--eccentricities", a.eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
-        ->type_name("DEG")
-        ->check(not_negative());
+    add_value(verb, "--frequencies", a.frequencies, positive(), "CPD",
+              "To measure at (default: octaves that fit the display)");
+    add_value(verb, "--eccentricities", a.eccentricities, not_negative(), "DEG",
+              "To measure at (default: 0, 5, 10, 20 as far as they fit)");
     // Not by its address: the parser takes an optional<bool> for a count and begins with 0.
     verb.add_flag_function(
         "--wide,!--no-wide", [&a](std::int64_t count) { a.wide = count > 0; },
         "Measure wide patches, too, or not (default: unless places are named)");
-    add_number(verb, "--luminance", a.luminance, positive(), "CDM2",
-               "Mean of the gratings (default: midway from black to white)");
+    add_value(verb, "--luminance", a.luminance, positive(), "CDM2",
+              "Mean of the gratings (default: midway from black to white)");
 }
 
 void add_display_measures(CLI::App& verb, CalibrateArguments& a) {
@@ -443,16 +441,12 @@ void add_display_measures(CLI::App& verb, CalibrateArguments& a) {
     verb.add_option("--photometer", a.photometer, "Take the display's luminances from a table, header code,cdm2")
         ->type_name("FILE.csv");
     verb.add_flag("--full-screen", a.window.full_screen, "Not in a window");
-    verb.add_option("--interval", a.window.interval_s,
-                    "Seconds of a grating, and of the pause between two (default: 0.5)")
-        ->type_name("S")
-        ->check(within(0.01, 60));
-    verb.add_option("--fade", a.window.fade_per_s, "With adjustment: decades of contrast a second (default: 0.25)")
-        ->type_name("D")
-        ->check(within(0.001, 100));
-    verb.add_option("--screenshot", a.window.screenshot, "Write a picture of what is shown at the end")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}));
+    add_value(verb, "--interval", a.window.interval_s, within(0.01, 60), "S",
+              "Seconds of a grating, and of the pause between two (default: 0.5)");
+    add_value(verb, "--fade", a.window.fade_per_s, within(0.001, 100), "D",
+              "With adjustment: decades of contrast a second (default: 0.25)");
+    add_value(verb, "--screenshot", a.window.screenshot, ending_in({".png"}), "OUT.png",
+              "Write a picture of what is shown at the end");
 }
 
 } // namespace
@@ -461,9 +455,8 @@ Command calibrate_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<CalibrateArguments>(CalibrateArguments{setup.display_options()});
     CLI::App* verb =
         app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
-    verb->add_option("-o,--output", a->out, "The observer's profile; with --gamma or --photometer the display's")
-        ->type_name("OUT.json")
-        ->check(ending_in({".json"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".json"}), "OUT.json",
+              "The observer's profile; with --gamma or --photometer the display's");
     add_plan_options(*verb, *a);
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");

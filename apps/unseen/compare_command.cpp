@@ -228,22 +228,15 @@ Command compare_command(CLI::App& app, Setup& setup) {
     add_choice<Model, Model>(
         *verb, "--model", a->model, {{"modern", Model::modern}, {"second", Model::second}, {"rpg99", Model::rpg99}},
         "modern (default), second (by another model of sight), or rpg99 (of 1999, blind to fine detail)");
-    add_number(*verb, "--field", a->field_degrees, within(1e-3, 179.9), "DEGREES",
-               "With rpg99: the image's horizontal field (default: as shown on the display)");
-    verb->add_option("--device", a->device,
-                     "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1%")
-        ->type_name("NAME")
-        ->check(one_of({"cpu", gpu}));
+    add_value(*verb, "--field", a->field_degrees, within(1e-3, 179.9), "DEGREES",
+              "With rpg99: the image's horizontal field (default: as shown on the display)");
+    add_value(*verb, "--device", a->device, one_of({"cpu", gpu}), "NAME",
+              "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1%");
     add_gaze_option(*verb, a->gaze_px);
-    verb->add_option("--map", a->map,
-                     "The differences, with a scale below: blue where invisible, yellow to red where visible")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}));
-    verb->add_option_function<std::uint64_t>(
-            "--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
-            "Exit status 1 if a difference is visible at more than N pixels")
-        ->type_name("N")
-        ->check(not_negative());
+    add_value(*verb, "--map", a->map, ending_in({".png"}), "OUT.png",
+              "The differences, with a scale below: blue where invisible, yellow to red where visible");
+    add_value(*verb, "--fail-above", a->fail_above, not_negative(), "N",
+              "Exit status 1 if a difference is visible at more than N pixels");
     add_json_option(*verb, a->json);
     setup.act_in(*verb, Setup::display | Setup::observer | Setup::csf);
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"

@@ -136,27 +136,25 @@ Command csf_command(CLI::App& app) {
     StimulusOptions* s = &a->stimulus;
     CLI::App* verb =
         app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
-    verb->add_option("--model", a->model_name, "Which closed form (default: castle): " + listed(model_names()))
-        ->type_name("NAME")
-        ->check(one_of(model_names()));
-    add_number(*verb, "--frequency", s->frequency, positive(), "CPD", "Spatial frequency");
-    add_number(*verb, "--luminance", s->luminance, positive(), "CDM2", "Adaptation luminance");
-    add_number(*verb, "--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
-    add_number(*verb, "--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
-    add_number(*verb, "--velocity", s->velocity, not_negative(), "DEG/S",
-               "How fast the grating moves on the retina (default: 0)");
-    add_number(*verb, "--distance", s->distance, positive(), "METRES",
-               "Distance of the grating, for --model daly (default: 0.5)");
-    add_number(*verb, "--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
+    add_value(*verb, "--model", a->model_name, one_of(model_names()), "NAME",
+              "Which closed form (default: castle): " + listed(model_names()));
+    add_value(*verb, "--frequency", s->frequency, positive(), "CPD", "Spatial frequency");
+    add_value(*verb, "--luminance", s->luminance, positive(), "CDM2", "Adaptation luminance");
+    add_value(*verb, "--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
+    add_value(*verb, "--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
+    add_value(*verb, "--velocity", s->velocity, not_negative(), "DEG/S",
+              "How fast the grating moves on the retina (default: 0)");
+    add_value(*verb, "--distance", s->distance, positive(), "METRES",
+              "Distance of the grating, for --model daly (default: 0.5)");
+    add_value(*verb, "--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
     add_choice<std::optional<VisualField>, VisualField>(
         *verb, "--field", s->field,
         {{"nasal", VisualField::nasal}, {"temporal", VisualField::temporal}, {"worst", VisualField::worst}},
         "Side of the visual field: nasal, temporal, or the worst of them (default)");
     verb->add_flag("--table", a->by_table, "Through the interpolated table that fold tests use, not the closed form");
     verb->add_option("--csf", a->csf, "Through a model's table, or a viewer's")->type_name("MODEL|FILE");
-    verb->add_option("--save-table", a->save, "With --table or --csf: write the table")
-        ->type_name("OUT.json")
-        ->check(ending_in({".json"}));
+    add_value(*verb, "--save-table", a->save, ending_in({".json"}), "OUT.json",
+              "With --table or --csf: write the table");
     add_json_option(*verb, a->json);
     verb->callback([a] {
         if (a->save.empty() && !a->stimulus.frequency) refuse("--frequency is required, or else --save-table.");

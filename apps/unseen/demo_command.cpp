@@ -153,9 +153,7 @@ Command demo_command(CLI::App& app, Setup& setup) {
     verb->add_option("-o,--output", a->folder, "Where its files go (default: unseen-demo)")->type_name("FOLDER");
     verb->add_flag("--made", a->is_made, "A model that is made, even where the bunny is installed");
     verb->add_flag("--no-view", a->is_without_view, "Open no window");
-    verb->add_option("--frames", a->frames, "End the viewer after so many frames, for scripts")
-        ->type_name("N")
-        ->check(whole(1, 1e6));
+    add_value(*verb, "--frames", a->frames, whole(1, 1e6), "N", "End the viewer after so many frames, for scripts");
     setup.act_in(*verb, Setup::cache);
     verb->footer(
         "The model is the Stanford bunny, where Debian's package glmark2-data is installed, or else a ball with\n"

@@ -264,9 +264,8 @@ void add_outputs(CLI::App& verb, FlyArguments& o) {
         ->type_name("FRAMES_%04d.png");
     verb.add_option("--csv", o.csv, "A line for each frame: triangles, changes, node tests, times, uploaded bytes")
         ->type_name("FILE.csv");
-    verb.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
-        ->type_name("FILE.png")
-        ->check(ending_in({".png"}));
+    add_value(verb, "--plot", o.plot, ending_in({".png"}), "FILE.png",
+              "Times, triangles, changes and uploaded bytes over the frames");
     add_json_option(verb, o.json);
     add_verbose_option(verb, o.is_verbose);
 }
@@ -297,11 +296,8 @@ Command fly_command(CLI::App& app, Setup& setup) {
     verb->add_flag("--changes", o.judges_changes,
                    "Judge whether the cut can be seen changing from frame to frame, although each picture passes; some "
                    "seconds a frame");
-    verb->add_option(
-            "--fps", o.frames_a_second,
-            "Frames a second of the path, for all that takes time: glides, changes, lights, gazes (default: 60)")
-        ->type_name("N")
-        ->check(within(1, 1e6));
+    add_value(*verb, "--fps", o.frames_a_second, within(1, 1e6), "N",
+              "Frames a second of the path, for all that takes time: glides, changes, lights, gazes (default: 60)");
     verb->add_flag("--draw", o.draws, "Draw the frames even where no -o keeps them, to time that");
     verb->add_flag("--no-draw")->group(""); // the default
     add_samples_option(*verb, o.draw.samples, "1; with --changes 64");

@@ -221,20 +221,15 @@ void add_methods(CLI::App& verb, LevelsArguments& o) {
         ->type_name("FILE.sel");
     add_triangles_option(verb, o.what.budget, "With --selection: the budget of a frame (default: the file's)");
     auto& control = o.control;
-    verb.add_option("--bias", control.bias,
-                    "With distance and area: above 1 finer levels, below 1 coarser ones (default: 1)")
-        ->type_name("X")
-        ->check(positive());
-    verb.add_option("--levels", control.chain.levels, "Most levels of a mesh, the whole one included (default: 6)")
-        ->type_name("N")
-        ->check(whole(1, session::most_levels));
+    add_value(verb, "--bias", control.bias, positive(), "X",
+              "With distance and area: above 1 finer levels, below 1 coarser ones (default: 1)");
+    add_value(verb, "--levels", control.chain.levels, whole(1, session::most_levels), "N",
+              "Most levels of a mesh, the whole one included (default: 6)");
     add_choice<session::MapRecipe, session::MapRecipe>(
         verb, "--maps", control.maps, {{"modern", session::MapRecipe::modern}, {"rpg99", session::MapRecipe::rpg99}},
         "With perceptual: thresholds of the modern judge (default), or as in the paper");
-    verb.add_option("--fade", control.fade_frames,
-                    "With --path: for N frames both levels of an object share its pixels (default: 0)")
-        ->type_name("N")
-        ->check(whole(0, 1000));
+    add_value(verb, "--fade", control.fade_frames, whole(0, 1000), "N",
+              "With --path: for N frames both levels of an object share its pixels (default: 0)");
 }
 
 std::vector<Rule> level_rules() {
@@ -273,20 +268,16 @@ Command levels_command(CLI::App& app, Setup& setup) {
         app.add_subcommand("levels", "Draw discrete levels of detail in place of cuts; select levels beforehand");
     add_model_option(*verb, a->model);
     verb->get_option("TREE")->required(false); // the parts have files of their own
-    verb->add_option(
-            "-o,--output", o.out,
-            "The picture in which nothing changes any more: PNG, or PFM or EXR for judging; with --path one for "
-            "each frame, FRAMES_%04d.png")
-        ->type_name("OUT.png|.pfm|.exr")
-        ->check(ending_in({".png", ".pfm", ".exr"}));
+    add_value(*verb, "-o,--output", o.out, ending_in({".png", ".pfm", ".exr"}), "OUT.png|.pfm|.exr",
+              "The picture in which nothing changes any more: PNG, or PFM or EXR for judging; with --path one for "
+              "each frame, FRAMES_%04d.png");
     add_choice<std::optional<LevelView>, LevelView>(
         *verb, "--show", o.show, {{"maps", LevelView::maps}, {"levels", LevelView::levels}},
         "In place of the picture: maps of thresholds, for each layer of depth what the others hide; or the levels");
     verb->add_option("--path", o.path, "As in 'unseen fly' (default: a still view)")
         ->type_name("orbit:D[:N]|walk[:V[:N]]|FILE.csv");
-    verb->add_option("--fps", o.frames_a_second, "With --lights that move: frames a second (default: 60)")
-        ->type_name("N")
-        ->check(within(1, 1e6));
+    add_value(*verb, "--fps", o.frames_a_second, within(1, 1e6), "N",
+              "With --lights that move: frames a second (default: 60)");
     add_json_option(*verb, o.json);
     add_verbose_option(*verb, o.is_verbose);
     add_methods(*verb, o);

@@ -217,35 +217,29 @@ Command lod_command(CLI::App& app, Setup& setup) {
     CLI::App* verb =
         app.add_subcommand("lod", "Make levels of detail with the distances from which nobody sees them, for engines");
     add_model_option(*verb, a->model);
-    verb->add_option("-o,--output", a->out, "All levels, by the extension MSFT_lod")
-        ->type_name("OUT.glb|.gltf")
-        ->required()
-        ->check(ending_in({".glb", ".gltf"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".glb", ".gltf"}), "OUT.glb|.gltf",
+              "All levels, by the extension MSFT_lod")
+        ->required();
     verb->add_flag("--separate", a->is_separate, "Also a file a level: OUT_lod0.glb, ...");
-    verb->add_option("--levels", a->options.chain.levels, "Most levels, the full mesh included (default: 5)")
-        ->type_name("N")
-        ->check(whole(2, session::most_levels));
+    add_value(*verb, "--levels", a->options.chain.levels, whole(2, session::most_levels), "N",
+              "Most levels, the full mesh included (default: 5)");
     verb->add_option_function<double>(
             "--coarsest", [a](double percent) { a->options.chain.least_share = percent / 100; },
             "Triangles of the last level, in percent of the full mesh's (default: 1)")
         ->type_name("PERCENT")
         ->check(within(1e-4, 50));
-    verb->add_option("--directions", a->options.directions, "From how many sides each level is judged (default: 12)")
-        ->type_name("N")
-        ->check(whole(1, 1000));
+    add_value(*verb, "--directions", a->options.directions, whole(1, 1000), "N",
+              "From how many sides each level is judged (default: 12)");
     add_samples_option(*verb, a->options.samples, "64");
-    verb->add_option("--seed", a->options.seed, "For the directions (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, 1e9));
-    add_number(
+    add_value(*verb, "--seed", a->options.seed, whole(0, 1e9), "N", "For the directions (default: 1)");
+    add_value(
         *verb, "--fov", a->options.fov_y_degrees, within(1, 179), "DEGREES",
         "Vertical field of the engine's camera, over the whole display (default: as the display fills the sight)");
     verb->add_flag("--quantize", a->gltf.quantize, "Numbers of 16 bits: KHR_mesh_quantization");
     verb->add_flag("--meshopt", a->gltf.meshopt, "Compressed: EXT_meshopt_compression");
     verb->add_option("--csv", a->csv, "A line for each level")->type_name("FILE.csv");
-    verb->add_option("--sheet", a->sheet, "A picture of the levels: where each begins, and from near by")
-        ->type_name("SHEET.png")
-        ->check(ending_in({".png"}));
+    add_value(*verb, "--sheet", a->sheet, ending_in({".png"}), "SHEET.png",
+              "A picture of the levels: where each begins, and from near by");
     add_json_option(*verb, a->json);
     setup.act_in(*verb, Setup::model | Setup::scenes);
     verb->footer(

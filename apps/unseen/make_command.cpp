@@ -69,20 +69,15 @@ Command subdivide_command(CLI::App& make, Setup& setup) {
     CLI::App* verb =
         make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTP")->required()->type_name("FILE");
-    verb->add_option("-o,--output", a->out, "The larger mesh")
-        ->type_name("OUT.ply|.obj|.glb")
-        ->required()
-        ->check(ending_in({".ply", ".obj", ".glb"}));
-    CLI::Option* times = verb->add_option("--times", a->options.times, "Make four of every triangle, N times")
-                             ->type_name("N")
-                             ->check(whole(0, most_subdivisions));
+    add_value(*verb, "-o,--output", a->out, ending_in({".ply", ".obj", ".glb"}), "OUT.ply|.obj|.glb", "The larger mesh")
+        ->required();
+    CLI::Option* times = add_value(*verb, "--times", a->options.times, whole(0, most_subdivisions), "N",
+                                   "Make four of every triangle, N times");
     CLI::Option* triangles = add_triangles_option(
         *verb, a->triangles,
         "Instead: up to N triangles, or P% of the mesh's; the last round splits the longest edges alone");
-    verb->add_option("--noise", a->options.noise,
-                     "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
-        ->type_name("SHARE")
-        ->check(within(0, 1));
+    add_value(*verb, "--noise", a->options.noise, within(0, 1), "SHARE",
+              "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)");
     add_json_option(*verb, a->json);
     setup.act_in(*verb, Setup::skip_bad);
     verb->callback([=] {
@@ -129,28 +124,25 @@ Result<int> run(SceneArguments& a) {
 CLI::App* add_scene_part(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
     CLI::App* make =
         verb.add_subcommand("scene", "Make a scene of many objects, with a camera, lights and a background");
-    make->add_option_function<std::string>(
-            "KIND",
-            [a](const std::string& kind) {
-                a->options.kind = kind == "museum"     ? SceneKind::museum
-                                  : kind == "treasure" ? SceneKind::treasure
-                                  : kind == "house"    ? SceneKind::house
-                                  : kind == "building" ? SceneKind::building
-                                  : kind == "spheres"  ? SceneKind::spheres
-                                  : kind == "bunnies"  ? SceneKind::bunnies
-                                  : kind == "models"   ? SceneKind::models
-                                                       : SceneKind::forest;
-            },
-            "museum: a statue behind a gate, lit through a barred window; treasure: a chamber of statues; "
-            "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
-            "trees; building: fifty furnished rooms with doors between them; spheres, bunnies (two of the statues) and "
-            "models (all of them): forty objects on a plain, to "
-            "select "
-            "levels of detail in")
+    add_choice<SceneKind, SceneKind>(
+        *make, "KIND", a->options.kind,
+        {{"museum", SceneKind::museum},
+         {"treasure", SceneKind::treasure},
+         {"house", SceneKind::house},
+         {"forest", SceneKind::forest},
+         {"building", SceneKind::building},
+         {"spheres", SceneKind::spheres},
+         {"bunnies", SceneKind::bunnies},
+         {"models", SceneKind::models}},
+        "museum: a statue behind a gate, lit through a barred window; treasure: a chamber of statues; "
+        "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
+        "trees; building: fifty furnished rooms with doors between them; spheres, bunnies (two of the statues) and "
+        "models (all of them): forty objects on a plain, to "
+        "select "
+        "levels of detail in")
         ->required()
-        ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models")
-        ->check(one_of({"museum", "treasure", "house", "forest", "building", "spheres", "bunnies", "models"}));
-    make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
+        ->type_name("museum|treasure|house|forest|building|spheres|bunnies|models");
+    add_value(*make, "-o,--output", a->out, ending_in({".glb"}), "OUT.glb", "The scene")->required();
     add_triangles_option(
         *make, a->triangles,
         "Roughly N in all objects, shared meshes counted for each, 10,000 to 100,000,000 "
@@ -163,9 +155,8 @@ CLI::App* add_scene_part(CLI::App& verb, const std::shared_ptr<SceneArguments>& 
                      "here. Bunnies and models take the first two or four, simplified where they have more")
         ->type_name("FILE")
         ->allow_extra_args(false);
-    CLI::Option* spacing = make->add_option("--bars-per-metre", a->options.bars_per_metre, "In the museum (default: 8)")
-                               ->type_name("N")
-                               ->check(within(1, 100));
+    CLI::Option* spacing = add_value(*make, "--bars-per-metre", a->options.bars_per_metre, within(1, 100), "N",
+                                     "In the museum (default: 8)");
     CLI::Option* bars = add_choice<MuseumBars, MuseumBars>(*make, "--bars", a->options.bars,
                                                            {{"both", MuseumBars::both},
                                                             {"gate", MuseumBars::gate},

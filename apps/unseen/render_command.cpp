@@ -119,10 +119,9 @@ Command render_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<RenderArguments>(RenderArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb = app.add_subcommand("render", "Draw a simplification of a model or a scene for a view");
     add_model_option(*verb, a->model);
-    verb->add_option("-o,--output", a->out, "PNG for people; PFM or EXR for judging: luminance in cd/m2")
-        ->type_name("OUT.png|.pfm|.exr")
-        ->required()
-        ->check(ending_in({".png", ".pfm", ".exr"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".png", ".pfm", ".exr"}), "OUT.png|.pfm|.exr",
+              "PNG for people; PFM or EXR for judging: luminance in cd/m2")
+        ->required();
     add_samples_option(*verb, a->draw.samples, "16; PFM and EXR, which are judged: 64");
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
     std::vector<std::pair<std::string, FoldMap>> maps;

@@ -205,26 +205,20 @@ void add_search_options(CLI::App& verb, PrecomputeArguments& a) {
                                                     {"contrast", SelectionQuality::contrast}},
                                                    "What pictures should lose least of: structural similarity (ssim; "
                                                    "default), pixels that differ visibly, or visible contrast");
-    verb.add_option("--grid", a.grid,
-                    "The ground that corners are on, world units (default: around the middles of all objects)")
-        ->type_name("X0 Z0 X1 Z1")
-        ->expected(4)
-        ->check(finite_numbers(1));
-    verb.add_option("--spacing", o.spacing, "Distance of corners, world units (default: a tenth of the longer side)")
-        ->type_name("X")
-        ->check(positive());
-    verb.add_option("--depth", o.depth, "How often a cell is halved where its corners select differently (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, session::most_selection_depth));
-    add_number(verb, "--height", a.eye_height, finite_numbers(1), "Y",
-               "Height of the eyes, world units (default: the scene camera's, or 1.7 above the lowest object)");
+    add_value(verb, "--grid", a.grid, finite_numbers(1), "X0 Z0 X1 Z1",
+              "The ground that corners are on, world units (default: around the middles of all objects)")
+        ->expected(4);
+    add_value(verb, "--spacing", o.spacing, positive(), "X",
+              "Distance of corners, world units (default: a tenth of the longer side)");
+    add_value(verb, "--depth", o.depth, whole(0, session::most_selection_depth), "N",
+              "How often a cell is halved where its corners select differently (default: 1)");
+    add_value(verb, "--height", a.eye_height, finite_numbers(1), "Y",
+              "Height of the eyes, world units (default: the scene camera's, or 1.7 above the lowest object)");
     verb.add_flag("--space", o.is_in_space, "A grid in space, cameras in six directions; else on the ground, in four");
-    verb.add_option("--levels", o.levels, "Levels of each object, each with half the triangles (default: 5)")
-        ->type_name("N")
-        ->check(whole(2, session::most_levels));
-    verb.add_option("--window", o.window_px, "Width and height of the cameras' pictures (default: 256)")
-        ->type_name("PIXELS")
-        ->check(whole(11, 8192));
+    add_value(verb, "--levels", o.levels, whole(2, session::most_levels), "N",
+              "Levels of each object, each with half the triangles (default: 5)");
+    add_value(verb, "--window", o.window_px, whole(11, 8192), "PIXELS",
+              "Width and height of the cameras' pictures (default: 256)");
 }
 
 } // namespace
@@ -234,10 +228,9 @@ Command precompute_command(CLI::App& levels, Setup& setup) {
     CLI::App* verb = levels.add_subcommand(
         "precompute", "For cameras all over a scene, select the levels that lose least within a budget of triangles");
     verb->add_option("SCENE", a->scene, "A scene (glTF)")->required()->type_name("SCENE.glb");
-    verb->add_option("-o,--output", a->out, "The selections; OUT.sel.part keeps what is done until then")
-        ->required()
-        ->type_name("OUT.sel")
-        ->check(ending_in({".sel"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".sel"}), "OUT.sel",
+              "The selections; OUT.sel.part keeps what is done until then")
+        ->required();
     add_triangles_option(*verb, a->budget, "Triangles a frame, or a share of the scene's")->required();
     add_search_options(*verb, *a);
     add_json_option(*verb, a->json);

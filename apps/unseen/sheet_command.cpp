@@ -73,26 +73,19 @@ Command sheet_command(CLI::App& app, Setup& setup) {
     CLI::App* verb =
         app.add_subcommand("sheet", "Draw and judge the full, imperceptible, budget and gaze-directed cuts");
     add_model_option(*verb, a->model, false);
-    verb->add_option("-o,--output", a->out, "The contact sheet, wireframes below")
-        ->type_name("SHEET.png")
-        ->check(ending_in({".png"}));
-    verb->add_option("--maps", a->maps,
-                     "A sheet without the budget and, below, with maps of the folds' cost, frequency, contrast and "
-                     "eccentricity; both sheets are drawn and judged once")
-        ->type_name("MAPS.png")
-        ->check(ending_in({".png"}));
+    add_value(*verb, "-o,--output", a->out, ending_in({".png"}), "SHEET.png", "The contact sheet, wireframes below");
+    add_value(*verb, "--maps", a->maps, ending_in({".png"}), "MAPS.png",
+              "A sheet without the budget and, below, with maps of the folds' cost, frequency, contrast and "
+              "eccentricity; both sheets are drawn and judged once");
     add_triangles_option(*verb, a->budget, "The budget (default: a quarter of the triangles)");
     add_gaze_option(*verb, a->sheet.gaze_px);
     verb->get_option("--gaze")->description(
         "Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
         "(default: 29 degrees to the right of the window's centre)");
     add_samples_option(*verb, a->sheet.samples, "64");
-    verb->add_option_function<int>(
-            "--cell", [o = a.get()](int px) { o->sheet.cell_px = px; },
-            "The longer side of a picture (default: " + std::to_string(usual_cell_px) + ", with maps " +
-                std::to_string(usual_maps_cell_px) + ")")
-        ->type_name("PIXELS")
-        ->check(whole(16, 4096));
+    add_value(*verb, "--cell", a->sheet.cell_px, whole(16, 4096), "PIXELS",
+              "The longer side of a picture (default: " + std::to_string(usual_cell_px) + ", with maps " +
+                  std::to_string(usual_maps_cell_px) + ")");
     add_fold_test_option(*verb, a->sheet.fold_test, true);
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);

@@ -105,10 +105,9 @@ Command simplify_command(CLI::App& app, Setup& setup) {
     auto a = std::make_shared<SimplifyArguments>(SimplifyArguments{setup.view_options(), setup.display_options()});
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh, or scene, for a view");
     add_model_option(*verb, a->model);
-    verb->add_option("-o,--output", a->out, "The mesh")
-        ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.stl|.off")
-        ->required()
-        ->check(ending_in(meshio::written_endings()));
+    add_value(*verb, "-o,--output", a->out, ending_in(meshio::written_endings()),
+              "OUT.ply|.obj|.glb|.gltf|.vtp|.stl|.off", "The mesh")
+        ->required();
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     std::vector<Rule> rules;

@@ -384,18 +384,15 @@ void add_make(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments
         "With --levels: thresholds of the modern judge (default), or as in the paper of 2007");
     maps->needs(levels);
     const auto count = [&](const char* name, std::optional<double>& value, double most, const char* text) {
-        make->add_option(name, value, text)->type_name("N")->check(whole(1, most));
+        add_value(*make, name, value, whole(1, most), "N", text);
     };
     count("--views", a->views, 360, "Views around each model (default: 5; of a scene 1)");
-    make->add_option("--distances", a->distances,
-                     "Distances of the eye, as multiples of the view's; all views from each (default: 1)")
-        ->type_name("X ...")
-        ->check(positive());
+    add_value(*make, "--distances", a->distances, positive(), "X ...",
+              "Distances of the eye, as multiples of the view's; all views from each (default: 1)");
     count("--samples", a->samples, 256, "Samples a pixel (default: 64)");
     count("--repeats", a->repeats, 1000, "How often each pair is shown (default: 2)");
-    make->add_option("--seed", a->seed, "For orders and sides (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+    add_value(*make, "--seed", a->seed, whole(0, 9007199254740992.0), "N",
+              "For orders and sides (default: 1)"); // 2^53, to which doubles count
     setup.act_in(*make, Setup::view | Setup::model | Setup::scenes);
     make->callback([a, levels] {
         a->part = StudyArguments::Part::make;
@@ -427,13 +424,11 @@ void add_run(CLI::App& verb, Setup& setup, const std::shared_ptr<StudyArguments>
                          "and is right in three of four at the threshold: median, default or strict")
             ->type_name("PERSON");
     part->add_flag("--full-screen", a->window.full_screen, "On the primary monitor")->excludes(simulate);
-    part->add_option("--seconds", a->window.seconds, "Show each pair for so long (default: until it is answered)")
-        ->type_name("T")
-        ->check(positive())
+    add_value(*part, "--seconds", a->window.seconds, positive(), "T",
+              "Show each pair for so long (default: until it is answered)")
         ->excludes(simulate);
-    part->add_option("--screenshot", a->window.screenshot, "Keep the last pair shown as a picture")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}))
+    add_value(*part, "--screenshot", a->window.screenshot, ending_in({".png"}), "OUT.png",
+              "Keep the last pair shown as a picture")
         ->excludes(simulate);
     setup.act_in(*part, Setup::display);
     part->callback([a] { a->part = StudyArguments::Part::run; });

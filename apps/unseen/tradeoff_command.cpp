@@ -156,10 +156,8 @@ Command tradeoff_command(CLI::App& app, Setup& setup) {
     add_model_option(*verb, a->model);
     verb->add_option("--csv", a->csv, "A line for each way")->type_name("FILE.csv");
     add_json_option(*verb, a->json);
-    verb->add_option("--seconds", a->options.seconds,
-                     "Roughly how long to measure; ways that do not fit are left out (default: 45)")
-        ->type_name("T")
-        ->check(positive());
+    add_value(*verb, "--seconds", a->options.seconds, positive(), "T",
+              "Roughly how long to measure; ways that do not fit are left out (default: 45)");
     add_samples_option(*verb, a->options.samples, "64");
     setup.act_in(*verb, Setup::view | Setup::model | Setup::scenes);
     verb->footer("Examples:\n  unseen tradeoff bunny.vdt\n"

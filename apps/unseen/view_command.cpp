@@ -49,12 +49,9 @@ Command view_command(CLI::App& app, Setup& setup) {
     CLI::App* verb = app.add_subcommand("view", "Look at a model or a scene in a window");
     add_model_option(*verb, a->model);
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
-    verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture of the model when the viewer ends")
-        ->type_name("OUT.png")
-        ->check(ending_in({".png"}));
-    verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
-        ->type_name("N")
-        ->check(whole(1, 1e6));
+    add_value(*verb, "--screenshot", a->viewer.screenshot, ending_in({".png"}), "OUT.png",
+              "Write a picture of the model when the viewer ends");
+    add_value(*verb, "--frames", a->viewer.frames, whole(1, 1e6), "N", "End after so many frames, for scripts");
     std::vector<Rule> rules;
     add_geomorph_option(*verb, a->viewer.geomorph_seconds, rules);
     add_what_options(*verb, a->viewer.what, rules);
