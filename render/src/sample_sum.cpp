@@ -3,7 +3,7 @@
 
 #include <numeric>
 
-#include <unseen/vdtree/internal/split_mix64.h>
+#include <unseen/vdtree/internal/random.h>
 
 #include "shaders.h"
 #include "surface_pass.h"
@@ -30,9 +30,9 @@ std::vector<glm::dvec2> n_rooks(int n, std::uint32_t seed) {
     std::iota(row_of_column.begin(), row_of_column.end(), 0);
     // The pattern must be the same everywhere, which std::shuffle does not promise. The bias of the modulus is below
     // 2^-55 for the 256 samples there can be.
-    SplitMix64 random(seed);
+    Random random(seed);
     for (std::size_t i = row_of_column.size(); i > 1; --i)
-        std::swap(row_of_column[i - 1], row_of_column[random.next() % i]);
+        std::swap(row_of_column[i - 1], row_of_column[random.bits() % i]);
 
     std::vector<glm::dvec2> points;
     points.reserve(row_of_column.size());

@@ -104,7 +104,7 @@ struct Masks {
                      std::move(*sum)};
     }
 
-    Result<perception::Elevations> of(std::span<const render::Item> items, render::Shadows* shadows) {
+    Result<perception::MaskingPicture::Elevations> of(std::span<const render::Item> items, render::Shadows* shadows) {
         sampling_.shadows = shadows;
         if (auto drawn = sum_.draw(items, view_, sampling_); !drawn) return drawn.error();
         drawings_ += sampling_.samples;
@@ -121,7 +121,8 @@ struct Masks {
         if (auto mapped = passes_->map_elevations(); !mapped) return mapped.error();
         auto grid = passes_->read_elevations();
         if (!grid) return grid.error();
-        perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
+        perception::MaskingPicture::Elevations elevations{
+            grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
         for (const JudgeTables::Band& band : tables_.bands) elevations.bands.emplace_back(band.nominal_cpd);
         return elevations;
     }
@@ -135,7 +136,7 @@ struct Masks {
 };
 
 // Of cells in all bands, those whose thresholds rise by a quarter or more: less does nearly nothing.
-float share_raised(const perception::Elevations& a, const perception::Elevations& b) {
+float share_raised(const perception::MaskingPicture::Elevations& a, const perception::MaskingPicture::Elevations& b) {
     constexpr float raised = 1.25f;
     std::size_t count = 0;
     for (std::size_t i = 0; i < a.elevation.size(); ++i) count += std::min(a.elevation[i], b.elevation[i]) >= raised;
@@ -163,7 +164,7 @@ Result<SceneMasks> find_masks(const Session& session, const render::Context& con
         auto rest = masks->of(without_layer(scene, split.layer_of, layer), scene.shadows);
         if (!rest) return rest.error();
         found.largest_share = std::max(found.largest_share, share_raised(*whole, *rest));
-        const perception::Elevations both[] = {*whole, std::move(*rest)};
+        const perception::MaskingPicture::Elevations both[] = {*whole, std::move(*rest)};
         auto masking = perception::MaskingPicture::create(view, both);
         if (!masking) return masking.error();
         by_layer.push_back(std::move(*masking));
