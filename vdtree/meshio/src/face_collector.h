@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include <glm/vec3.hpp>
-
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 

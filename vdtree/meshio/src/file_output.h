@@ -4,8 +4,6 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <cstddef>
-#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>

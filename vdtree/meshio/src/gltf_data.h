@@ -2,9 +2,7 @@
 #pragma once
 
 #include <deque>
-#include <limits>
 #include <map>
-#include <string_view>
 
 #include "gltf_document.h"
 

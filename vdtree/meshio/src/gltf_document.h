@@ -4,7 +4,6 @@
 
 #include <initializer_list>
 #include <limits>
-#include <string_view>
 
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>

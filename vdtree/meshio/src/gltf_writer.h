@@ -5,7 +5,6 @@
 #include <deque>
 #include <string_view>
 
-#include <glm/vec3.hpp>
 #include <nlohmann/json.hpp>
 
 #include <unseen/meshio/scene_file.h>

@@ -3,10 +3,7 @@
 
 #include <new>
 #include <stdexcept>
-#include <string_view>
 #include <type_traits>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/colour.h>

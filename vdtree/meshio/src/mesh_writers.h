@@ -1,10 +1,6 @@
 // The formats of mesh files, and the writers behind write_mesh and write_cut, one function a format.
 #pragma once
 
-#include <string_view>
-#include <type_traits>
-#include <utility>
-
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>
 

@@ -1,8 +1,6 @@
 // Material libraries of Wavefront OBJ.
 #pragma once
 
-#include <string_view>
-
 #include "named_files.h"
 
 namespace unseen::meshio {

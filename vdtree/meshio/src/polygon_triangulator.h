@@ -1,13 +1,8 @@
 // Polygons as triangles.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/mesh.h>
 

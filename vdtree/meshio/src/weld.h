@@ -3,14 +3,10 @@
 #pragma once
 
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <random>
 #include <span>
 #include <vector>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/mesh.h>
 

@@ -1,8 +1,6 @@
 // The directions that the surroundings of each node face, before and after it folds.
 #pragma once
 
-#include <span>
-
 #include "build/bound_spheres.h"
 #include "build/parallel_array.h"
 #include "tree/directions.h"

@@ -1,9 +1,6 @@
 // Spheres around what each node supports and what surrounds it, and how far its leaves are from its proxy.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include "tree/leaf_rings.h"
 
 namespace unseen::vdtree {

@@ -1,9 +1,6 @@
 // Numbers the nodes of a clustering depth-first, and its triangles by the node at which they vanish.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/internal/tree_shape.h>
 
 namespace unseen::vdtree {

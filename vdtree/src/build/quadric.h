@@ -13,9 +13,6 @@
 // is subtracted is never larger than the cluster.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-
 #include <unseen/vdtree/mesh.h>
 
 #include <unseen/vdtree/internal/simd.h>

@@ -15,8 +15,6 @@
 #include <compare>
 #include <vector>
 
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>
 

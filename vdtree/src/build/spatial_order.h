@@ -2,12 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
 #include <functional>
 #include <span>
 
 #include <glm/common.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/mesh.h>
 

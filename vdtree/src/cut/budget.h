@@ -1,10 +1,7 @@
 // Where the costs of folds come from, and the best cuts of one or more trees within a number of triangles.
 #pragma once
 
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <vector>
 
 #include <unseen/vdtree/function_ref.h>
 

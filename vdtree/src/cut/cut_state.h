@@ -1,10 +1,6 @@
 // What a cut is made of, for those that change it: Cut itself, the follower and geomorphs.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <span>
 #include <vector>
 
 #include <unseen/vdtree/cut.h>

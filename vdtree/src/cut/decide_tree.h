@@ -2,8 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include <unseen/vdtree/internal/node_bits.h>

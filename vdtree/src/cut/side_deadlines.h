@@ -1,9 +1,6 @@
 // Deadlines of watched slots by a clock that only some views need: that of lights, or that of frusta.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cut/kernel/deadline_kernel.h"

@@ -1,14 +1,10 @@
 // A set of normals while a tree is being built: its mask, and its slabs in a form whose union is a maximum of bytes.
 #pragma once
 
-#include <array>
 #include <bit>
-#include <cmath>
-#include <cstdint>
 #include <cstring>
 
 #include <glm/common.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/internal/normal_mask.h>
 

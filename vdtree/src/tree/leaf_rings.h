@@ -1,10 +1,6 @@
 // What surrounds each leaf.
 #pragma once
 
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "build/parallel_array.h"
 #include "build/surface.h"
 #include <unseen/vdtree/internal/tree_parts.h>

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <atomic>
-#include <memory>
-#include <string>
 
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 

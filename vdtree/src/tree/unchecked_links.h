@@ -2,8 +2,6 @@
 // it follows that node's links, and so need not look at the whole tree. Everything else takes a SoundTree.
 #pragma once
 
-#include <cstddef>
-
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -1,9 +1,6 @@
 // Builds vertex trees: a clusterer decides which vertices merge, everything else is derived from the mesh.
 #pragma once
 
-#include <string_view>
-#include <vector>
-
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>

@@ -13,14 +13,7 @@
 // test can change, so no node is tested before its time.
 #pragma once
 
-#include <cstdint>
 #include <limits>
-#include <memory>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/lighting.h>

@@ -5,10 +5,7 @@
 // antichain that covers every leaf. A triangle is active iff the node at which it vanishes is unfolded.
 #pragma once
 
-#include <memory>
 #include <optional>
-#include <span>
-#include <vector>
 
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/vertex_tree.h>

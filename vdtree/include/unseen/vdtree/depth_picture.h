@@ -1,13 +1,6 @@
 // Nodes that one view hides, found from the depth of each pixel. For pictures of that view alone, hidden nodes fold.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>

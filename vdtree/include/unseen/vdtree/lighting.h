@@ -10,11 +10,6 @@
 // the renderer takes away the share of each light that is hidden.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -17,21 +17,7 @@
 // number of cuts and threads may read one tree.
 #pragma once
 
-#include <array>
 #include <compare>
-#include <cstddef>
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <string>
-#include <string_view>
-#include <type_traits>
-#include <utility>
-#include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>

@@ -15,7 +15,6 @@
 
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <CGAL/IO/Color.h>
 #include <CGAL/Kernel_traits.h>

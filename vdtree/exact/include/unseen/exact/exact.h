@@ -3,8 +3,6 @@
 // Uses CGAL's number types, which are under the LGPL, version 3 or later, and none of its packages under the GPL.
 #pragma once
 
-#include <cstdint>
-
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -2,10 +2,6 @@
 // are inside out.
 #pragma once
 
-#include <cstdint>
-
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
 

@@ -7,12 +7,7 @@
 // stays proportional to the file; compressed VTP may become 100 times the file, or 1 GiB.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>

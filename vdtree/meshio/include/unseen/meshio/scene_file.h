@@ -7,17 +7,7 @@
 // brightness of lights: {"unseen": {"exposure": E, "ambient": A}}, see SceneContents.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <filesystem>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
-
 #include <glm/mat3x3.hpp>
-#include <glm/mat4x4.hpp>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>

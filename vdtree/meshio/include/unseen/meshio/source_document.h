@@ -6,9 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 #include <glm/mat2x2.hpp>
 #include <glm/mat4x4.hpp>

@@ -16,6 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include <type_traits>
+
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
 #include <unseen/adapters/adapters.h>

@@ -5,8 +5,6 @@
 // is bound by one of the two. Unseen's own code is under its own licence here, too.
 #pragma once
 
-#include <cstdint>
-
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
 

@@ -3,8 +3,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <span>
-#include <string_view>
 
 #include <unseen/vdtree/result.h>
 

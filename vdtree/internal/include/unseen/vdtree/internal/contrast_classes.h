@@ -4,7 +4,6 @@
 // Values are relative, 0..1, as trees store them. A linear map, which the criterion gives, makes them absolute.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>

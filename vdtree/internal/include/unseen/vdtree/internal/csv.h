@@ -2,10 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
 #include <unseen/vdtree/result.h>
 

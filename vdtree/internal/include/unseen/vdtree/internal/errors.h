@@ -1,8 +1,6 @@
 // Errors by their codes, for `return invalid_argument("...");`.
 #pragma once
 
-#include <utility>
-
 #include <unseen/vdtree/result.h>
 
 namespace unseen {

@@ -2,9 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
 #include <span>
-#include <vector>
 
 #include <glm/geometric.hpp>
 

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
-#include <string>
 
 #include <unseen/vdtree/result.h>
 

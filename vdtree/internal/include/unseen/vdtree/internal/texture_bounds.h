@@ -2,9 +2,6 @@
 // texture.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>

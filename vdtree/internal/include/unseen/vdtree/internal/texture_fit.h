@@ -3,9 +3,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <vector>
 
 #include <glm/vec3.hpp>
 

@@ -1,12 +1,8 @@
 // What can be seen of a texture over a range of coordinates.
 #pragma once
 
-#include <cstdint>
 #include <limits>
 #include <vector>
-
-#include <glm/vec2.hpp>
-#include <glm/vec4.hpp>
 
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/vertex_tree.h>

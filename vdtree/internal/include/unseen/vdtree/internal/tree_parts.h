@@ -4,8 +4,6 @@
 
 #include <cstdint>
 #include <numeric>
-#include <span>
-#include <vector>
 
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_shape.h>
