@@ -94,6 +94,4 @@ Result<std::vector<DifferenceCounts::Count>> DifferenceCounts::take() {
     });
 }
 
-int DifferenceCounts::open_counts() const noexcept { return static_cast<int>(impl_->open.size()); }
-
 } // namespace unseen::render

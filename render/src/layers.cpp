@@ -273,15 +273,6 @@ const Target& LayerPasses::composite() const noexcept { return impl_->composite;
 const Target& LayerPasses::combination() const noexcept { return impl_->combination; }
 double LayerPasses::near_plane() const noexcept { return impl_->camera.near_plane.value_or(1); }
 
-const Target* LayerPasses::layer(int number) const noexcept {
-    if (number < 0 || number >= impl_->layer_count) return nullptr;
-    return &impl_->slices[static_cast<std::size_t>(number) + 1].target;
-}
-
-const Target* LayerPasses::background() const noexcept {
-    return impl_->has_background ? &impl_->slices.front().target : nullptr;
-}
-
 const Target* LayerPasses::mask() const noexcept { return impl_->is_masked ? &*impl_->mask : nullptr; }
 
 LayerCounts LayerPasses::counts() const noexcept {

@@ -12,25 +12,13 @@
 namespace unseen::render {
 namespace {
 
-GLenum gl_stage(ShaderSource::Stage stage) {
-    switch (stage) {
-    case ShaderSource::Stage::vertex: return GL_VERTEX_SHADER;
-    case ShaderSource::Stage::geometry: return GL_GEOMETRY_SHADER;
-    case ShaderSource::Stage::fragment: return GL_FRAGMENT_SHADER;
-    case ShaderSource::Stage::compute: return GL_COMPUTE_SHADER;
-    }
-    return 0;
-}
-
-const char* stage_name(ShaderSource::Stage stage) {
-    switch (stage) {
-    case ShaderSource::Stage::vertex: return "vertex";
-    case ShaderSource::Stage::geometry: return "geometry";
-    case ShaderSource::Stage::fragment: return "fragment";
-    case ShaderSource::Stage::compute: return "compute";
-    }
-    return "unknown";
-}
+constexpr struct {
+    GLenum kind;
+    const char* name;
+} stages[] = {{GL_VERTEX_SHADER, "vertex"}, // in the order of ShaderSource::Stage
+              {GL_GEOMETRY_SHADER, "geometry"},
+              {GL_FRAGMENT_SHADER, "fragment"},
+              {GL_COMPUTE_SHADER, "compute"}};
 
 // A shader lives until its program is linked.
 class Shader {
@@ -85,7 +73,8 @@ Result<Program> Program::build(std::string_view label, std::span<const ShaderSou
     ProgramObject program = ProgramObject::create(label);
     std::vector<Shader> shaders;
     for (const ShaderSource& source : sources) {
-        const Shader& shader = shaders.emplace_back(gl_stage(source.stage));
+        const auto& stage = stages[static_cast<std::size_t>(source.stage)];
+        const Shader& shader = shaders.emplace_back(stage.kind);
         const GLchar* texts[] = {first.data(), source.text.data()};
         const GLint sizes[] = {static_cast<GLint>(first.size()), static_cast<GLint>(source.text.size())};
         glShaderSource(shader.id(), 2, texts, sizes);
@@ -93,7 +82,7 @@ Result<Program> Program::build(std::string_view label, std::span<const ShaderSou
         GLint compiled = GL_FALSE;
         glGetShaderiv(shader.id(), GL_COMPILE_STATUS, &compiled);
         if (compiled != GL_TRUE)
-            return shader_error(label, std::string("compiling the ") + stage_name(source.stage) + " shader",
+            return shader_error(label, std::string("compiling the ") + stage.name + " shader",
                                 info_log(shader.id(), glGetShaderiv, glGetShaderInfoLog));
         glAttachShader(program.id(), shader.id());
     }

@@ -71,7 +71,6 @@ struct ProgramKey {
 class Programs {
 public:
     Result<const Program*> surface(ProgramKey key);
-    std::size_t surface_count() const noexcept { return surfaces_.size(); }
 
     // The one program of this label, a literal.
     Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources,

@@ -279,29 +279,6 @@ TEST_P(ShadowCut, FromScratchDependsOnNoViewBefore) {
     EXPECT_EQ(triangles_of(*used), triangles_of(*unused));
 }
 
-// A look at one of several objects in a window of another size, as levels take it, leaves the others' criteria as they
-// are. All go by one reach again afterwards: else it is found anew for each in turn, frame by frame.
-TEST_F(ShadowCut, FindsItsReachOnceForAllObjects) {
-    const Setting setting = settings()[0];
-    const vdtree::VertexTree ball = ball_of(setting.grey), ground = support::built(floor(6, 48));
-    session::Scene scene = scene_of(setting, ball, ground, true);
-    scene.objects.push_back({ball.share(), scene.objects[0].placement});
-    scene.objects[1].placement.translation.x += 1.2;
-    auto session = require(session::Session::create(std::move(scene)));
-    const session::Request request{.purpose = session::Purpose::picture};
-    const vdtree::View view = view_of(setting);
-    session::Follower follower(*session);
-    ASSERT_TRUE(follower.follow(view, request));
-    vdtree::View smaller = view;
-    smaller.width = smaller.height = window_px / 2;
-    ASSERT_TRUE(session->recipe(smaller, request, 0));
-    constexpr int frames = 20;
-    const std::uint64_t before = session::ShadowReach::made();
-    for (int frame = 0; frame < frames; ++frame)
-        ASSERT_TRUE(follower.follow(vdtree::orbited(view, 0.002 * frame), request));
-    EXPECT_LE(session::ShadowReach::made() - before, 2u) << "for the view, and for those nearby";
-}
-
 INSTANTIATE_TEST_SUITE_P(Settings, ShadowCut, ::testing::Range<std::size_t>(0, 12),
                          [](const auto& of) { return std::string(settings()[of.param].name); });
 

@@ -233,13 +233,21 @@ TEST(StudyAnalysis, HasTheTableOf2007) {
     }
 }
 
+// `which`: of a right answer. `differ`: of the answer "different".
+double probability(const PictureObserver& observer, StudyTask task, double visibility) {
+    const auto below = [](double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); };
+    const double d = PictureObserver::threshold_d * std::pow(visibility, observer.exponent);
+    const double attentive = task == StudyTask::which ? below(d / std::numbers::sqrt2) : below(d - observer.criterion);
+    return (1 - observer.lapse) * attentive + observer.lapse / 2;
+}
+
 TEST(PictureObserver, IsRightInThreeOfFourAtThreshold) {
     PictureObserver observer;
     observer.lapse = 0;
-    EXPECT_NEAR(observer.probability(StudyTask::which, 0), 0.5, 1e-9);
-    EXPECT_NEAR(observer.probability(StudyTask::which, 1), 0.75, 1e-4);
-    EXPECT_NEAR(observer.probability(StudyTask::which, 100), 1, 1e-9);
-    EXPECT_NEAR(observer.probability(StudyTask::differ, 0), 0.1587, 1e-3);
+    EXPECT_NEAR(probability(observer, StudyTask::which, 0), 0.5, 1e-9);
+    EXPECT_NEAR(probability(observer, StudyTask::which, 1), 0.75, 1e-4);
+    EXPECT_NEAR(probability(observer, StudyTask::which, 100), 1, 1e-9);
+    EXPECT_NEAR(probability(observer, StudyTask::differ, 0), 0.1587, 1e-3);
     observer.lapse = 0.01;
     for (const StudyTask task : {StudyTask::which, StudyTask::differ})
         for (const double visibility : {0.0, 0.7, 1.0, 1.4, 5.0}) {
@@ -251,7 +259,7 @@ TEST(PictureObserver, IsRightInThreeOfFourAtThreshold) {
                 yes += task == StudyTask::differ ? choice == StudyChoice::different
                                                  : (choice == StudyChoice::left) == trial.is_other_left;
             }
-            const double expected = observer.probability(task, visibility);
+            const double expected = probability(observer, task, visibility);
             EXPECT_NEAR(static_cast<double>(yes) / trials, expected, 4 * std::sqrt(0.25 / trials))
                 << name(task) << ' ' << visibility;
         }

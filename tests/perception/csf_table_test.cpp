@@ -250,7 +250,7 @@ TEST(CsfTable, MonotoneFormTakesTheLargestOfWhatIsHarderToSee) {
     EXPECT_NEAR(monotone(table, {16, 0, 1}), 2, float_rounding);    // larger further out
     EXPECT_NEAR(monotone(table, {1, 10, 1}), 2, float_rounding);    // larger at a higher frequency
     EXPECT_NEAR(monotone(table, {16, 10, 100}), 2, float_rounding); // larger in dimmer light
-    EXPECT_NEAR(table.peak_sensitivity(0.0_deg, 1.0_cdm2), 16, 16 * rounding);
+    EXPECT_NEAR(table.peak_sensitivity(Degrees(0), Luminance(1)), 16, 16 * rounding);
 }
 
 TEST(CsfTable, MonotoneFormIsMonotone) {

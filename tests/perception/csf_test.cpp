@@ -71,10 +71,12 @@ TEST(Csf, FieldsAgreeAtTheFovea) {
 
 TEST(Csf, SurvivesDimLight) {
     // Below 0.0113 cd/m2 the peak of castle's transient channel would lie below 0 Hz.
-    EXPECT_NEAR(sensitivity(CsfModel::castle, {.frequency = 1.0_cpd, .luminance = 0.01_cdm2}), 5.56, 0.005);
+    EXPECT_NEAR(sensitivity(CsfModel::castle, {.frequency = CyclesPerDegree(1), .luminance = Luminance(0.01)}), 5.56,
+                0.005);
     double before = 0;
     for (double luminance = 1e-3; luminance < 1; luminance *= 1.1) {
-        const double s = sensitivity(CsfModel::castle, {.frequency = 1.0_cpd, .luminance = Luminance(luminance)});
+        const double s =
+            sensitivity(CsfModel::castle, {.frequency = CyclesPerDegree(1), .luminance = Luminance(luminance)});
         ASSERT_TRUE(std::isfinite(s)) << luminance;
         EXPECT_GT(s, 0);
         EXPECT_LT(s, 100);
@@ -130,7 +132,7 @@ TEST(Csf, IsFiniteOverTheWholeDomain) {
                 for (const double hertz : {0.0, 1e-3, 8.0, 200.0}) {
                     const double s = sensitivity(model, {.frequency = CyclesPerDegree(cpd),
                                                          .luminance = Luminance(luminance),
-                                                         .eccentricity = 120.0_deg,
+                                                         .eccentricity = Degrees(120),
                                                          .temporal = Hertz(hertz),
                                                          .area = patch_area(CyclesPerDegree(cpd))});
                     EXPECT_TRUE(std::isfinite(s) && s >= 0) << cpd << " cpd, " << luminance << " cd/m2, " << hertz;
@@ -141,8 +143,8 @@ TEST(Csf, IsFiniteOverTheWholeDomain) {
 }
 
 TEST(Csf, PatchHasARadiusOfOneAndAHalfCycles) {
-    EXPECT_DOUBLE_EQ(patch_area(1.5_cpd).value(), std::numbers::pi);
-    EXPECT_DOUBLE_EQ(patch_area(3.0_cpd).value(), std::numbers::pi / 4);
+    EXPECT_DOUBLE_EQ(patch_area(CyclesPerDegree(1.5)).value(), std::numbers::pi);
+    EXPECT_DOUBLE_EQ(patch_area(CyclesPerDegree(3)).value(), std::numbers::pi / 4);
 }
 
 TEST(Csf, WiderPatchesAreSeenBetterByTheLawOfArea) {
@@ -170,8 +172,8 @@ TEST(Csf, WiderPatchesAreSeenBetterByTheLawOfArea) {
         EXPECT_NEAR(summation_gain(frequency, unlimited, 0.6), 0.6 * summation_gain(frequency, unlimited), 1e-12);
     }
     // docs/model.md's numbers.
-    EXPECT_NEAR(summation_gain(0.5_cpd, unlimited), 2.16, 0.01);
-    EXPECT_NEAR(summation_gain(4.0_cpd, unlimited), 3.4, 0.05);
+    EXPECT_NEAR(summation_gain(CyclesPerDegree(0.5), unlimited), 2.16, 0.01);
+    EXPECT_NEAR(summation_gain(CyclesPerDegree(4), unlimited), 3.4, 0.05);
     for (const auto& [cpd, deg2, own] :
          {std::array{0.0, 1.0, 1.0}, {1.0, 0.0, 1.0}, {1.0, -1.0, 1.0}, {1.0, 1.0, 0.0}, {1.0, 1.0, std::nan("")}})
         EXPECT_TRUE(std::isnan(summation_gain(CyclesPerDegree(cpd), SquareDegrees(deg2), own)));

@@ -25,24 +25,24 @@ TEST(Display, PixelsPerDegreeOfA4kScreen) {
     Display display;
     display.width_px = 3840;
     display.pixel_pitch = Metres(0.7 / 3840);
-    display.distance = 0.7_m;
+    display.distance = Metres(0.7);
     EXPECT_NEAR(pixels_per_degree(display).value(), 67.0206, 5e-5);
 }
 
 TEST(Display, PixelsPerDegreeCanBeSet) {
     for (const double ppd : {0.1, 1.0, 34.36, 60.0, 500.0}) {
         Display display;
-        display.distance = 1.7_m;
+        display.distance = Metres(1.7);
         set_pixels_per_degree(display, PixelsPerDegree(ppd));
         EXPECT_NEAR(pixels_per_degree(display).value(), ppd, 4 * rounding * ppd);
-        EXPECT_EQ(display.distance, 1.7_m);
+        EXPECT_EQ(display.distance, Metres(1.7));
     }
 }
 
 TEST(Display, FieldGrowsLessThanThePixels) {
     const Display display;
     EXPECT_LT(physical_field(display, 1600).value(), 1600 * physical_field(display, 1).value());
-    EXPECT_LT(physical_field(display, 1000000), 180.0_deg);
+    EXPECT_LT(physical_field(display, 1000000), Degrees(180));
 }
 
 TEST(Display, AmbientLightRaisesBlackAndWhiteAlike) {

@@ -43,13 +43,11 @@ public:
         EXPECT_TRUE(counts_.draw_depth(all, {.view = frontal_view(side, side)}));
         const auto name = counts_.begin(item, picture, thresholds);
         EXPECT_TRUE(name) << name.error().message;
-        EXPECT_EQ(counts_.open_counts(), 1);
         EXPECT_TRUE(context_.finish());
         const auto taken = counts_.take();
         EXPECT_TRUE(taken);
         EXPECT_EQ(taken->size(), 1u);
         EXPECT_EQ(taken->front().name, *name);
-        EXPECT_EQ(counts_.open_counts(), 0);
         return taken->front().pixels;
     }
     DifferenceCounts& counts() { return counts_; }

@@ -123,19 +123,6 @@ TEST_F(LayersTest, TogetherAreThePictureToTheBit) {
         }
 }
 
-TEST_F(LayersTest, ALayerHasItsObjectsAlone) {
-    const Strips strips(context());
-    auto passes = LayerPasses::create(context(), 32, 32);
-    ASSERT_TRUE(
-        passes->draw(strips.objects, strips.background, {.view = ahead(32, 32), .near_plane = 0.01}, strips.split));
-    const std::vector<Item> first = {strips.objects[1]};
-    auto target = Target::create(context(), 32, 32);
-    ASSERT_TRUE(draw(first, {.view = ahead(32, 32), .near_plane = 0.01}, *target, {.colour = glm::vec4(0)}));
-    EXPECT_EQ(*read_pixels(*passes->layer(0)), *read_pixels(*target));
-    EXPECT_EQ(*read_pixels(*passes->background()), drawn(context(), {}, strips.background, ahead(32, 32)));
-    EXPECT_EQ(passes->layer(3), nullptr);
-}
-
 TEST_F(LayersTest, DrawsAtOnceWhatIsNotSplit) {
     const Strips strips(context());
     const View view = ahead(40, 30);

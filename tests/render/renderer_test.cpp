@@ -640,10 +640,4 @@ TEST_F(RendererTest, RefusesTheCutOfAnotherTree) {
     EXPECT_THAT(error_in(renderer->draw(yours.cut, frontal_view(8, 8))), ::testing::HasSubstr("another tree"));
 }
 
-TEST_F(RendererTest, RefusesToDrawToAWindowThatIsNotThere) {
-    const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
-    auto renderer = require(Renderer::create(context(), scene.tree));
-    EXPECT_THAT(error_in(renderer->draw_to_window(scene.cut, frontal_view(8, 8))), ::testing::HasSubstr("headless"));
-}
-
 } // namespace renderer_test

@@ -1,7 +1,6 @@
 #include "shadow_reach.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <queue>
 
@@ -349,16 +348,11 @@ private:
     std::vector<float> values_;            // by level, slab, row and column
 };
 
-namespace {
-std::atomic<std::uint64_t> count_of_reaches{0};
-} // namespace
-
 ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& lit,
                          std::shared_ptr<const perception::ShadowEdges> edges, glm::dvec3 eye,
                          std::span<const vdtree::Plane> window, bool moves)
     : lighting_(lit.lighting), edges_(std::move(edges)), eye_(eye), window_(window.begin(), window.end()),
       moves_(moves), edge_(receivers.edge_) {
-    count_of_reaches.fetch_add(1, std::memory_order_relaxed);
     if (receivers.balls().empty()) return;
     const glm::dvec3 middle = receivers.balls().front().sphere.centre;
     for (const Ball& ball : receivers.balls())
@@ -369,8 +363,6 @@ ShadowReach::ShadowReach(const ShadowReceivers& receivers, const LitReceivers& l
 }
 
 ShadowReach::~ShadowReach() = default;
-
-std::uint64_t ShadowReach::made() noexcept { return count_of_reaches.load(std::memory_order_relaxed); }
 
 namespace {
 

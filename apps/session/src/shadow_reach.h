@@ -75,8 +75,6 @@ public:
     bool is_of(glm::dvec3 eye, std::span<const vdtree::Plane> window) const; // this very view
     bool moves() const noexcept { return moves_; }
 
-    static std::uint64_t made() noexcept; // by this process, so far: tests see by it what is kept
-
     // World units: how far outlines of what is in this sphere may move. Infinite where no light casts a shadow of it
     // that can be seen; 0 where the eye may be in one. Cost: some hundred nanoseconds a light.
     double unseen_shift(const WorldSphere& sphere) const;

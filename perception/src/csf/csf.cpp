@@ -118,9 +118,6 @@ Stimulus stimulus_of(const Stimulus& conditions, CyclesPerDegree frequency, Degr
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-// Daly 1998: the share of a target's speed that the eye keeps up with, its drift, and its greatest speed in pursuit.
-constexpr double pursuit_gain = 0.82;
-constexpr double drift_deg_s = 0.15, greatest_pursuit_deg_s = 80;
 
 bool in_domain(double cpd, double deg_s) { return cpd > 0 && std::isfinite(cpd) && deg_s >= 0 && std::isfinite(deg_s); }
 
@@ -144,11 +141,6 @@ double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity) {
     const double wave = 2 * std::numbers::pi * spatial * frequency.value();
     const double rise = log_gain(deg_s) - log_gain(least) + std::log(deg_s / least);
     return std::exp(rise - 2 * wave * speed * (deg_s - least) / 45.9);
-}
-
-DegreesPerSecond retinal_velocity_of_target(DegreesPerSecond image) {
-    const double pursuit_deg_s = std::min(pursuit_gain * image.value() + drift_deg_s, greatest_pursuit_deg_s);
-    return DegreesPerSecond(std::abs(image.value() - pursuit_deg_s));
 }
 
 Result<Person> person(std::string_view wanted) {

@@ -190,7 +190,7 @@ private:
         NodeId other = parent_of_leaf(neighbour);
         Box places;
         PackedRange lights = empty_range;
-        ChromaRange colours = no_chroma_yet;
+        ChromaRange colours{glm::vec2(1e30f), glm::vec2(-1e30f)};
         UvBox uvs;
         thread_local std::vector<NodeId> others; // with a texture: those seen so far
         if constexpr (is_textured) others.assign(1, interior_ + neighbour);

@@ -202,7 +202,6 @@ GazeTracker::Gaze GazeTracker::at(double time_s) const {
         for (auto s = next; s != saccades_.begin();) {
             --s;
             if (!(seen_s < s->second)) break;
-            tracked.is_suppressed = true;
             seen_s = std::nextafter(s->first, s->first - 1);
         }
     }

@@ -113,7 +113,6 @@ public:
         // speed latency.
         double margin_deg = 0;
         double speed_deg_s = 0;
-        bool is_suppressed = false;
     };
 
     // Preconditions: validate() accepts the options and the display, and the window is at least 1x1 pixels.

@@ -46,13 +46,4 @@ constexpr Radians to_radians(Degrees a) { return Radians(a.value() * (std::numbe
 constexpr Degrees to_degrees(Radians a) { return Degrees(a.value() * degrees_per_radian); }
 constexpr CyclesPerDegree nyquist(PixelsPerDegree p) { return CyclesPerDegree(p.value() / 2); }
 
-inline namespace literals {
-constexpr Degrees operator""_deg(long double v) { return Degrees(static_cast<double>(v)); }
-constexpr Metres operator""_m(long double v) { return Metres(static_cast<double>(v)); }
-constexpr Hertz operator""_Hz(long double v) { return Hertz(static_cast<double>(v)); }
-constexpr Luminance operator""_cdm2(long double v) { return Luminance(static_cast<double>(v)); }
-constexpr CyclesPerDegree operator""_cpd(long double v) { return CyclesPerDegree(static_cast<double>(v)); }
-constexpr PixelsPerDegree operator""_ppd(long double v) { return PixelsPerDegree(static_cast<double>(v)); }
-} // namespace literals
-
 } // namespace unseen::perception

@@ -31,8 +31,6 @@ struct PictureObserver {
                               const perception::Display& display) const;
     // Depends on the seed, the trial's number and the visibility alone.
     StudyChoice choose(StudyTask task, const StudyTrial& trial, double visibility) const;
-    // `which`: the probability of a right answer. `differ`: that of the answer "different".
-    double probability(StudyTask task, double visibility) const;
 };
 
 } // namespace unseen::calibration

@@ -38,7 +38,6 @@ Result<std::vector<ChromaRange>> ring_chroma(const vdtree::VertexTree& tree);
 // How a vertex is drawn: its colour scaled to its luminance.
 glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance);
 
-inline constexpr ChromaRange no_chroma_yet{glm::vec2(1e30f), glm::vec2(-1e30f)};
 inline ChromaRange unite(const ChromaRange& a, const ChromaRange& b) {
     return {glm::min(a.lo, b.lo), glm::max(a.hi, b.hi)};
 }

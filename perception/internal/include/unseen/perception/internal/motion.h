@@ -22,8 +22,4 @@ inline constexpr DegreesPerSecond fastest_velocity{80};
 // coarse ones. NaN if the frequency is not above 0, or the velocity below 0.
 double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity);
 
-// How fast a target moves on the retina of an eye that follows it at min(0.82 v + 0.15, 80) degrees per second (Daly
-// 1998).
-DegreesPerSecond retinal_velocity_of_target(DegreesPerSecond image);
-
 } // namespace unseen::perception

@@ -37,8 +37,6 @@ public:
     // The counts that the GPU has finished since the last call, in order. Does not wait.
     Result<std::vector<Count>> take();
 
-    int open_counts() const noexcept; // begun, but not taken
-
 private:
     struct Impl;
     explicit DifferenceCounts(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}

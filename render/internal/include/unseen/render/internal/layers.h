@@ -75,10 +75,6 @@ public:
     const Target* mask() const noexcept; // of the last combine(): the share, in all channels; null without shadows
     double near_plane() const noexcept;  // of the last draw(), for passes that share its depths
 
-    // From the last draw() into layers; null if there was none.
-    const Target* layer(int number) const noexcept;
-    const Target* background() const noexcept;
-
     LayerCounts counts() const noexcept;
 
 private:
