@@ -95,6 +95,7 @@ TEST_P(DamagedTrees, LeadNobodyOutOfBounds) {
 TEST_P(DamagedTrees, AreToldWithTheNode) {
     TreeFile file = honest();
     const std::size_t interior = file["first_leaf"].count();
+    const auto parent = file["parents"].get<std::uint32_t>(interior - 1);
     file["parents"].set(interior - 1, 0x40000000u);
     const auto tree = require(mapped(file));
     const auto lit = LightBounds::measure(*tree);
@@ -102,7 +103,7 @@ TEST_P(DamagedTrees, AreToldWithTheNode) {
     EXPECT_THAT(lit.error().message, HasSubstr("of the mapped tree is damaged. Build the tree again"));
     EXPECT_FALSE(SoundTree::of(*tree));
     EXPECT_EQ(SoundTree::of(*tree).error().message, lit.error().message);
-    EXPECT_THAT(lit.error().message, HasSubstr("Node " + std::to_string(tree->first_damaged())));
+    EXPECT_THAT(lit.error().message, HasSubstr("Node " + std::to_string(parent)));
 }
 
 // What no node's own check looks at.
@@ -112,7 +113,6 @@ TEST_P(DamagedTrees, AreToldWithTheSection) {
         file[section].set(at, bits);
         const auto tree = require(mapped(file));
         EXPECT_THAT(error_in(SoundTree::of(*tree)), HasSubstr(what)) << section;
-        EXPECT_EQ(tree->first_damaged(), no_node);
     };
     expect_fault("displacement", 1, 0x7fc00000, "displacement has a value that is not finite");
     expect_fault("displacement", 1, 0xbf800000, "displacement is negative");

@@ -236,7 +236,7 @@ private:
         for (Triangle& t : triangles_)
             for (NodeId& corner : t)
                 if (goes_on(corner)) corner = folded_[parents_[corner]];
-        std::erase_if(triangles_, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+        std::erase_if(triangles_, uses_a_vertex_twice);
     }
 
     template <class F>

@@ -115,7 +115,7 @@ private:
             },
             [&](std::size_t a, std::size_t b) { return sorted[a] == sorted[b]; });
         for (std::size_t t = 0; t < first.size(); ++t)
-            found_.duplicate_triangles += first[t] != t && !is_collapsed(places(t));
+            found_.duplicate_triangles += first[t] != t && !uses_a_vertex_twice(places(t));
     }
 
     // By a power of two, so that products neither overflow nor vanish.
@@ -130,12 +130,11 @@ private:
         const Triangle& v = mesh_.triangles[t];
         return {place_[v[0]], place_[v[1]], place_[v[2]]};
     }
-    static bool is_collapsed(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
     bool has_no_area(std::size_t t) const {
         constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
         const Triangle corners = places(t);
-        if (is_collapsed(corners)) return true;
+        if (uses_a_vertex_twice(corners)) return true;
         const glm::dvec3 ab = at(corners[1]) - at(corners[0]), ac = at(corners[2]) - at(corners[0]);
         return glm::length(glm::cross(ab, ac)) <= rounding * std::max(glm::dot(ab, ab), glm::dot(ac, ac));
     }
@@ -189,7 +188,7 @@ private:
     void for_each_side(Body&& body) const {
         for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
             const Triangle corners = places(t);
-            if (is_collapsed(corners)) continue;
+            if (uses_a_vertex_twice(corners)) continue;
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::size_t next = (k + 1) % 3;
                 const bool runs_up = corners[k] < corners[next];
@@ -225,7 +224,7 @@ private:
         std::vector<bool> has_fan(mesh_.positions.size(), false), is_split(mesh_.positions.size(), false);
         for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
             const Triangle corners = places(t);
-            if (is_collapsed(corners)) continue;
+            if (uses_a_vertex_twice(corners)) continue;
             for (std::size_t k = 0; k < 3; ++k) {
                 if (fans.root(3 * t + k) != 3 * t + k) continue;
                 if (has_fan[corners[k]]) is_split[corners[k]] = true;
@@ -247,7 +246,7 @@ private:
         for (std::size_t t = 0; t < triangles; ++t) {
             const Triangle corners = places(t);
             const std::size_t part = parts.root(t);
-            if (is_collapsed(corners) || is_open[part]) continue;
+            if (uses_a_vertex_twice(corners) || is_open[part]) continue;
             const glm::dvec3 origin = at(places(part)[0]); // near by, for the sake of precision
             const double volume =
                 glm::dot(at(corners[0]) - origin, glm::cross(at(corners[1]) - origin, at(corners[2]) - origin));
@@ -255,7 +254,7 @@ private:
             volumes[part].sizes += std::abs(volume);
         }
         for (std::size_t t = 0; t < triangles; ++t) {
-            if (parts.root(t) != t || is_collapsed(places(t))) continue;
+            if (parts.root(t) != t || uses_a_vertex_twice(places(t))) continue;
             ++found_.components;
             if (is_open[t]) continue;
             ++found_.closed_components;

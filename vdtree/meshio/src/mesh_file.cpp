@@ -109,10 +109,7 @@ std::vector<SourceDocument::Run> shortened(const std::vector<SourceDocument::Run
     for (std::size_t i = 0; i < runs.size(); ++i) {
         const std::uint64_t first = runs[i].first_triangle - dropped;
         const std::uint64_t end = i + 1 < runs.size() ? runs[i + 1].first_triangle : mesh.triangles.size();
-        for (std::uint64_t t = runs[i].first_triangle; t < end; ++t) {
-            const Triangle& corners = mesh.triangles[t];
-            dropped += corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
-        }
+        for (std::uint64_t t = runs[i].first_triangle; t < end; ++t) dropped += uses_a_vertex_twice(mesh.triangles[t]);
         if (end - dropped > first) kept.push_back({first, runs[i].part});
     }
     return kept;

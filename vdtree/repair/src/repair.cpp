@@ -32,6 +32,7 @@ using vdtree::Index;
 using vdtree::Mesh;
 using vdtree::MeshRange;
 using vdtree::Triangle;
+using vdtree::uses_a_vertex_twice;
 
 namespace pmp = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -43,8 +44,6 @@ using Vertex = Surface::Vertex_index;
 
 constexpr double largest_gap = 0.01;          // share of the diagonal: more is no crack
 constexpr std::size_t most_hole_edges = 1000; // triangulate_hole() takes the cube of it where its fast way fails
-
-bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 Triangle from_least(Triangle t) {
     std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());

@@ -63,8 +63,6 @@ struct CleanMesh {
     Index source_triangle(Index t) const { return source_triangles.empty() ? t : source_triangles[t]; }
 };
 
-bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
-
 template <class T>
 std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
     std::vector<T> out;

@@ -53,13 +53,11 @@ Result<void> validate(const MeshView& mesh) {
 }
 
 std::uint64_t drop_degenerate_triangles(Mesh& mesh) {
-    const auto is_degenerate = [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; };
-
     // Numbers of the dropped triangles: few as a rule, so that ranges are moved by a search in them.
     std::vector<std::uint64_t> dropped;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        if (is_degenerate(mesh.triangles[i])) dropped.push_back(i);
+        if (uses_a_vertex_twice(mesh.triangles[i])) dropped.push_back(i);
         else mesh.triangles[kept++] = mesh.triangles[i];
     }
     if (dropped.empty()) return 0;

@@ -103,9 +103,7 @@ const char* fault_in_links(const TreeGeometry& g, NodeId node) {
     if (child_starts.size() < 2) return links_fault;
     for (Index t = g.first_triangle[node]; t < g.first_triangle[node + 1]; ++t) {
         const Triangle& tri = g.triangles[t];
-        if (tri[0] >= leaves || tri[1] >= leaves || tri[2] >= leaves || tri[0] == tri[1] || tri[1] == tri[2] ||
-            tri[2] == tri[0])
-            return corner_fault;
+        if (tri[0] >= leaves || tri[1] >= leaves || tri[2] >= leaves || uses_a_vertex_twice(tri)) return corner_fault;
         if (!vanishes(tri, g.first_leaf[node], g.leaf_end[node], child_starts)) return vanishing_fault;
     }
     return nullptr;
@@ -169,13 +167,6 @@ bool NodeChecks::is_in_order(NodeId node) {
     return true;
 }
 
-bool NodeChecks::look(NodeId node) {
-    if (is_in_order(node)) return true;
-    NodeId none = no_node;
-    damaged_.compare_exchange_strong(none, node, std::memory_order_relaxed);
-    return false;
-}
-
 Result<void> NodeChecks::check_all() {
     if (all_sound_.load(std::memory_order_acquire)) return {};
     const auto damaged = [](const std::string& what) {
@@ -195,10 +186,7 @@ Result<void> NodeChecks::check_all() {
             return found;
         },
         lowest);
-    if (node != no_node) {
-        look(node);
-        return damaged("Node " + std::to_string(node) + " of the mapped tree is damaged.");
-    }
+    if (node != no_node) return damaged("Node " + std::to_string(node) + " of the mapped tree is damaged.");
     if (const std::string fault = fault_in_sections(g_, l_); !fault.empty())
         return damaged("The mapped tree is damaged. " + fault);
     all_sound_.store(true, std::memory_order_release);

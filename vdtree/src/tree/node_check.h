@@ -32,20 +32,17 @@ public:
 
     // Whether the links of an interior node and the values of its children can be used. Looks at them the first time.
     bool is_sound(NodeId node) {
-        return (sound_[node >> 6].load(std::memory_order_relaxed) >> (node & 63) & 1) != 0 || look(node);
+        return (sound_[node >> 6].load(std::memory_order_relaxed) >> (node & 63) & 1) != 0 || is_in_order(node);
     }
     // Everything; see VertexTree::check().
     Result<void> check_all();
-    NodeId first_damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
 
 private:
-    bool look(NodeId node);
     bool is_in_order(NodeId node);
 
     const TreeGeometry& g_;
     const TreeLuminance& l_;
     std::unique_ptr<std::atomic<std::uint64_t>[]> sound_; // one bit a node
-    std::atomic<NodeId> damaged_{no_node};
     std::atomic<bool> all_sound_{false};
 };
 

@@ -311,8 +311,6 @@ bool VertexTree::is_prelit() const noexcept { return data_->light->prelit; }
 
 bool VertexTree::looks_sound(NodeId node) const { return checks_->is_sound(node); }
 
-NodeId VertexTree::first_damaged() const noexcept { return checks_ ? checks_->first_damaged() : no_node; }
-
 Result<void> VertexTree::check() const { return checks_ ? checks_->check_all() : Result<void>(); }
 
 Result<SoundTree> SoundTree::of(const VertexTree& tree) {

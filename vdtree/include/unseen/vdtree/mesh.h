@@ -15,6 +15,7 @@ namespace unseen::vdtree {
 
 using Index = std::uint32_t;
 using Triangle = std::array<Index, 3>;
+constexpr bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
 // RGB encoded as sRGB, and alpha.
 using Texel = std::array<std::uint8_t, 4>;

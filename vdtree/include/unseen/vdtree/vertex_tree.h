@@ -215,7 +215,6 @@ public:
     // then a node's values may be anything. A damaged node must stay folded, and for_each_child() gives it no children.
     // Cost: one bit; the first time, the node's children and triangles.
     bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
-    NodeId first_damaged() const noexcept; // the first node for which is_sound() was false, or no_node
 
     // For trees from map_tree(): checks what read_tree() checks, except for the checksums of pages. The error names a
     // damaged node or section. Cost: one parallel pass over the file, once.

@@ -162,7 +162,7 @@ Result<Made<M>> filled(Made<M>&& out, const vdtree::MeshView& soup, const AddVer
     for (std::size_t v = 0; v < soup.positions.size(); ++v) handles.push_back(add(static_cast<vdtree::Index>(v)));
     std::vector<vdtree::Triangle> refused;
     for (const vdtree::Triangle& t : soup.triangles) {
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        if (vdtree::uses_a_vertex_twice(t)) continue;
         if (!add_face(out.mesh, handles[t[0]], handles[t[1]], handles[t[2]])) refused.push_back(t);
     }
     for (const vdtree::Triangle& t : refused) {

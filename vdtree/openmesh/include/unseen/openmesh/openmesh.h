@@ -16,8 +16,6 @@
 #include <utility>
 #include <vector>
 
-#include <type_traits>
-
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
 #include <unseen/adapters/adapters.h>
