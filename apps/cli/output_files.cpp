@@ -12,7 +12,6 @@
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/tree_io.h>
 
-#include "report.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -107,6 +106,13 @@ Result<void> check_outputs(const std::vector<std::string>& inputs, const std::ve
         checked_outputs.push_back(*output);
     }
     return {};
+}
+
+Result<JsonReport> open_report(const std::vector<std::string>& inputs, std::vector<std::string> outputs,
+                               const std::string& json, const std::string& csv) {
+    outputs.insert(outputs.end(), {csv, json});
+    if (const auto ready = check_outputs(inputs, outputs); !ready) return ready.error();
+    return JsonReport::open(json, csv);
 }
 
 void print_written(const std::vector<std::string>& files) {

@@ -8,6 +8,7 @@
 #include <unseen/vdtree/result.h>
 
 #include "options.h"
+#include "report.h"
 
 namespace unseen::app {
 
@@ -15,6 +16,10 @@ namespace unseen::app {
 // and if it could not be written. Empty names and "-" are passed over. Outputs stay as they are; folders that they need
 // are made, and what a killed writer has left in them is removed.
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
+
+// Checks all outputs, these and those of the report, and opens the report.
+Result<JsonReport> open_report(const std::vector<std::string>& inputs, std::vector<std::string> outputs,
+                               const std::string& json, const std::string& csv = {});
 
 // A sentence about what a file holds, with the first input's name if it names none.
 Message with_file_name(const Error& error);

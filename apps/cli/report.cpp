@@ -72,6 +72,11 @@ Result<void> JsonReport::publish() {
     return file_ ? file_->commit() : Result<void>();
 }
 
+Result<void> JsonReport::write(const Json& json, const std::string& csv) {
+    auto prepared = prepare(json, csv);
+    return prepared ? publish() : prepared;
+}
+
 std::string csv_line(std::initializer_list<Json> cells) {
     std::string line;
     for (const Json& cell : cells) {

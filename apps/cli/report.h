@@ -33,6 +33,8 @@ public:
     // Two steps, so that nothing can fail any more between writing the results and saying so.
     Result<void> prepare(const Json& json, const std::string& csv = {});
     Result<void> publish();
+    // Both, where there is nothing else to write.
+    Result<void> write(const Json& json, const std::string& csv = {});
 
 private:
     JsonReport() = default;

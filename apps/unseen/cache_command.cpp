@@ -61,8 +61,7 @@ Result<int> run(const CacheArguments& a) {
                  {"removed", removed},
                  {"trees", Json::array()}};
     for (const session::CachedTree& tree : trees) json["trees"].push_back(to_json(tree));
-    if (auto ok = report->prepare(json); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(json); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     if (cache.is_on()) print_trees(cache, trees, removed);
     else print_line("there is no cache: $UNSEEN_CACHE is off, or no folder is known");

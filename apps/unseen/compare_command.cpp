@@ -171,9 +171,7 @@ void print(const Judgement& judgement, std::uint64_t different, double ssim) {
 }
 
 Result<int> run(const CompareArguments& a) {
-    if (const auto ready = check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.json}); !ready)
-        return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report({a.reference, a.test, a.display.file, a.display.csf}, {a.map}, a.json);
     if (!report) return report.error();
     const auto display = make_display(a.display);
     if (!display) return display.error();

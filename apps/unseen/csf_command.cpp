@@ -83,8 +83,7 @@ Result<double> sensitivity_of(const Observer& observer, const StimulusOptions& s
 }
 
 Result<int> run(const CsfArguments& a) {
-    if (const auto ready = check_outputs({a.csf}, {a.save, a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report({a.csf}, {a.save}, a.json);
     if (!report) return report.error();
     const auto observer = make_observer(a);
     if (!observer) return observer.error();
@@ -102,8 +101,7 @@ Result<int> run(const CsfArguments& a) {
             ? beyond_reach(*observer->table, Degrees(a.stimulus.eccentricity.value_or(0)), luminance, luminance)
             : std::string();
     if (!beyond.empty()) json["beyond_table"] = beyond;
-    if (auto ok = report->prepare(json); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(json); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_table({{"sensitivity", rounded(*value, 3)}, {"least visible contrast", rounded(100 / *value, 3) + "%"}});
     if (!beyond.empty()) print_note(beyond + ".");

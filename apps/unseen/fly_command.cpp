@@ -123,11 +123,10 @@ private:
 
     Result<render::Frame> next(std::optional<Drawing>& drawing) {
         if (options_.geomorph_seconds) follower_.let_pass(1 / options_.frames_a_second);
-        if (changes_) {
-            const auto draw = draw_options();
-            if (!draw) return draw.error();
+        const auto draw = draw_options();
+        if (!draw) return draw.error();
+        if (changes_)
             if (auto drawn = changes_->before(follower_, request_, view_, *draw); !drawn) return drawn.error();
-        }
         const auto start = vdtree::Clock::now();
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
@@ -143,20 +142,14 @@ private:
         }
         Result<render::Frame> frame = render::Frame{};
         if (drawing) {
-            const auto draw = draw_options();
-            if (!draw) return draw.error();
-            const auto cuts = session::drawn_cuts(follower_, session_.scene().objects.size());
-            if (draws_frames(options_)) {
-                frame = drawing->renderer.draw(cuts, view_, *draw);
-                if (!frame) return frame;
-                record.draw_ms = frame->draw_ms;
-                record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
-            }
+            frame =
+                drawing->renderer.draw(session::drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
+            if (!frame) return frame;
+            record.draw_ms = frame->draw_ms;
+            record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
         }
         record.frame_ms = vdtree::ms_since(start);
         if (changes_) {
-            const auto draw = draw_options();
-            if (!draw) return draw.error();
             const auto judged =
                 changes_->after(follower_, request_, view_, *draw, *frame, 1 / options_.frames_a_second);
             if (!judged) return judged.error();
@@ -190,8 +183,8 @@ struct Preparation {
 Result<Preparation> prepare(const FlyArguments& options) {
     std::vector<std::string> inputs = inputs_of(options.model, options.view, options.display);
     inputs.insert(inputs.end(), {options.path, options.gaze.trace});
-    if (const auto ready = check_outputs(inputs, {options.csv, options.plot, options.json, options.pictures}); !ready)
-        return ready.error();
+    auto report = open_report(inputs, {options.plot, options.pictures}, options.json, options.csv);
+    if (!report) return report.error();
     auto path = CameraPath::read(options.path, options.view.up.value_or(vdtree::View().up));
     if (!path) return path.error();
     if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))
@@ -201,8 +194,6 @@ Result<Preparation> prepare(const FlyArguments& options) {
                          "gaze_x and gaze_y."};
     auto gaze = session::GazePlayer::create(options.gaze);
     if (!gaze) return gaze.error();
-    auto report = JsonReport::open(options.json, options.csv);
-    if (!report) return report.error();
     std::optional<render::Context> context;
     if (draws_frames(options)) {
         auto made = render::Context::headless();

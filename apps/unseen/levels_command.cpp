@@ -167,15 +167,14 @@ void print(const LevelsArguments& options, const LevelFlight& flight, const sess
 Result<void> draw_levels(const LevelsArguments& options) {
     std::vector<std::string> inputs = inputs_of(options.model, options.view, options.display);
     inputs.insert(inputs.end(), {options.selection, options.path});
-    if (const auto ready = check_outputs(inputs, {options.json, options.out}); !ready) return ready;
+    auto report = open_report(inputs, {options.out}, options.json);
+    if (!report) return report.error();
     std::optional<CameraPath> path;
     if (!options.path.empty()) {
         auto read = CameraPath::read(options.path, options.view.up.value_or(vdtree::View().up));
         if (!read) return read.error();
         path = std::move(*read);
     }
-    auto report = JsonReport::open(options.json);
-    if (!report) return report.error();
     const auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(options.model, options.view, options.display);

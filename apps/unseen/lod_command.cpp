@@ -172,14 +172,13 @@ Result<int> run(LodArguments& a) {
     std::vector<std::string> files;
     if (a.is_separate)
         for (int i = 0; i < a.options.chain.levels; ++i) files.push_back(level_file(a.out, i));
-    std::vector<std::string> outputs = {a.out, a.csv, a.json, a.sheet};
+    std::vector<std::string> outputs = {a.out, a.sheet};
     outputs.insert(outputs.end(), files.begin(), files.end());
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), outputs); !ready) return ready.error();
+    auto report = open_report(inputs_of(a.model, a.view, a.display), outputs, a.json, a.csv);
+    if (!report) return report.error();
     if (a.gltf.meshopt && !meshio::has_meshoptimizer())
         return Error{ErrorCode::unsupported, "--meshopt is not in this build, for it was made without the library "
                                              "meshoptimizer: install libmeshoptimizer-dev and build again."};
-    auto report = JsonReport::open(a.json, a.csv);
-    if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto session = open_session(a.model, a.view, a.display);
@@ -198,8 +197,7 @@ Result<int> run(LodArguments& a) {
         if (!sheet) return sheet.error();
         if (auto ok = perception::write_image(a.sheet, *sheet); !ok) return ok.error();
     }
-    if (auto ok = report->prepare(to_json(*lod, *session, *written, *separate), to_csv(*lod)); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(to_json(*lod, *session, *written, *separate), to_csv(*lod)); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_scene(*session);
     print(*lod, *written);

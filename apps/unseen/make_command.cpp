@@ -41,8 +41,7 @@ Result<void> write(const std::string& file, const vdtree::Mesh& mesh) {
 }
 
 Result<int> run(const SubdivideArguments& a) {
-    if (const auto ready = check_outputs({a.mesh}, {a.out, a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report({a.mesh}, {a.out}, a.json);
     if (!report) return report.error();
     auto read = read_mesh_file(a.mesh, a.view.texture.skips_bad);
     if (!read) return read.error();
@@ -99,8 +98,7 @@ struct SceneArguments {
 };
 
 Result<int> run(SceneArguments& a) {
-    if (const auto ready = check_outputs(a.statues, {a.out, a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report(a.statues, {a.out}, a.json);
     if (!report) return report.error();
     a.options.statues.assign(a.statues.begin(), a.statues.end());
     const auto made = make_scene(a.out, a.options);
@@ -111,8 +109,7 @@ Result<int> run(SceneArguments& a) {
                        {"meshes", made->meshes},
                        {"mesh_triangles", made->mesh_triangles},
                        {"background_triangles", made->background_triangles}};
-    if (auto ok = report->prepare(json); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(json); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_line("made " + grouped(made->objects) + (made->objects == 1 ? " object" : " objects") + " of " +
                grouped(made->triangles) + " triangles, and " + grouped(made->background_triangles) +

@@ -62,12 +62,10 @@ void print(const RenderArguments& a, const session::Session& session, const sess
 }
 
 Result<int> run(RenderArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
-        return ready.error();
+    auto report = open_report(inputs_of(a.model, a.view, a.display), {a.out}, a.json);
+    if (!report) return report.error();
     const auto gaze = session::GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
-    auto report = JsonReport::open(a.json);
-    if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     a.view.measures = a.what.needs_measurement();

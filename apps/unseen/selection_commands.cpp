@@ -137,8 +137,7 @@ Result<int> precompute(PrecomputeArguments& a) {
         print_note("interrupted: the same command goes on from '" + a.out +
                    ".part', which may be removed to begin anew.");
     if (!done) return done.error();
-    if (auto ok = report.prepare(to_json(facts_of(*done))); !ok) return ok.error();
-    if (auto ok = report.publish(); !ok) return ok.error();
+    if (auto ok = report.write(to_json(facts_of(*done))); !ok) return ok.error();
     if (report.is_on_stdout()) return exit_done;
     print(*done, a.is_verbose);
     print_written({a.out, a.json});
@@ -187,8 +186,7 @@ Result<int> selection_info(const SelectionInfoArguments& a) {
         {"objects_in_sight", "objects in sight, mean", in_sight / of, rounded(in_sight / of, 3)},
         {"mean_loss", "lost a pixel, mean", loss / of, rounded(loss / of, 3)},
         {"selected_by_level", "", by_level}};
-    if (auto ok = report->prepare(to_json(facts)); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(to_json(facts)); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     for (std::size_t level = 0; level < levels; ++level)
         facts.push_back(count_of("", "selected at level " + std::to_string(level), by_level[level]));

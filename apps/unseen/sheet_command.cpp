@@ -41,9 +41,7 @@ Result<ContactSheet> draw(session::Session& session, render::Context& context, c
 }
 
 Result<int> run(const SheetArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.maps, a.json}); !ready)
-        return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report(inputs_of(a.model, a.view, a.display), {a.out, a.maps}, a.json);
     if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();

@@ -47,9 +47,7 @@ Result<std::vector<Message>> write_scene(const std::string& file, const session:
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
 Result<int> run(const SimplifyArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
-        return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report(inputs_of(a.model, a.view, a.display), {a.out}, a.json);
     if (!report) return report.error();
     ViewOptions view = a.view;
     view.measures = a.what.needs_measurement();

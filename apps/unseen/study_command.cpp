@@ -334,14 +334,12 @@ void print(const calibration::StudyAnalysis& analysis, bool markdown) {
 }
 
 Result<int> analyse_study(StudyArguments& a) {
-    if (const auto ready = check_outputs(a.files, {a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
+    auto report = open_report(a.files, {}, a.json);
     if (!report) return report.error();
     const std::vector<fs::path> files(a.files.begin(), a.files.end());
     const auto analysis = calibration::analyse_answers(files);
     if (!analysis) return analysis.error();
-    if (auto ok = report->prepare(to_json(*analysis)); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
+    if (auto ok = report->write(to_json(*analysis)); !ok) return ok.error();
     if (!report->is_on_stdout()) print(*analysis, a.markdown);
     return exit_done;
 }

@@ -114,9 +114,7 @@ void print(const session::Tradeoff& tradeoff, const session::Session& session, i
 }
 
 Result<int> run(TradeoffArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.csv, a.json}); !ready)
-        return ready.error();
-    auto report = JsonReport::open(a.json, a.csv);
+    auto report = open_report(inputs_of(a.model, a.view, a.display), {}, a.json, a.csv);
     if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
@@ -131,15 +129,14 @@ Result<int> run(TradeoffArguments& a) {
     if (!tradeoff) return tradeoff.error();
     Json points = Json::array();
     for (const session::TradeoffPoint& point : tradeoff->points) points.push_back(to_json(point));
-    if (auto ok = report->prepare({{"source_triangles", session->triangle_count()},
-                                   {"samples", tradeoff->samples},
-                                   {"measuring_s", tradeoff->measuring_s},
-                                   {"points", std::move(points)},
-                                   {"left_out", tradeoff->left_out}},
-                                  to_csv(*tradeoff));
+    if (auto ok = report->write({{"source_triangles", session->triangle_count()},
+                                 {"samples", tradeoff->samples},
+                                 {"measuring_s", tradeoff->measuring_s},
+                                 {"points", std::move(points)},
+                                 {"left_out", tradeoff->left_out}},
+                                to_csv(*tradeoff));
         !ok)
         return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_scene(*session);
     print(*tradeoff, *session, a.options.samples);
