@@ -28,7 +28,7 @@ vdtree::View view_on_walk(const vdtree::View& first, int frame) {
 // The program's own first, and one thing changed in each of the others.
 std::vector<std::pair<std::string, session::LevelControlOptions>> level_variants() {
     const session::LevelControlOptions usual;
-    return {{"modern, " + std::to_string(usual.layers) + " layers, whole maps, 32 bits, tested every " +
+    return {{"modern, " + std::to_string(usual.layers) + " layers, tested every " +
                  std::to_string(usual.frames_a_layer) + " frames",
              {}},
             {"rpg99", {.maps = session::MapRecipe::rpg99}},
@@ -36,9 +36,6 @@ std::vector<std::pair<std::string, session::LevelControlOptions>> level_variants
             {"2 layers", {.layers = 2}},
             {"3 layers", {.layers = 3}},
             {"8 layers", {.layers = 8}},
-            {"maps of half the resolution", {.map_block = 2}},
-            {"maps of a quarter", {.map_block = 4}},
-            {"16 bits", {.half_floats = true}},
             {"tested every frame", {.frames_a_layer = 1}},
             {"tested every 2 frames", {.frames_a_layer = 2}},
             {"tested every 8 frames", {.frames_a_layer = 8}},

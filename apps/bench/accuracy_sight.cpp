@@ -115,32 +115,13 @@ private:
 
 // ---- maps
 
-perception::Image block_means(const perception::Image& image, int block) {
-    perception::Image out{
-        .width = (image.width + block - 1) / block, .height = (image.height + block - 1) / block, .values = {}};
-    for (int y = 0; y < out.height; ++y)
-        for (int x = 0; x < out.width; ++x) {
-            double sum = 0;
-            int count = 0;
-            for (int v = y * block; v < std::min((y + 1) * block, image.height); ++v)
-                for (int u = x * block; u < std::min((x + 1) * block, image.width); ++u, ++count)
-                    sum += static_cast<double>(image.at(u, v));
-            out.values.push_back(static_cast<float>(sum / count));
-        }
-    return out;
-}
-
-// Of each pixel of the truth, the relative error of a map of blocks.
-std::vector<double> map_errors(const std::vector<float>& map, int map_width, int block,
-                               const perception::Image& truth) {
+// Of each pixel of the truth.
+std::vector<double> relative_errors(const std::vector<float>& map, const perception::Image& truth) {
     std::vector<double> errors;
-    for (int y = 0; y < truth.height; ++y)
-        for (int x = 0; x < truth.width; ++x) {
-            const double wanted = static_cast<double>(truth.at(x, y));
-            const auto at = static_cast<std::size_t>(y / block) * static_cast<std::size_t>(map_width) +
-                            static_cast<std::size_t>(x / block);
-            errors.push_back(std::abs(static_cast<double>(map[at]) - wanted) / wanted);
-        }
+    for (std::size_t i = 0; i < map.size(); ++i) {
+        const auto wanted = static_cast<double>(truth.values[i]);
+        errors.push_back(std::abs(static_cast<double>(map[i]) - wanted) / wanted);
+    }
     return errors;
 }
 
@@ -148,7 +129,6 @@ std::vector<double> map_errors(const std::vector<float>& map, int map_width, int
 struct MapVariant {
     std::string name;
     bool is_modern;        // else rpg99's
-    int block = 1;         // each of its pixels stands for so many by so many
     std::size_t bands = 0; // at most; 0: all
 };
 
@@ -163,21 +143,16 @@ public:
     explicit MapMaker(AccuracySubject& subject) : context_(subject.context), observer_(subject.session.observer()) {}
 
     perception::JudgeOptions judging() const { return session::judge_options(observer_); }
-    double field_degrees(int width, int block) const {
-        return perception::physical_field(display(block), width).value();
-    }
+    double field_degrees(int width) const { return perception::physical_field(observer_.display, width).value(); }
 
     GpuMap make(const perception::Image& picture, const MapVariant& variant) const {
-        return variant.is_modern ? modern(picture, variant) : rpg99(picture, variant);
+        return variant.is_modern ? modern(picture, variant) : rpg99(picture);
     }
 
 private:
     GpuMap modern(const perception::Image& picture, const MapVariant& variant) const {
-        perception::JudgeOptions how = judging();
-        how.display = display(variant.block);
-        if (how.gaze_px) *how.gaze_px /= static_cast<double>(variant.block);
         const auto [least, most] = std::ranges::minmax(picture.values);
-        auto tables = require(perception::judge_tables(picture.width, picture.height, least, most, how));
+        auto tables = require(perception::judge_tables(picture.width, picture.height, least, most, judging()));
         if (variant.bands > 0 && tables.bands.size() > variant.bands) tables.bands.resize(variant.bands);
         auto up = upload(picture);
         auto passes = require(render::VisibilityPasses::create(context_, tables, up.texture()));
@@ -186,19 +161,11 @@ private:
             require(passes.map_thresholds());
         });
     }
-    GpuMap rpg99(const perception::Image& picture, const MapVariant& variant) const {
-        const auto tables =
-            require(perception::rpg99_tables(picture.width, field_degrees(picture.width, variant.block)));
+    GpuMap rpg99(const perception::Image& picture) const {
+        const auto tables = require(perception::rpg99_tables(picture.width, field_degrees(picture.width)));
         auto up = upload(picture);
         auto passes = require(render::ElevationPasses::create(context_, picture.width, picture.height, tables));
         return timed(passes, "against rpg99's", [&] { require(passes.map_thresholds(up.texture())); });
-    }
-    perception::Display display(int block) const {
-        perception::Display display = observer_.display;
-        if (block > 1)
-            perception::set_pixels_per_degree(
-                display, perception::PixelsPerDegree(perception::pixels_per_degree(display).value() / block));
-        return display;
     }
     render::LuminanceImage upload(const perception::Image& picture) const {
         return require(render::LuminanceImage::create(context_, picture.width, picture.height, picture.values));
@@ -301,32 +268,26 @@ AccuracyPoints map_points(AccuracySubject& subject) {
     const double modern_s =
         seconds_of([&] { modern = require(perception::threshold_map_modern(picture, maker.judging())); });
     const double rpg99_s = seconds_of(
-        [&] { rpg99 = require(perception::rpg99_map(picture, picture, maker.field_degrees(picture.width, 1))); });
+        [&] { rpg99 = require(perception::rpg99_map(picture, picture, maker.field_degrees(picture.width))); });
     AccuracyPoints points = {{.name = "modern, CPU", .values = {1e3 * modern_s, 0, 0, 4}},
                              {.name = "rpg99, CPU",
                               .values = {1e3 * rpg99_s, 0, 0, 4},
                               .note = "thresholds are " + rounded(median_ratio(rpg99.threshold, modern), 2) +
                                       " x modern's at the median pixel"}};
     for (const MapVariant& variant : {MapVariant{"modern", true},
-                                      {"modern, half the resolution", true, 2},
-                                      {"modern, a quarter", true, 4},
-                                      {"modern, 1 band", true, 1, 1},
-                                      {"modern, 2 bands", true, 1, 2},
-                                      {"modern, 3 bands", true, 1, 3},
-                                      {"modern, 4 bands", true, 1, 4},
-                                      {"modern, 5 bands", true, 1, 5},
-                                      {"rpg99", false},
-                                      {"rpg99, half the resolution", false, 2},
-                                      {"rpg99, a quarter", false, 4}}) {
-        const perception::Image small = block_means(picture, variant.block);
-        const GpuMap map = maker.make(small, variant);
+                                      {"modern, 1 band", true, 1},
+                                      {"modern, 2 bands", true, 2},
+                                      {"modern, 3 bands", true, 3},
+                                      {"modern, 4 bands", true, 4},
+                                      {"modern, 5 bands", true, 5},
+                                      {"rpg99", false}}) {
+        const GpuMap map = maker.make(picture, variant);
         const std::vector<double> errors =
-            map_errors(map.thresholds, small.width, variant.block, variant.is_modern ? modern : rpg99.threshold);
+            relative_errors(map.thresholds, variant.is_modern ? modern : rpg99.threshold);
         constexpr double of_picture = 4, of_map = 4; // bytes a pixel
-        const double share = static_cast<double>(small.values.size()) / static_cast<double>(picture.values.size());
         points.push_back(
             {.name = variant.name,
-             .values = {map.milliseconds, quantile(errors, 0.99), quantile(errors, 0.5), share * (of_picture + of_map)},
+             .values = {map.milliseconds, quantile(errors, 0.99), quantile(errors, 0.5), of_picture + of_map},
              .note = map.note,
              .is_default = variant.name == "modern"});
     }

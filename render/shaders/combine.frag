@@ -1,4 +1,4 @@
-// Layers put together by their depths, all of them or all but one; or, of block by block pixels, the mean of that.
+// Layers put together by their depths, all of them or all but one.
 // What is nearer hides what is farther. Of equal depths the earlier layer is taken, and the background last, as where
 // all is drawn at once.
 layout(binding = 0) uniform sampler2DArray colours; // slice 0: the background
@@ -7,8 +7,7 @@ layout(binding = 1) uniform sampler2DArray depths;  // 1 at the near plane, 0 at
 layout(binding = 2) uniform sampler2D mask;        // of the layer that is left out: the share of their light ...
 layout(binding = 3) uniform sampler2D mask_depths; // ... that its surfaces get, which are here
 #endif
-layout(location = 0) uniform ivec4 layers; // how many, the one that is left out (-1: none), pixels of a block's side
-layout(location = 1) uniform ivec2 size;   // of the layers
+layout(location = 0) uniform ivec2 layers; // how many, the one that is left out (-1: none)
 
 layout(location = 0) out vec4 pixel;
 
@@ -37,12 +36,4 @@ vec4 nearest_at(ivec2 at) {
     return colour;
 }
 
-void main() {
-    ivec2 first = ivec2(gl_FragCoord.xy) * layers.z, past = min(first + layers.z, size);
-    vec4 sum = vec4(0.0);
-    for (int y = first.y; y < past.y; ++y)
-        for (int x = first.x; x < past.x; ++x)
-            sum += nearest_at(ivec2(x, y));
-    ivec2 count = past - first;
-    pixel = sum / float(count.x * count.y);
-}
+void main() { pixel = nearest_at(ivec2(gl_FragCoord.xy)); }

@@ -20,25 +20,21 @@ struct DifferenceCounts::Impl {
     Impl(const Context& context_, Target depth_)
         : context(context_), depth(std::move(depth_)), queries(context_, GL_SAMPLES_PASSED) {}
 
-    Result<std::uint64_t> begin(const Item& item, const LuminanceTexture& picture, const ThresholdTexture& thresholds) {
+    Result<std::uint64_t> begin(const Item& item, const LuminanceTexture& picture, unsigned thresholds) {
         if (auto ok = check_texture(picture); !ok) return ok.error();
         if (picture.width != depth.width() || picture.height != depth.height())
             return invalid_argument("The picture to compare with is of " + size_text(picture.width, picture.height) +
                                     " pixels, and the depth of " + size_text(depth.width(), depth.height()) + ".");
-        if (thresholds.block < 1) return invalid_argument("A threshold is of a block of at least 1x1 pixels.");
-        const auto blocks = [&](int pixels) { return (pixels + thresholds.block - 1) / thresholds.block; };
-        if (auto ok =
-                check_texture({.id = thresholds.id, .width = blocks(depth.width()), .height = blocks(depth.height())});
-            !ok)
+        if (auto ok = check_texture({.id = thresholds, .width = depth.width(), .height = depth.height()}); !ok)
             return ok.error();
         const auto pass = SurfacePass::prepare(std::span<const Item>(&item, 1), *camera, depth.impl(), 0,
                                                SurfacePass::Use::comparison);
         if (!pass) return pass.error();
         const GLuint query = queries.take();
         glBindTextureUnit(picture_unit, picture.id);
-        glBindTextureUnit(thresholds_unit, thresholds.id);
+        glBindTextureUnit(thresholds_unit, thresholds);
         glBeginQuery(GL_SAMPLES_PASSED, query);
-        pass->compare(depth.impl(), camera->point, glm::vec4(picture.channel, picture.scale, thresholds.block, 0));
+        pass->compare(depth.impl(), camera->point, glm::vec4(picture.channel, picture.scale, 0, 0));
         glEndQuery(GL_SAMPLES_PASSED);
         glBindTextureUnit(picture_unit, 0);
         glBindTextureUnit(thresholds_unit, 0);
@@ -77,8 +73,7 @@ Result<void> DifferenceCounts::draw_depth(std::span<const Item> items, const Cam
     return {};
 }
 
-Result<std::uint64_t> DifferenceCounts::begin(const Item& item, const LuminanceTexture& picture,
-                                              const ThresholdTexture& thresholds) {
+Result<std::uint64_t> DifferenceCounts::begin(const Item& item, const LuminanceTexture& picture, unsigned thresholds) {
     if (!impl_->camera) return invalid_argument("Pixels are counted where depth was drawn before: call draw_depth().");
     return in_context(impl_->context, "Counting differences", [&] { return impl_->begin(item, picture, thresholds); });
 }

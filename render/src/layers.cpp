@@ -12,13 +12,10 @@
 namespace unseen::render {
 namespace {
 
-constexpr int most_block = 16;
 // Largest ratio of the farthest to the nearest centre's distance: nearer planes would divide what touches the eye.
 constexpr double largest_ratio = 1e3;
 
-constexpr int counts_location = 0, size_location = 1; // of combine.frag
-
-std::uint64_t bytes_a_pixel(ColourFormat format) { return format == ColourFormat::rgba32f ? 16 : 8; }
+constexpr int counts_location = 0; // of combine.frag
 
 Result<void> check_layers(int layers) {
     if (layers >= 1 && layers <= most_layers) return {};
@@ -70,8 +67,8 @@ Result<LayerSplit> split_into_layers(std::span<const glm::dvec3> centres, const 
 }
 
 struct LayerPasses::Impl {
-    Impl(const Context& context_, Target composite_, Target combination_, const LayerOptions& options_)
-        : context(context_), options(options_), composite(std::move(composite_)), combination(std::move(combination_)),
+    Impl(const Context& context_, Target composite_, Target combination_, int most_)
+        : context(context_), most(most_), composite(std::move(composite_)), combination(std::move(combination_)),
           guard(context_) {}
 
     struct Slice {
@@ -86,8 +83,7 @@ struct LayerPasses::Impl {
         const int width = composite.width(), height = composite.height();
         colours = Texture2dArray::create("layers");
         depths = Texture2dArray::create("depths of layers");
-        const GLenum format = options.format == ColourFormat::rgba32f ? GL_RGBA32F : GL_RGBA16F;
-        glTextureStorage3D(colours.id(), 1, format, width, height, count);
+        glTextureStorage3D(colours.id(), 1, GL_RGBA32F, width, height, count);
         glTextureStorage3D(depths.id(), 1, GL_DEPTH_COMPONENT32F, width, height, count);
         for (int i = 0; i < count; ++i) {
             FramebufferObject framebuffer = FramebufferObject::create(i == 0 ? "background" : "layer");
@@ -120,8 +116,7 @@ struct LayerPasses::Impl {
     // Which share of its light comes to each of the layer's surfaces, and where these are.
     Result<void> draw_mask(int left_out, const Shadows& cast_by_others) {
         if (!mask) {
-            auto made = Target::create(context, composite.width(), composite.height(),
-                                       {.colours = {options.format}, .label = "mask of shadows"});
+            auto made = Target::create(context, composite.width(), composite.height(), {.label = "mask of shadows"});
             if (!made) return made.error();
             mask = std::move(*made);
         }
@@ -139,7 +134,7 @@ struct LayerPasses::Impl {
         return {};
     }
 
-    Result<void> put_together(int left_out, int block, const Target& to, const Target* masked_by = nullptr) {
+    Result<void> put_together(int left_out, const Target& to, const Target* masked_by = nullptr) {
         Programs& programs = context.impl().programs;
         const auto found = masked_by ? programs.full_screen("combine masked", shaders::combine_frag, {"MASKED"})
                                      : programs.full_screen("combine", shaders::combine_frag);
@@ -154,8 +149,7 @@ struct LayerPasses::Impl {
             glBindTextureUnit(2, masked_by->colour_texture());
             glBindTextureUnit(3, masked_by->depth_texture());
         }
-        glProgramUniform4i(program.id(), counts_location, layer_count, left_out, block, 0);
-        program.set(size_location, glm::ivec2(composite.width(), composite.height()));
+        program.set(counts_location, glm::ivec2(layer_count, left_out));
         programs.draw_full_screen(program);
         for (GLuint unit = 0; unit < 4; ++unit) glBindTextureUnit(unit, 0);
         ++done.full_screen_passes;
@@ -163,7 +157,7 @@ struct LayerPasses::Impl {
     }
 
     Context context; // first, and so gone last
-    LayerOptions options;
+    int most;        // layers
     Target composite, combination;
     Texture2dArray colours, depths;
     std::optional<Target> mask; // made when a combination first has one
@@ -182,20 +176,13 @@ struct LayerPasses::Impl {
     ContextGuard guard;
 };
 
-Result<LayerPasses> LayerPasses::create(const Context& context, int width, int height, const LayerOptions& options) {
-    if (auto valid = check_layers(options.most); !valid) return valid.error();
-    if (options.format == ColourFormat::srgb8)
-        return invalid_argument("Layers keep luminance: choose rgba32f or rgba16f.");
-    if (options.block < 1 || options.block > most_block)
-        return invalid_argument("A combination's pixel is of 1 to " + std::to_string(most_block) +
-                                " pixels a side, not " + std::to_string(options.block) + ".");
-    auto composite = Target::create(context, width, height, {.colours = {options.format}, .label = "composite"});
+Result<LayerPasses> LayerPasses::create(const Context& context, int width, int height, int most) {
+    if (auto valid = check_layers(most); !valid) return valid.error();
+    auto composite = Target::create(context, width, height, {.label = "composite"});
     if (!composite) return composite.error();
-    const auto blocks = [&](int pixels) { return (pixels + options.block - 1) / options.block; };
-    auto combination = Target::create(context, blocks(width), blocks(height),
-                                      {.colours = {options.format}, .depth = false, .label = "combination"});
+    auto combination = Target::create(context, width, height, {.depth = false, .label = "combination"});
     if (!combination) return combination.error();
-    return LayerPasses(std::make_unique<Impl>(context, std::move(*composite), std::move(*combination), options));
+    return LayerPasses(std::make_unique<Impl>(context, std::move(*composite), std::move(*combination), most));
 }
 
 Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const Item> background, const Camera& camera,
@@ -207,9 +194,9 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
     if (split.layer_of.size() != objects.size())
         return invalid_argument("The layers are of " + std::to_string(split.layer_of.size()) + " objects, not of " +
                                 std::to_string(objects.size()) + ".");
-    if (split.count > own.options.most)
+    if (split.count > own.most)
         return invalid_argument("The objects are in " + std::to_string(split.count) + " layers, and there are only " +
-                                std::to_string(own.options.most) + ".");
+                                std::to_string(own.most) + ".");
     const auto is_none = [&](int layer) { return layer < 0 || layer >= std::max(split.count, 1); };
     if (std::ranges::any_of(split.layer_of, is_none)) return invalid_argument("An object is in a layer that is none.");
     std::vector<Item> all(objects.begin(), objects.end());
@@ -231,7 +218,7 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
             own.combinations = objects.empty() ? 0 : 1;
             return {};
         }
-        if (auto made = own.need_slices(own.options.most + 1); !made) return made;
+        if (auto made = own.need_slices(own.most + 1); !made) return made;
         if (auto drawn = own.draw_slice(0, background, clear); !drawn) return drawn;
         own.has_background = true;
         std::vector<Item> items;
@@ -243,7 +230,7 @@ Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const It
                 return drawn;
         }
         own.layer_count = own.combinations = split.count;
-        return own.put_together(-1, 1, own.composite);
+        return own.put_together(-1, own.composite);
     });
 }
 
@@ -263,7 +250,7 @@ Result<void> LayerPasses::combine(int left_out, const Shadows* cast_by_others) {
             if (auto drawn = own.draw_mask(left_out, *cast_by_others); !drawn) return drawn;
             own.is_masked = true;
         }
-        return own.put_together(own.layer_count == 0 ? -1 : left_out, own.options.block, own.combination,
+        return own.put_together(own.layer_count == 0 ? -1 : left_out, own.combination,
                                 own.is_masked ? &*own.mask : nullptr);
     });
 }
@@ -280,7 +267,7 @@ LayerCounts LayerPasses::counts() const noexcept {
     const auto pixels = [](const Target& t) {
         return static_cast<std::uint64_t>(t.width()) * static_cast<std::uint64_t>(t.height());
     };
-    const std::uint64_t colour = bytes_a_pixel(impl_->options.format);
+    constexpr std::uint64_t colour = 16; // bytes a pixel
     counts.textures = 3;
     counts.texture_bytes = pixels(impl_->composite) * (colour + 4) + pixels(impl_->combination) * colour;
     if (!impl_->slices.empty()) {

@@ -35,7 +35,6 @@ Result<void> check(int width, int height, const TargetOptions& options) {
 GLenum gl_format(ColourFormat format) {
     switch (format) {
     case ColourFormat::rgba32f: return GL_RGBA32F;
-    case ColourFormat::rgba16f: return GL_RGBA16F;
     case ColourFormat::srgb8: return GL_SRGB8_ALPHA8;
     case ColourFormat::shares8: return GL_RGBA8;
     }

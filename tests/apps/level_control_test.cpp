@@ -281,32 +281,27 @@ TEST_F(LevelControlTest, AChangeFades) {
 
 TEST_F(LevelControlTest, MapsAreThoseOfTheCpu) {
     Session session = bodies(row);
-    for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99})
-        for (const int block : {1, 2}) {
-            auto control =
-                require(LevelControl::create(context(), session, ahead(127), {.maps = maps, .map_block = block}));
-            ASSERT_TRUE(control->draw(ahead(127)));
-            const auto map = require(control->thresholds(1));
-            ASSERT_EQ(control->map_width(), block == 1 ? 127 : 64);
-            const auto relative = render::read_luminance(control->layers().combination());
-            perception::Image picture{control->map_width(), control->map_height(), 1, *relative};
-            for (float& v : picture.values)
-                v = static_cast<float>(
-                    perception::to_luminance(session.observer().display, static_cast<double>(v)).value());
-            auto options = judging(session);
-            perception::set_pixels_per_degree(
-                options.display,
-                perception::PixelsPerDegree(perception::pixels_per_degree(options.display).value() / block));
-            const double field = perception::physical_field(options.display, picture.width).value();
-            std::vector<float> wanted;
-            if (maps == MapRecipe::modern) wanted = perception::threshold_map_modern(picture, options)->values;
-            else wanted = perception::rpg99_map(picture, picture, field)->threshold.values;
-            std::vector<double> errors;
-            for (std::size_t i = 0; i < wanted.size(); ++i)
-                errors.push_back(std::abs(static_cast<double>((*map)[i]) / static_cast<double>(wanted[i]) - 1));
-            std::sort(errors.begin(), errors.end());
-            EXPECT_LT(errors[errors.size() - 1 - errors.size() / 1000], 1e-3) << block;
-        }
+    for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99}) {
+        auto control = require(LevelControl::create(context(), session, ahead(127), {.maps = maps}));
+        ASSERT_TRUE(control->draw(ahead(127)));
+        const auto map = require(control->thresholds(1));
+        const auto relative = render::read_luminance(control->layers().combination());
+        perception::Image picture{control->map_width(), control->map_height(), 1, *relative};
+        ASSERT_EQ(picture.width, 127);
+        for (float& v : picture.values)
+            v = static_cast<float>(
+                perception::to_luminance(session.observer().display, static_cast<double>(v)).value());
+        const auto options = judging(session);
+        const double field = perception::physical_field(options.display, picture.width).value();
+        const std::vector<float> wanted = maps == MapRecipe::modern
+                                              ? perception::threshold_map_modern(picture, options)->values
+                                              : perception::rpg99_map(picture, picture, field)->threshold.values;
+        std::vector<double> errors;
+        for (std::size_t i = 0; i < wanted.size(); ++i)
+            errors.push_back(std::abs(static_cast<double>((*map)[i]) / static_cast<double>(wanted[i]) - 1));
+        std::sort(errors.begin(), errors.end());
+        EXPECT_LT(errors[errors.size() - 1 - errors.size() / 1000], 1e-3);
+    }
 }
 
 TEST_F(LevelControlTest, OtherMethodsGoByDistanceAndByArea) {
@@ -369,7 +364,6 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_THAT(refused({.chain = {.levels = 0}}), HasSubstr("1 to 16 levels"));
     EXPECT_THAT(refused({.layers = 0}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.layers = 17}), HasSubstr("1 to 16 layers"));
-    EXPECT_THAT(refused({.map_block = 0}), HasSubstr("pixels a side"));
     EXPECT_THAT(refused({.upper_share = 0.1, .lower_share = 0.2}), HasSubstr("shares"));
     EXPECT_THAT(refused({.fade_frames = -1}), HasSubstr("fade"));
     EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));

@@ -87,8 +87,8 @@ private:
 };
 
 std::vector<glm::vec4> drawn(const Context& context, std::vector<Item> items, const std::vector<Item>& background,
-                             const View& view, ColourFormat format = ColourFormat::rgba32f) {
-    auto target = Target::create(context, view.width, view.height, {.colours = {format}});
+                             const View& view) {
+    auto target = Target::create(context, view.width, view.height);
     items.insert(items.end(), background.begin(), background.end());
     EXPECT_TRUE(draw(items, {.view = view, .near_plane = 0.01}, *target));
     return *read_pixels(*target);
@@ -96,31 +96,26 @@ std::vector<glm::vec4> drawn(const Context& context, std::vector<Item> items, co
 
 TEST_F(LayersTest, TogetherAreThePictureToTheBit) {
     const Strips strips(context());
-    for (const auto& [width, height] : {std::pair{37, 23}, {64, 64}, {1, 1}})
-        for (const ColourFormat format : {ColourFormat::rgba32f, ColourFormat::rgba16f}) {
-            const View view = ahead(width, height);
-            auto passes = require(LayerPasses::create(context(), width, height, {.format = format}));
-            ASSERT_TRUE(
-                passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
-            EXPECT_EQ(*read_pixels(passes->composite()),
-                      drawn(context(), strips.objects, strips.background, view, format));
-            ASSERT_EQ(passes->combination_count(), 3);
-            for (int left_out = 0; left_out < 3; ++left_out) {
-                ASSERT_TRUE(passes->combine(left_out));
-                std::vector<Item> others;
-                for (std::size_t i = 0; i < 3; ++i)
-                    if (strips.split.layer_of[i] != left_out) others.push_back(strips.objects[i]);
-                EXPECT_EQ(*read_pixels(passes->combination()),
-                          drawn(context(), others, strips.background, view, format));
-            }
-            // 3 layers, the background; the composite and 3 combinations.
-            EXPECT_EQ(passes->counts().surface_passes, 4);
-            EXPECT_EQ(passes->counts().full_screen_passes, 4);
-            EXPECT_EQ(passes->counts().textures, 5);
-            const std::uint64_t pixels = static_cast<std::uint64_t>(width * height);
-            const std::uint64_t colour = format == ColourFormat::rgba32f ? 16 : 8;
-            EXPECT_EQ(passes->counts().texture_bytes, pixels * (6 * (colour + 4) + (colour + 4) + colour));
+    for (const auto& [width, height] : {std::pair{37, 23}, {64, 64}, {1, 1}}) {
+        const View view = ahead(width, height);
+        auto passes = require(LayerPasses::create(context(), width, height));
+        ASSERT_TRUE(passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
+        EXPECT_EQ(*read_pixels(passes->composite()), drawn(context(), strips.objects, strips.background, view));
+        ASSERT_EQ(passes->combination_count(), 3);
+        for (int left_out = 0; left_out < 3; ++left_out) {
+            ASSERT_TRUE(passes->combine(left_out));
+            std::vector<Item> others;
+            for (std::size_t i = 0; i < 3; ++i)
+                if (strips.split.layer_of[i] != left_out) others.push_back(strips.objects[i]);
+            EXPECT_EQ(*read_pixels(passes->combination()), drawn(context(), others, strips.background, view));
         }
+        // 3 layers, the background; the composite and 3 combinations.
+        EXPECT_EQ(passes->counts().surface_passes, 4);
+        EXPECT_EQ(passes->counts().full_screen_passes, 4);
+        EXPECT_EQ(passes->counts().textures, 5);
+        const std::uint64_t pixels = static_cast<std::uint64_t>(width * height);
+        EXPECT_EQ(passes->counts().texture_bytes, pixels * (6 * 20 + 20 + 16));
+    }
 }
 
 TEST_F(LayersTest, DrawsAtOnceWhatIsNotSplit) {
@@ -146,27 +141,6 @@ TEST_F(LayersTest, DrawsAtOnceWhatIsNotSplit) {
     // And without anything, what it is cleared to.
     ASSERT_TRUE(passes->draw({}, {}, {.view = view}, {}, glm::vec4(0.25f)));
     EXPECT_THAT(*read_pixels(passes->composite()), ::testing::Each(glm::vec4(0.25f)));
-}
-
-TEST_F(LayersTest, BlocksAreMeans) {
-    const Strips strips(context());
-    const View view = ahead(37, 23);
-    auto passes = LayerPasses::create(context(), 37, 23, {.block = 4});
-    ASSERT_TRUE(passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
-    ASSERT_TRUE(passes->combine(0));
-    ASSERT_EQ(passes->combination().width(), 10);
-    ASSERT_EQ(passes->combination().height(), 6);
-    const auto full = drawn(context(), {strips.objects[0], strips.objects[2]}, strips.background, view);
-    const auto small = *read_pixels(passes->combination());
-    for (int y = 0; y < 6; ++y)
-        for (int x = 0; x < 10; ++x) {
-            glm::vec4 sum(0);
-            float count = 0;
-            for (int row = 4 * y; row < std::min(4 * y + 4, 23); ++row)
-                for (int column = 4 * x; column < std::min(4 * x + 4, 37); ++column, ++count)
-                    sum += full[static_cast<std::size_t>(row * 37 + column)];
-            EXPECT_NEAR(small[static_cast<std::size_t>(y * 10 + x)].a, sum.a / count, 1e-6f);
-        }
 }
 
 // A wall behind, a screen before it, and a board that the sun casts a shadow with, from the left. Luminance of the wall
@@ -273,19 +247,17 @@ TEST_F(LayersTest, StippledItemsShareThePixels) {
 }
 
 TEST_F(LayersTest, RefusesWhatCannotBeSplit) {
-    const auto why = [&](int width, int height, const LayerOptions& options) {
-        const auto made = LayerPasses::create(context(), width, height, options);
+    const auto why = [&](int width, int height, int most = default_layers) {
+        const auto made = LayerPasses::create(context(), width, height, most);
         return made ? "" : made.error().message;
     };
-    EXPECT_THAT(why(8, 8, {.most = 17}), HasSubstr("1 to 16 layers, not 17"));
-    EXPECT_THAT(why(8, 8, {.most = 0}), HasSubstr("not 0"));
-    EXPECT_THAT(why(8, 8, {.format = ColourFormat::srgb8}), HasSubstr("rgba32f or rgba16f"));
-    EXPECT_THAT(why(8, 8, {.block = 17}), HasSubstr("1 to 16 pixels a side"));
-    EXPECT_THAT(why(0, 8, {}), HasSubstr("at least 1x1"));
-    EXPECT_THAT(why(largest_target_side() + 1, 8, {}), HasSubstr("choose a smaller size"));
+    EXPECT_THAT(why(8, 8, 17), HasSubstr("1 to 16 layers, not 17"));
+    EXPECT_THAT(why(8, 8, 0), HasSubstr("not 0"));
+    EXPECT_THAT(why(0, 8), HasSubstr("at least 1x1"));
+    EXPECT_THAT(why(largest_target_side() + 1, 8), HasSubstr("choose a smaller size"));
 
     const Strips strips(context());
-    auto passes = LayerPasses::create(context(), 8, 8, {.most = 2});
+    auto passes = LayerPasses::create(context(), 8, 8, 2);
     const auto refused = [&](const LayerSplit& split) {
         const auto done = passes->draw(strips.objects, {}, {.view = ahead(8, 8)}, split);
         return done ? "" : done.error().message;

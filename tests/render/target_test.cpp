@@ -46,12 +46,12 @@ TEST_F(TargetTest, RefusesMoreThanTheDriverCanDraw) {
     ASSERT_FALSE(made);
     EXPECT_EQ(made.error().code, unseen::ErrorCode::unsupported);
     EXPECT_THAT(made.error().message, HasSubstr(std::to_string(most)));
-    EXPECT_FALSE(Target::create(context(), 4, 4, {.colours = std::vector(1000, ColourFormat::rgba16f)}));
+    EXPECT_FALSE(Target::create(context(), 4, 4, {.colours = std::vector(1000, ColourFormat::rgba32f)}));
 }
 
 TEST_F(TargetTest, KeepsItsColoursApart) {
     const auto made =
-        require(Target::create(context(), 5, 3, {.colours = {ColourFormat::rgba32f, ColourFormat::rgba16f}}));
+        require(Target::create(context(), 5, 3, {.colours = {ColourFormat::rgba32f, ColourFormat::rgba32f}}));
     fill(*made, 0, {0.1f, 0.2f, 0.3f, 0.7f});
     fill(*made, 1, {1, 2, 4, 0.5f});
     const auto luminance = read_luminance(*made), colour = read_colour(*made, 1), other = read_luminance(*made, 1);

@@ -20,7 +20,6 @@
 namespace unseen::session {
 namespace {
 
-constexpr int most_block = 16; // of render::LayerOptions
 // A level that was too coarse is not tried again before the eye has moved by this share of its distance to the object:
 // else the object would go to and fro between two levels.
 constexpr double moved_share = 0.02;
@@ -35,7 +34,6 @@ Result<void> check(const LevelControlOptions& o) {
         return bad_option("shares of pixels lie between 0 and 1, and the lower one is not above the upper one");
     if (o.frames_a_layer < 1) return bad_option("objects are tested every frame at most");
     if (o.fade_frames < 0) return bad_option("a fade cannot last less than no frame");
-    if (o.map_block < 1 || o.map_block > most_block) return bad_option("a map's threshold is of 1 to 16 pixels a side");
     return {};
 }
 
@@ -169,21 +167,13 @@ struct LevelControl::Impl {
         passes.reset(); // the old ones first, so that both sizes need not fit at a time
         open.clear();
         for (Subject& subject : subjects) subject.is_open = false;
-        auto layers = render::LayerPasses::create(
-            context, wanted.width, wanted.height,
-            {.most = options.layers,
-             .format = options.half_floats ? render::ColourFormat::rgba16f : render::ColourFormat::rgba32f,
-             .block = options.map_block});
+        auto layers = render::LayerPasses::create(context, wanted.width, wanted.height, options.layers);
         if (!layers) return layers.error();
         auto counts = render::DifferenceCounts::create(context, wanted.width, wanted.height);
         if (!counts) return counts.error();
         Passes made{wanted.width, wanted.height, observer.gaze, std::move(*layers), std::move(*counts), {}, {}};
         const render::Target& combination = made.layers.combination();
-        perception::Display display = observer.display;
-        if (options.map_block > 1)
-            perception::set_pixels_per_degree(
-                display, perception::PixelsPerDegree(perception::pixels_per_degree(observer.display).value() /
-                                                     options.map_block));
+        const perception::Display& display = observer.display;
         if (!is_perceptual()) {
             // Nothing is mapped.
         } else if (options.maps == MapRecipe::rpg99) {
@@ -194,15 +184,12 @@ struct LevelControl::Impl {
             if (!maps) return maps.error();
             made.rpg99 = std::move(*maps);
         } else {
-            perception::JudgeOptions judging = judge_options(observer);
-            judging.display = display;
-            if (judging.gaze_px) *judging.gaze_px /= static_cast<double>(options.map_block);
             // Whatever a picture holds: all that the display shows.
             const auto tables = perception::judge_tables(
                 combination.width(), combination.height(), static_cast<float>(perception::black_level(display).value()),
                 std::nextafter(static_cast<float>(perception::to_luminance(display, 1).value()),
                                std::numeric_limits<float>::infinity()),
-                judging);
+                judge_options(observer));
             if (!tables) return tables.error();
             auto maps = render::VisibilityPasses::create(context, *tables, luminance_of(combination));
             if (!maps) return maps.error();
@@ -599,8 +586,8 @@ struct LevelControl::Impl {
                 const std::size_t object = d.in_sight[test.place];
                 const unsigned map = passes->with_maps(
                     [&](const auto& maps) { return maps.thresholds_texture(static_cast<int>(layer)); });
-                const auto name = passes->counts.begin(d.compared[test.place], luminance_of(passes->layers.composite()),
-                                                       {map, options.map_block});
+                const auto name =
+                    passes->counts.begin(d.compared[test.place], luminance_of(passes->layers.composite()), map);
                 if (!name) return name.error();
                 OpenTest& asked = open.emplace_back();
                 asked.name = *name;
@@ -772,7 +759,6 @@ Result<std::vector<int>> LevelControl::read_levels() {
 
 const render::Target& LevelControl::picture() const noexcept { return impl_->passes->layers.composite(); }
 const render::LayerPasses& LevelControl::layers() const noexcept { return impl_->passes->layers; }
-Result<void> LevelControl::combine(int left_out) { return impl_->combine(left_out); }
 
 Result<std::vector<float>> LevelControl::thresholds(int left_out) {
     Impl& own = *impl_;

@@ -11,7 +11,6 @@ namespace unseen::render {
 
 enum class ColourFormat {
     rgba32f, // linear RGB and relative luminance in a; 16 bytes a pixel
-    rgba16f, // the same in half floats
     srgb8,   // for displays: encoded as sRGB, a is 1
     shares8, // four numbers from 0 to 1 in steps of 1/255, for shadow masks
 };

@@ -46,8 +46,6 @@ struct LevelControlOptions {
     LevelChainOptions chain = {};
     int layers = 5; // of depth, 1 to 16
     MapRecipe maps = MapRecipe::modern;
-    int map_block = 1;        // a map's threshold is of so many by so many pixels, 1 to 16
-    bool half_floats = false; // pictures of layers; of modern maps 1% is lost, of rpg99 in smooth pictures more
     // Shares of all pixels that differ visibly: an object gets a better level above the upper, a coarser one below the
     // lower.
     double upper_share = 450.0 / (512 * 512), lower_share = 170.0 / (512 * 512);
@@ -126,7 +124,6 @@ public:
     // stays; if memory runs out, there is no picture.
     const render::Target& picture() const noexcept;      // of the last frame: linear RGB, relative luminance
     const render::LayerPasses& layers() const noexcept;  // of the last frame
-    Result<void> combine(int left_out);                  // of the last frame, for people to look at
     Result<std::vector<float>> thresholds(int left_out); // the map of that combination, cd/m2; waits
     Result<std::vector<int>> read_levels();              // by pixel; -1: no object; draws and waits
     int map_width() const noexcept;

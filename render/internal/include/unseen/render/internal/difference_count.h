@@ -7,13 +7,6 @@
 
 namespace unseen::render {
 
-// Just visible steps of luminance, cd/m2, in the first channel of a two-dimensional texture: one for each pixel, or for
-// each block of `block` by `block` pixels, of which the last ones may be cut off.
-struct ThresholdTexture {
-    unsigned id = 0; // GL name; stays its owner's
-    int block = 1;
-};
-
 // Move-only; keeps a handle to the context. Memory: 4 bytes a pixel.
 class DifferenceCounts {
 public:
@@ -27,8 +20,9 @@ public:
 
     // Begins to count the visible pixels of an item whose depth was drawn, if their luminance differs from the picture's by
     // the threshold or more; NaN differs. Does not wait. The picture's scale applies to the item's luminance, too. Returns
-    // the count's number.
-    Result<std::uint64_t> begin(const Item& item, const LuminanceTexture& picture, const ThresholdTexture& thresholds);
+    // the count's number. `thresholds`: just visible steps of luminance, cd/m2, by pixel, in the first channel of a
+    // two-dimensional texture of this GL name.
+    Result<std::uint64_t> begin(const Item& item, const LuminanceTexture& picture, unsigned thresholds);
 
     struct Count {
         std::uint64_t name = 0;

@@ -29,12 +29,6 @@ struct LayerSplit {
 Result<LayerSplit> split_into_layers(std::span<const glm::dvec3> centres, const vdtree::View& view,
                                      int layers = default_layers);
 
-struct LayerOptions {
-    int most = default_layers;                   // layers; 1 to most_layers
-    ColourFormat format = ColourFormat::rgba32f; // of pictures; or rgba16f
-    int block = 1;                               // 1 to 16: a combination's pixel is the mean of block by block pixels
-};
-
 // Work since the last draw() began, and memory.
 struct LayerCounts {
     int surface_passes = 0;     // of items: a layer's, the background's, the whole scene's, or a mask's
@@ -46,19 +40,19 @@ struct LayerCounts {
 
 // Move-only. Keeps a handle to its context. Nothing is read back, and nothing waits for the GPU.
 //
-// Memory, in bytes a pixel, with 32-bit floats (16-bit ones): 20 (12) for each of `most` layers and for the background,
-// made when a picture is first split, 20 (12) for the composite and 16 (8) for the combination; 20 (12) for the mask of
-// shadows, made when a combination first has one.
+// Memory, in bytes a pixel: 20 for each of `most` layers and for the background, made when a picture is first split, 20
+// for the composite and 16 for the combination; 20 for the mask of shadows, made when a combination first has one.
 class LayerPasses {
 public:
-    // Fails on options out of range, on sizes as Target::create() does, and when memory runs out.
-    static Result<LayerPasses> create(const Context& context, int width, int height, const LayerOptions& options = {});
+    // For at most so many layers. Fails on other numbers than 1 to most_layers, on sizes as Target::create() does, and
+    // when memory runs out.
+    static Result<LayerPasses> create(const Context& context, int width, int height, int most = default_layers);
     LayerPasses(LayerPasses&&) noexcept = default;
     LayerPasses& operator=(LayerPasses&&) noexcept = default;
 
     // Draws each layer and the background separately, and composes them by depth. Without layers, draws everything at once.
     // `split`: of these objects. `clear`: linear RGB and luminance of empty pixels. Fails like draw() of
-    // <unseen/render/draw.h>, on a split of other objects, and on more layers than the options allow.
+    // <unseen/render/draw.h>, on a split of other objects, and on more layers than create() was told of.
     Result<void> draw(std::span<const Item> objects, std::span<const Item> background, const Camera& camera,
                       const LayerSplit& split, const glm::vec4& clear = glm::vec4(default_background));
 
