@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

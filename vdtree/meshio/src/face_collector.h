@@ -1,8 +1,6 @@
 // Faces as files have them, made into triangles: polygons are cut, strips unrolled, bad faces counted and left out.
 #pragma once
 
-#include <algorithm>
-
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 

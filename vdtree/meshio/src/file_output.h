@@ -4,9 +4,6 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <string>
-#include <string_view>
-#include <utility>
 
 #include <unseen/vdtree/internal/atomic_file.h>
 

@@ -1,10 +1,8 @@
 // Cuts as glTF: scenes and models, with one level of detail or several.
-#include <algorithm>
 
 #include <unseen/meshio/scene_file.h>
 
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 
 #include "file_output.h"
 #include "gltf_data.h"

@@ -2,9 +2,6 @@
 // would believe or fetch reaches it.
 #pragma once
 
-#include <initializer_list>
-#include <limits>
-
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
 

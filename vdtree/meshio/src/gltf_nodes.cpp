@@ -1,7 +1,3 @@
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
 #include "gltf_nodes.h"
 
 namespace unseen::meshio::gltf {

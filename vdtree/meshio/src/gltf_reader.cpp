@@ -1,14 +1,7 @@
 // glTF 2.0, as JSON and as GLB. tinygltf maps the JSON to its structures; everything it would believe or fetch is kept
 // from it: the document is first cut down to what describes triangles (gltf_document.h), and buffers are resolved here
 // (gltf_data.h), so that files cannot make it allocate, decode images or touch the file system.
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <unordered_map>
-#include <utility>
-
-#include <glm/geometric.hpp>
 
 #include "gltf_meshes.h"
 #include "gltf_nodes.h"

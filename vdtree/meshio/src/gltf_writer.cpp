@@ -1,7 +1,5 @@
 #include "gltf_writer.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <system_error>
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <deque>
-#include <string_view>
 
 #include <nlohmann/json.hpp>
 

@@ -2,8 +2,6 @@
 
 #include <set>
 
-#include <glm/geometric.hpp>
-
 #include "mesh_readers.h"
 #include "restore.h"
 #include "text_scanner.h"

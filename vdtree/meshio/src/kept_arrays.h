@@ -1,8 +1,6 @@
 // What readers do with arrays of vertices, and what writers need of those of a cut.
 #pragma once
 
-#include <string_view>
-
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>

@@ -1,9 +1,6 @@
 #include "write_cut.h"
 
-#include <algorithm>
 #include <sstream>
-
-#include <glm/geometric.hpp>
 
 #include <unseen/vdtree/colour.h>
 

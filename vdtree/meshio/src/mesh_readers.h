@@ -3,7 +3,6 @@
 
 #include <new>
 #include <stdexcept>
-#include <type_traits>
 
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/vdtree/colour.h>

@@ -10,7 +10,6 @@
 #include <set>
 
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 
 namespace unseen::meshio {
 

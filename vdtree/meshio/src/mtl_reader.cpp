@@ -2,9 +2,7 @@
 #include "mtl_reader.h"
 #include "text_scanner.h"
 
-#include <array>
 #include <unordered_set>
-#include <utility>
 
 namespace unseen::meshio {
 

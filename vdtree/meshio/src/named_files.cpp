@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <system_error>
-#include <utility>
 
 #include "named_files.h"
 

@@ -3,7 +3,6 @@
 
 #include <map>
 #include <set>
-#include <string_view>
 
 #include "mesh_readers.h"
 

@@ -7,9 +7,7 @@
 #include "weld.h"
 #include <unseen/vdtree/internal/vectors.h>
 
-#include <array>
 #include <unordered_map>
-#include <utility>
 
 namespace unseen::meshio {
 

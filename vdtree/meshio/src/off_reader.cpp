@@ -1,6 +1,4 @@
 // OFF: Geomview's object file format, ASCII, with its prefixes ST, C and N.
-#include <array>
-#include <utility>
 
 #include "face_collector.h"
 #include "text_scanner.h"

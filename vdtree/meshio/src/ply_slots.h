@@ -1,9 +1,6 @@
 // Names in PLY: of types, and of those properties of vertices that have a meaning.
 #pragma once
 
-#include <string_view>
-#include <utility>
-
 #include <unseen/meshio/source_document.h>
 
 namespace unseen::meshio::ply {

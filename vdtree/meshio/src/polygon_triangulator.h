@@ -1,9 +1,6 @@
 // Polygons as triangles.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/mesh.h>
 
 namespace unseen::meshio {

@@ -1,13 +1,8 @@
 #include "restore.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <map>
 #include <tuple>
-#include <utility>
 
-#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include "gltf_document.h"

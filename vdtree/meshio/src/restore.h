@@ -2,7 +2,6 @@
 #pragma once
 
 #include <glm/mat3x3.hpp>
-#include <glm/vec3.hpp>
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>

@@ -3,8 +3,6 @@
 #include <numbers>
 #include <set>
 
-#include <glm/geometric.hpp>
-
 #include <unseen/vdtree/colour.h>
 
 #include "file_output.h"

@@ -5,8 +5,6 @@
 #include <array>
 #include <bit>
 #include <optional>
-#include <string_view>
-#include <utility>
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/internal/budget.h>

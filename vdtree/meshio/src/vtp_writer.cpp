@@ -1,5 +1,4 @@
 // VTK's polygons in its XML format: VTK File Formats, https://docs.vtk.org, "XML File Formats".
-#include <functional>
 #include <set>
 
 #include <unseen/vdtree/colour.h>

@@ -5,8 +5,6 @@
 #include <bit>
 #include <limits>
 #include <random>
-#include <span>
-#include <vector>
 
 #include <unseen/vdtree/mesh.h>
 

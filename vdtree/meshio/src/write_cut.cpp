@@ -1,7 +1,6 @@
 // Cuts with all that the file of their mesh said.
 #include "write_cut.h"
 
-#include <algorithm>
 #include <map>
 #include <system_error>
 

@@ -1,7 +1,6 @@
 #include "build/bound_facing.h"
 
 #include <limits>
-#include <numeric>
 
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/parallel.h>

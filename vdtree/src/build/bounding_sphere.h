@@ -1,13 +1,6 @@
 // Small enclosing spheres of points and of spheres.
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <span>
-#include <vector>
-
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {

@@ -2,7 +2,6 @@
 #include <unseen/vdtree/builder.h>
 
 #include <atomic>
-#include <numeric>
 #include <optional>
 
 #include <glm/geometric.hpp>

@@ -9,7 +9,6 @@
 // balanced.
 #include <unseen/vdtree/builder.h>
 
-#include <cmath>
 #include <numeric>
 
 #include <glm/geometric.hpp>

@@ -1,9 +1,6 @@
 // Where the proxies are and what they look like: area-weighted means of their leaves.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {

@@ -1,11 +1,8 @@
 #include "build/quadric_contraction.h"
 
 #include <bit>
-#include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
-#include <utility>
 
 #include <glm/geometric.hpp>
 

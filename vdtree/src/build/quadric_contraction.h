@@ -13,7 +13,6 @@
 #pragma once
 
 #include <compare>
-#include <vector>
 
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>

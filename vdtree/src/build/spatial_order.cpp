@@ -1,7 +1,5 @@
 #include "build/spatial_order.h"
 
-#include <utility>
-
 namespace unseen::vdtree {
 
 void sort_by_code(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <span>
 
 #include <glm/common.hpp>
 

@@ -1,8 +1,6 @@
 // What the builder finds out about the surface before it clusters anything.
 #pragma once
 
-#include <vector>
-
 #include <unseen/vdtree/mesh.h>
 
 namespace unseen::vdtree {

@@ -1,9 +1,7 @@
 #include "cut/budget.h"
 
 #include <iterator>
-#include <optional>
 #include <queue>
-#include <utility>
 
 #include "cut/decide_tree.h"
 

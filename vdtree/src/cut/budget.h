@@ -1,8 +1,6 @@
 // Where the costs of folds come from, and the best cuts of one or more trees within a number of triangles.
 #pragma once
 
-#include <limits>
-
 #include <unseen/vdtree/function_ref.h>
 
 #include "cut/kernel/fold_kernel.h"

@@ -1,7 +1,6 @@
 #include <unseen/vdtree/cut.h>
 
 #include <numeric>
-#include <string>
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/vectors.h>

@@ -1,8 +1,6 @@
 #include "cut/cut_state.h"
 
 #include <atomic>
-#include <cassert>
-#include <utility>
 
 #include "cut/cut_follower.h"
 #include "cut/index_buffer.h"

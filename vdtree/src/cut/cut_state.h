@@ -1,8 +1,6 @@
 // What a cut is made of, for those that change it: Cut itself, the follower and geomorphs.
 #pragma once
 
-#include <vector>
-
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/internal/node_bits.h>

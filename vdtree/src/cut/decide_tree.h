@@ -1,9 +1,6 @@
 // Decides which nodes of a tree unfold, from the root down, a thousand at a time.
 #pragma once
 
-#include <algorithm>
-#include <vector>
-
 #include <unseen/vdtree/internal/node_bits.h>
 
 #include "tree/unchecked_links.h"

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/footprint.h>

@@ -1,8 +1,6 @@
 #include <unseen/vdtree/depth_picture.h>
 
-#include <limits>
 #include <numbers>
-#include <string>
 
 #include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>

@@ -1,9 +1,5 @@
 #include <unseen/vdtree/geomorph.h>
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-
 #include <unseen/vdtree/internal/errors.h>
 
 #include <glm/common.hpp>

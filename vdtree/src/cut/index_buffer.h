@@ -1,7 +1,6 @@
 // The index buffer of a cut: gathered as a whole, or kept current by patches around what folds and unfolds.
 #pragma once
 
-#include <algorithm>
 #include <bit>
 
 #include <unseen/vdtree/cut.h>

@@ -1,8 +1,6 @@
 // Deadlines of watched slots by a clock that only some views need: that of lights, or that of frusta.
 #pragma once
 
-#include <vector>
-
 #include "cut/kernel/deadline_kernel.h"
 #include <unseen/vdtree/internal/simd.h>
 

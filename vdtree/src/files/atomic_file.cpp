@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cerrno>
 #include <random>
-#include <string>
 #include <system_error>
 
 #include <fcntl.h>

@@ -2,13 +2,7 @@
 // docs/file-format.md describes it byte by byte.
 #include <unseen/vdtree/tree_io.h>
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
 #include <fstream>
-#include <type_traits>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include <unseen/vdtree/internal/fold_sequence.h>
 

@@ -1,7 +1,5 @@
 #include "tree/leaf_rings.h"
 
-#include <numeric>
-
 namespace unseen::vdtree {
 
 LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& places, const TreeParts& parts) {

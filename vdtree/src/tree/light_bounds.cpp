@@ -1,9 +1,7 @@
 // What the vertices of rings have in normals and albedos.
 
-#include <cassert>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include <glm/geometric.hpp>
 

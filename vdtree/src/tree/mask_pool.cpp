@@ -1,8 +1,5 @@
 #include "tree/mask_pool.h"
 
-#include <algorithm>
-#include <bit>
-
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {

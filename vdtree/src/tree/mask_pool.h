@@ -4,10 +4,6 @@
 // each of those. Equal masks share one record. Dragon, quadric: 7 bytes a node instead of 48.
 #pragma once
 
-#include <cstddef>
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/vertex_tree.h>
 

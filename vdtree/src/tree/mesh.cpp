@@ -1,8 +1,6 @@
 // Checks and repairs of triangle soups.
 #include <unseen/vdtree/mesh.h>
 
-#include <utility>
-
 #include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {

@@ -1,8 +1,5 @@
 #include "tree/node_check.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include <tbb/parallel_reduce.h>
 
 #include <unseen/vdtree/internal/parallel.h>

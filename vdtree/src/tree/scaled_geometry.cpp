@@ -1,7 +1,6 @@
 #include <unseen/vdtree/internal/fold_sequence.h>
 
 #include <cmath>
-#include <utility>
 
 namespace unseen::vdtree {
 

@@ -1,5 +1,4 @@
 // Checks everything that a vertex tree promises.
-#include <initializer_list>
 #include <optional>
 
 #include <glm/geometric.hpp>

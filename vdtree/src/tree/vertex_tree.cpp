@@ -1,7 +1,5 @@
 #include <unseen/vdtree/vertex_tree.h>
 
-#include <algorithm>
-
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/colour.h>

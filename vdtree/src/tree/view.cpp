@@ -1,7 +1,6 @@
 #include <unseen/vdtree/view.h>
 
 #include <numbers>
-#include <string>
 
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>

@@ -5,8 +5,6 @@
 // antichain that covers every leaf. A triangle is active iff the node at which it vanishes is unfolded.
 #pragma once
 
-#include <optional>
-
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -11,13 +11,6 @@
 // removed within a glide's time: a triangle budget holds for the followed cut only.
 #pragma once
 
-#include <cstdint>
-#include <memory>
-#include <span>
-
-#include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
-
 #include <unseen/vdtree/cut.h>
 
 namespace unseen::vdtree {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/colour.h>

@@ -13,9 +13,6 @@
 // ("h:uv") are read, and vertices are split at seams.
 #pragma once
 
-#include <string>
-#include <utility>
-
 #include <CGAL/IO/Color.h>
 #include <CGAL/Kernel_traits.h>
 #include <CGAL/Surface_mesh.h>

@@ -1,12 +1,6 @@
 // OpenMesh's decimater as a clusterer: its halfedge collapses, with any of its modules, become a tree's merges.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
-#include <span>
-
 #include <glm/common.hpp>
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>

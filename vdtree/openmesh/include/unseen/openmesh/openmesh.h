@@ -11,11 +11,6 @@
 // coordinates at seams, vertices are split.
 #pragma once
 
-#include <string>
-#include <type_traits>
-#include <utility>
-#include <vector>
-
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
 #include <unseen/adapters/adapters.h>

@@ -2,8 +2,6 @@
 // follow the normals, too, as snow does.
 #pragma once
 
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/result.h>
 #include <unseen/vdtree/vertex_tree.h>
 

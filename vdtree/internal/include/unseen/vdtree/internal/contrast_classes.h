@@ -5,9 +5,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <memory>
 
 #include <unseen/vdtree/internal/light_bounds.h>
 

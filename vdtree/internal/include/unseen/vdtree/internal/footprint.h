@@ -1,8 +1,6 @@
 // What nodes cover of a window.
 #pragma once
 
-#include <vector>
-
 #include <unseen/vdtree/vertex_tree.h>
 #include <unseen/vdtree/view.h>
 

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/lighting.h>
 #include <unseen/vdtree/result.h>

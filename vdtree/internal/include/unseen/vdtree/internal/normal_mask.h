@@ -2,12 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <type_traits>
-
-#include <glm/vec3.hpp>
 
 #include <unseen/vdtree/vertex_tree.h>
 

@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include <glm/vec3.hpp>
-
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <limits>
-#include <vector>
 
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/vertex_tree.h>

@@ -2,7 +2,6 @@
 // and the parts on the tree alone, not on the threads.
 #pragma once
 
-#include <cstdint>
 #include <numeric>
 
 #include <unseen/vdtree/internal/parallel.h>

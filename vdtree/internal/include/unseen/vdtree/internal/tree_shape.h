@@ -1,9 +1,6 @@
 // The nodes of a tree while it is being built: how they are numbered and when the clusterer made them.
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include <unseen/vdtree/builder.h>
 
 namespace unseen::vdtree {

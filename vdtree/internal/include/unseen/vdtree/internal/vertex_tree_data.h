@@ -1,11 +1,6 @@
 // The arrays of a vertex tree, as the builder fills them and the file stores them. See <unseen/vdtree/vertex_tree.h>.
 #pragma once
 
-#include <cstddef>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
