@@ -81,6 +81,12 @@ Result<perception::Image> with_colour_bar(const perception::Image& map, const Co
     return whole;
 }
 
+glm::vec3 mixed_colour(std::span<const glm::vec3> colours, double share) {
+    const double at = std::clamp(share, 0.0, 1.0) * static_cast<double>(colours.size() - 1);
+    const auto first = std::min(static_cast<std::size_t>(at), colours.size() - 2);
+    return glm::mix(colours[first], colours[first + 1], static_cast<float>(at - static_cast<double>(first)));
+}
+
 perception::Image visibility_map(const perception::Image& visibility) {
     perception::Image map{visibility.width, visibility.height, 3, {}};
     map.values.reserve(3 * visibility.values.size());

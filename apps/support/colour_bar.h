@@ -1,6 +1,7 @@
 // Maps of values as colours, with the scale that says which is which.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct ColourBar {
 // A map in code values with the bar and its unit below it: pixels keep their places. Wider than the map where that is
 // too narrow for the text, the rest black.
 Result<perception::Image> with_colour_bar(const perception::Image& map, const ColourBar& bar);
+
+// `share` 0..1 of the way through evenly spaced colours, mixed between neighbours.
+glm::vec3 mixed_colour(std::span<const glm::vec3> colours, double share);
 
 // ---- what a judge saw
 

@@ -146,9 +146,7 @@ glm::vec3 colour_at(double place) {
     constexpr std::array<glm::vec3, 6> stops = {glm::vec3(0.16f, 0.05f, 0.37f), glm::vec3(0.20f, 0.27f, 0.54f),
                                                 glm::vec3(0.14f, 0.46f, 0.55f), glm::vec3(0.20f, 0.64f, 0.47f),
                                                 glm::vec3(0.56f, 0.78f, 0.28f), glm::vec3(0.99f, 0.91f, 0.24f)};
-    const double at = std::clamp(place, 0.0, 1.0) * (stops.size() - 1);
-    const auto first = std::min(static_cast<std::size_t>(at), stops.size() - 2);
-    return glm::mix(stops[first], stops[first + 1], static_cast<float>(at - static_cast<double>(first)));
+    return mixed_colour(stops, place);
 }
 
 constexpr glm::vec3 too_much{0.9f, 0.15f, 0.1f}, unfolded{0.45f}, background{0};

@@ -306,30 +306,6 @@ HardMesh waved_square(int triangles, double height, double waves) {
     return {"waved square", waved_sheet(std::max(24, static_cast<int>(std::sqrt(triangles / 2.0))), height, waves)};
 }
 
-std::vector<HardMesh> ship_hulls(int triangles) {
-    constexpr int across = 16; // of a deck, and of a side
-    const int along = std::max(8, triangles / (3 * 2 * across));
-    const auto half_width = [](double z) {
-        return 1.2 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4))) * (1 + 0.01 * std::sin(9 * z));
-    };
-    const auto deck = [&](double down, double right) {
-        const double z = 12 * down - 6, x = 2 * right - 1;
-        return glm::dvec3(x * half_width(z), 0.05 * (1 - x * x), z);
-    };
-    const auto hull = [&](double bright, double dark) {
-        Mesh mesh = painted(net(along, across, false, deck), [=](const glm::dvec3&) { return bright; });
-        for (const double sign : {1.0, -1.0})
-            append(mesh, painted(net(along, across, false,
-                                     [&](double down, double below) {
-                                         const double z = 12 * down - 6;
-                                         return glm::dvec3(sign * half_width(z) * (1 - 0.3 * below * below), -below, z);
-                                     }),
-                                 [=](const glm::dvec3&) { return dark; }));
-        return mesh;
-    };
-    return {{"hull", hull(0.85, 0.06)}, {"grey hull", hull(0.6, 0.25)}};
-}
-
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard) {
     const vdtree::BuildOptions options{.prelit = true}; // colours are what is drawn
     if (!hard.proxies_at_darkest) return vdtree::build_tree(hard.mesh.view(), options);

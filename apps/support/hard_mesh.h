@@ -33,10 +33,6 @@ std::vector<HardMesh> open_sheets(int triangles);
 // of its folds are alike everywhere, the worst that is known.
 HardMesh waved_square(int triangles, double height, double waves);
 
-// Ships, of slender quads: a bright deck beside dark sides, which share their edges' places and no vertices, as CAD
-// programs write them. Of about so many triangles each; at least a thousand.
-std::vector<HardMesh> ship_hulls(int triangles);
-
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard);
 
 } // namespace unseen::app

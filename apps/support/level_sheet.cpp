@@ -39,27 +39,6 @@ Image enlarged(const Image& image, double outline_px) {
     return large;
 }
 
-class LevelPainter {
-public:
-    LevelPainter(const session::Session& session, session::SceneRenderer& renderer)
-        : session_(session), renderer_(renderer) {}
-
-    Result<Image> draw(const vdtree::Cut& cut, const vdtree::View& view, bool has_edges = false) {
-        render::DrawOptions options;
-        options.samples = samples;
-        options.background = session_.background();
-        options.wireframe = has_edges;
-        const session::DrawnCut drawn[] = {{&cut}};
-        const auto frame = renderer_.draw(drawn, view, options);
-        if (!frame) return frame.error();
-        return session::code_image(*frame, session_.observer().display);
-    }
-
-private:
-    const session::Session& session_;
-    session::SceneRenderer& renderer_;
-};
-
 } // namespace
 
 Result<Image> draw_level_sheet(const session::Session& session, const render::Context& context, const session::Lod& lod,
@@ -72,7 +51,6 @@ Result<Image> draw_level_sheet(const session::Session& session, const render::Co
     if (object.levels.size() < 2) return invalid_argument("There is nothing for a sheet: " + object.notes.back());
     auto renderer = session::SceneRenderer::create(context, session);
     if (!renderer) return renderer.error();
-    LevelPainter painter(session, *renderer);
     vdtree::View window;
     window.width = window.height = cell_px;
     const vdtree::View near = session.frame(towards_eye, 0.9, window);
@@ -95,9 +73,15 @@ Result<Image> draw_level_sheet(const session::Session& session, const render::Co
                                       {cut, far, true, false},
                                       {cut, near, false, false},
                                       {cut, near, false, true}}) {
-            auto picture = painter.draw(wanted.cut, wanted.view, wanted.has_edges);
-            if (!picture) return picture.error();
-            column.pictures.push_back(wanted.is_far ? enlarged(*picture, outline_px) : std::move(*picture));
+            render::DrawOptions options;
+            options.samples = samples;
+            options.background = session.background();
+            options.wireframe = wanted.has_edges;
+            const session::DrawnCut drawn[] = {{&wanted.cut}};
+            const auto frame = renderer->draw(drawn, wanted.view, options);
+            if (!frame) return frame.error();
+            Image picture = session::code_image(*frame, session.observer().display);
+            column.pictures.push_back(wanted.is_far ? enlarged(picture, outline_px) : std::move(picture));
         }
     }
     return compose_columns(

@@ -45,9 +45,7 @@ Image beside_each_other(const std::vector<Image>& panels) {
 glm::vec3 colour_of_threshold(double share) {
     constexpr std::array<glm::vec3, 4> colours = {glm::vec3(0.05F, 0.02F, 0.2F), glm::vec3(0.15F, 0.35F, 0.65F),
                                                   glm::vec3(0.2F, 0.7F, 0.45F), glm::vec3(1.0F, 0.95F, 0.2F)};
-    const double at = std::clamp(share, 0.0, 1.0) * (colours.size() - 1);
-    const auto cell = std::min(static_cast<std::size_t>(at), colours.size() - 2);
-    return glm::mix(colours[cell], colours[cell + 1], static_cast<float>(at - static_cast<double>(cell)));
+    return mixed_colour(colours, share);
 }
 
 constexpr double least_threshold = 1.0 / 16, largest_threshold = 16; // cd/m2: the ends of the colours

@@ -10,32 +10,29 @@ namespace {
 constexpr double panel_margin = 0.6, ring_width = 0.11;
 constexpr double most_of_height = 1.0 / 3; // of the window's, for the status
 
+Result<Layer> layer_of(const std::vector<TextLine>& lines, double line_px, glm::dvec2 room_px) {
+    return text_panel(lines, line_px, room_px);
+}
+Result<Layer> layer_of(const Ring& ring, double line_px, glm::dvec2 window_px) {
+    return outline(ring.points, std::max(1.0, ring_width * line_px), ring.is_dashed, glm::ivec2(window_px));
+}
+
 } // namespace
 
 ViewerOverlay::ViewerOverlay(const render::Context& context)
     : context_(context), status_(context), keys_(context), message_(context) {}
 
-Result<void> ViewerOverlay::fill(Panel& panel, const std::vector<TextLine>& lines, double line_px, glm::dvec2 most_px) {
-    if (panel.lines == lines && panel.line_px == line_px && panel.most_px == most_px) return {};
-    const auto layer = text_panel(lines, line_px, most_px);
+template <class Content>
+Result<void> ViewerOverlay::fill(Shown<Content>& shown, const Content& content, double line_px, glm::dvec2 room_px) {
+    if (shown.content == content && shown.line_px == line_px && shown.room_px == room_px) return {};
+    const auto layer = layer_of(content, line_px, room_px);
     if (!layer) return layer.error();
-    if (auto set = panel.overlay.set_image({layer->width, layer->height, layer->pixels}); !set) return set;
-    panel.lines = lines;
-    panel.line_px = line_px;
-    panel.most_px = most_px;
-    panel.size = {layer->width, layer->height};
-    return {};
-}
-
-Result<void> ViewerOverlay::fill(DrawnRing& drawn, const Ring& ring, double line_px, glm::ivec2 window) {
-    if (drawn.ring == ring && drawn.line_px == line_px && drawn.window == window) return {};
-    const auto layer = outline(ring.points, std::max(1.0, ring_width * line_px), ring.is_dashed, window);
-    if (!layer) return layer.error();
-    if (auto set = drawn.overlay.set_image({layer->width, layer->height, layer->pixels}); !set) return set;
-    drawn.ring = ring;
-    drawn.line_px = line_px;
-    drawn.window = window;
-    drawn.corner = layer->corner;
+    if (auto set = shown.overlay.set_image({layer->width, layer->height, layer->pixels}); !set) return set;
+    shown.content = content;
+    shown.line_px = line_px;
+    shown.room_px = room_px;
+    shown.size = {layer->width, layer->height};
+    shown.corner = layer->corner;
     return {};
 }
 

@@ -35,26 +35,21 @@ public:
     Result<void> draw(render::Target& window, const OverlayContent& content);
 
 private:
-    // A panel in a corner of the window.
-    struct Panel {
-        explicit Panel(const render::Context& context) : overlay(context) {}
+    // What an overlay shows: `content`, which is lines of text or a ring.
+    template <class Content>
+    struct Shown {
+        explicit Shown(const render::Context& context) : overlay(context) {}
 
         render::Overlay overlay;
-        std::vector<TextLine> lines; // that the overlay shows, and how
+        Content content;
         double line_px = 0;
-        glm::dvec2 most_px = glm::dvec2(0);
-        glm::ivec2 size = glm::ivec2(0);
+        glm::dvec2 room_px = glm::dvec2(0); // that it had
+        glm::ivec2 size = glm::ivec2(0), corner = glm::ivec2(0);
     };
-    struct DrawnRing {
-        explicit DrawnRing(const render::Context& context) : overlay(context) {}
-
-        render::Overlay overlay;
-        Ring ring; // that the overlay shows, and where
-        double line_px = 0;
-        glm::ivec2 window = glm::ivec2(0), corner = glm::ivec2(0);
-    };
-    static Result<void> fill(Panel& panel, const std::vector<TextLine>& lines, double line_px, glm::dvec2 most_px);
-    static Result<void> fill(DrawnRing& drawn, const Ring& ring, double line_px, glm::ivec2 window);
+    using Panel = Shown<std::vector<TextLine>>;
+    using DrawnRing = Shown<Ring>;
+    template <class Content>
+    static Result<void> fill(Shown<Content>& shown, const Content& content, double line_px, glm::dvec2 room_px);
 
     render::Context context_;
     Panel status_, keys_, message_;

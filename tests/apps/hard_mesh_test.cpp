@@ -113,11 +113,46 @@ TEST_P(OpenSheets, AreFoldedUnseen) {
     });
 }
 
+// A ship, of slender quads: a bright deck beside dark sides, which share their edges' places and no vertices, as CAD
+// programs write them.
+HardMesh ship_hull(const std::string& name, float bright, float dark) {
+    constexpr int along = 1000, across = 16; // quads of a deck, and of a side
+    vdtree::Mesh mesh;
+    const auto add_net = [&](float grey, const auto& place) {
+        const auto at = [first = mesh.positions.size()](int row, int column) {
+            return static_cast<vdtree::Index>(first) + static_cast<vdtree::Index>(row * (across + 1) + column);
+        };
+        for (int row = 0; row <= along; ++row)
+            for (int column = 0; column <= across; ++column) {
+                mesh.positions.push_back(place(12 * (double(row) / along) - 6, double(column) / across));
+                mesh.colours.emplace_back(grey, grey, grey, 1);
+            }
+        for (int row = 0; row < along; ++row)
+            for (int column = 0; column < across; ++column) {
+                mesh.triangles.push_back({at(row, column), at(row, column + 1), at(row + 1, column)});
+                mesh.triangles.push_back({at(row + 1, column), at(row, column + 1), at(row + 1, column + 1)});
+            }
+    };
+    const auto half_width = [](double z) {
+        return 1.2 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4))) * (1 + 0.01 * std::sin(9 * z));
+    };
+    add_net(bright, [&](double z, double right) {
+        const double x = 2 * right - 1;
+        return glm::dvec3(x * half_width(z), 0.05 * (1 - x * x), z);
+    });
+    for (const double sign : {1.0, -1.0})
+        add_net(dark, [&](double z, double below) {
+            return glm::dvec3(sign * half_width(z) * (1 - 0.3 * below * below), -below, z);
+        });
+    return {name, std::move(mesh)};
+}
+std::vector<HardMesh> ship_hulls() { return {ship_hull("hull", 0.85f, 0.06f), ship_hull("grey hull", 0.6f, 0.25f)}; }
+
 // Beside a bright deck a side's nodes, all dark, fold at any size. Then triangles stretch from the deck's edge over the
 // side, with a gradient of luminances that no ring of the mesh's own has: the safe test knows of it. And far from the
 // gaze, lower frequencies than that of half a wave show in a row of such triangles.
 TEST(ShipHulls, AreFoldedUnseenByTheSafeTest) {
-    for (const HardMesh& hull : ship_hulls(96'000)) {
+    for (const HardMesh& hull : ship_hulls()) {
         SCOPED_TRACE(hull.name);
         Seen seen(built(hull));
         const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
@@ -133,7 +168,7 @@ TEST(ShipHulls, AreFoldedUnseenUnderLights) {
     vdtree::Lighting from_above;
     from_above.ambient = 0.1;
     from_above.lights.push_back({.intensity = 0.8, .direction = glm::normalize(glm::dvec3(0.2, 1, 0.1))});
-    for (HardMesh& hull : ship_hulls(96'000)) {
+    for (HardMesh& hull : ship_hulls()) {
         SCOPED_TRACE(hull.name);
         Seen seen(built(hull), from_above);
         const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
@@ -150,7 +185,7 @@ TEST(ShipHulls, AreFoldedUnseenUnderLights) {
 
 // Why that test is what requests fall back to.
 TEST(ShipHulls, ShowWhatLuebkeAndHallensTestFolds) {
-    Seen seen(built(ship_hulls(96'000).front()));
+    Seen seen(built(ship_hulls().front()));
     const auto judged =
         seen.judge({{1, 0.5, 0.1}, 0.2}, 12, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
             return perception::luebke_hallen_distances(seen.tree(), view, options);
