@@ -202,7 +202,7 @@ public:
 
 private:
     double border(int k) const { return std::tan((2.0 * k / side_ - 1) * std::numbers::pi / 4); }
-    // Of a unit vector. What is at a border belongs to the cell that it is nearer to the middle of, within rounding.
+    // The cell of a unit vector. What is at a border belongs to the cell whose middle is nearer, within rounding.
     std::size_t cell_of_normal(glm::dvec3 n) const {
         const glm::dvec3 size = glm::abs(n);
         const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);

@@ -19,7 +19,7 @@
 namespace unseen::app {
 namespace {
 
-// Of the trees, each once: bytes a triangle, with and without what is kept with them of their folds.
+// Bytes a triangle of the trees, each counted once, with and without what is kept with them of their folds.
 struct TreeBytes {
     double measured = 0, plain = 0;
 };
@@ -62,7 +62,7 @@ public:
     double seconds() const { return seconds_; }
     double bytes() const { return bytes_; } // a triangle of the full trees
 
-    // Of each object the worst level that nobody sees from where the eye is, times the bias.
+    // Each object's coarsest level that nobody sees from where the eye is, times the bias.
     std::vector<vdtree::Cut> cuts(double bias) const {
         std::vector<vdtree::Cut> all;
         for (std::size_t i = 0; i < of_object_.size(); ++i) all.push_back(of_object_[i]->cut(level(i, bias)));

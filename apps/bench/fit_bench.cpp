@@ -20,7 +20,7 @@ using vdtree::NodeId;
 // Where the viewer looks, from the window's centre; 0: at everything.
 constexpr auto aside_degrees = FoldModel::needed_at_degrees;
 
-// Of the model's sensitivity at one of aside_degrees; the others keep it from rising.
+// Sets the model's sensitivity at one of aside_degrees; the others keep it from rising.
 template <std::size_t I>
 void set_needed(FoldModel& model, double value) {
     model.needed[I] = value;

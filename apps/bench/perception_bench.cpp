@@ -28,7 +28,7 @@ constexpr double gaze_degrees = 29;
 constexpr double gazes[] = {gaze_degrees, 0}; // 0: none, all is looked at
 constexpr Index large_mesh = 50'000;          // triangles, of the meshes that are looked at from afar
 constexpr Index huge_mesh = 400'000;          // triangles, whose pictures take a minute each in software
-// Of the group `aside`: where the viewer looks, from the window's centre, in degrees; 0: at everything.
+// Where the viewer looks in the group `aside`, from the window's centre, in degrees; 0: at everything.
 constexpr double eccentricities[] = {0, 6, 12, 20, 29, 40, 50, 70};
 const glm::dvec3 directions[] = {{0, 0, 1}, {1, 0, 0}, {1, 1, 1}};
 

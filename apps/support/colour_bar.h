@@ -33,7 +33,7 @@ glm::vec3 mixed_colour(std::span<const glm::vec3> colours, double share);
 // Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more). Code values.
 perception::Image visibility_map(const perception::Image& visibility);
 
-// Of these colours: thresholds of visibility.
+// The bar of these colours: thresholds of visibility.
 ColourBar visibility_bar();
 
 } // namespace unseen::app

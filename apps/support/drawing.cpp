@@ -36,7 +36,7 @@ std::string as_utf8(std::string_view text) {
     return clean;
 }
 
-// Of the font at a height of one pixel; text scales with it, as hints do not move it.
+// Chooses the font without hints, so that text scales with its height.
 void choose_font(cairo_t* context, double height_px) {
     cairo_select_font_face(context, font, CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
     cairo_font_options_t* options = cairo_font_options_create();

@@ -120,7 +120,7 @@ private:
         const double depth = glm::dot(direction, ahead_);
         return depth > 0 ? depth * ahead_ + magnification_ * (direction - depth * ahead_) : direction;
     }
-    // Of small angles there, along the radius or across it.
+    // The magnification of small angles there, the larger one of along the radius and across it.
     double largest_magnification(glm::dvec3 direction) const {
         const double depth = glm::dot(direction, ahead_), m = magnification_;
         if (!(depth > 0)) return std::max(m, 1 / m);

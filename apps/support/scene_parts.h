@@ -34,7 +34,7 @@ vdtree::Mesh bar(double height, double radius, int segments);
 // A closed sphere with bumps around the origin, radius about 1: 4 * rows * rows triangles (at the poles without area).
 vdtree::Mesh bumpy_sphere(int rows);
 
-// Of about so many triangles each, closed, a metre high.
+// Meshes of about this many triangles, closed, a metre high.
 vdtree::Mesh urn(std::uint64_t triangles);
 vdtree::Mesh sphere(std::uint64_t triangles);
 vdtree::Mesh knot(std::uint64_t triangles); // a knotted tube with ribs

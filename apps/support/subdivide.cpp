@@ -27,7 +27,7 @@ std::uint64_t mixed(std::uint64_t x) { // the finaliser of SplitMix64 (Steele, L
     return x ^ (x >> 31);
 }
 
-// Of the place alone, so that doubled vertices hash alike. Adding 0 makes one of the two zeros.
+// Hashes the place alone, so that doubled vertices hash alike. Adding 0 makes one of the two zeros.
 std::uint64_t hash_of(const glm::dvec3& p, std::uint64_t seed) {
     for (int axis = 0; axis < 3; ++axis)
         seed = mixed(seed + 0x9e3779b97f4a7c15u + std::bit_cast<std::uint64_t>(p[axis] + 0.0));

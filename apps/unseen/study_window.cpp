@@ -92,7 +92,7 @@ public:
         return {};
     }
 
-    // Of what was drawn last.
+    // Saves what was drawn last.
     Result<void> save(const std::string& file) {
         glm::ivec2 window_px;
         glfwGetFramebufferSize(window(), &window_px.x, &window_px.y);

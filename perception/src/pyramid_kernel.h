@@ -12,7 +12,7 @@ namespace unseen::perception {
 
 inline constexpr double kernel_middle = 0.4, kernel_near = 0.25, kernel_far = 0.05; // taps, by distance in samples
 
-// Of a grating's amplitude, by radians a sample.
+// What the kernel leaves of a grating's amplitude, by radians a sample.
 inline double kernel_response(double omega) {
     return kernel_middle + 2 * kernel_near * std::cos(omega) + 2 * kernel_far * std::cos(2 * omega);
 }

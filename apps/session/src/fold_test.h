@@ -5,7 +5,7 @@
 
 namespace unseen::session {
 
-// Of the scene's object of this number. Fails where the request asks for a test that does not know what there is to
+// Decides for one object of the scene. Fails if the request asks for a test that does not know what there is to
 // see.
 Result<Decision> decide(Sight& sight, const Request& request, std::size_t object);
 

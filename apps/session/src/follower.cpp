@@ -108,7 +108,7 @@ public:
         std::optional<vdtree::Cut> cut;
         std::optional<vdtree::Geomorph> geomorph;
         std::optional<CutRecipe> recipe; // of the last cut, which refers to its criterion; none: out of sight
-        // Of the last call, where nothing of the object was in the window, and so all is folded.
+        // From the last call in which nothing of the object was in the window, and so all was folded.
         std::optional<vdtree::AdjustStats> stats_out_of_sight;
         FoldTest test_out_of_sight = FoldTest::error;
     };

@@ -93,7 +93,7 @@ void warn_again(const vdtree::VertexTree& tree, const fs::path& file, const Mess
     for (std::string line; std::getline(lines, line);) messages.warning(file.string() + ": " + without_marks(line));
 }
 
-// Of files in the cache, behind the source's name.
+// Ends the names of files in the cache.
 constexpr std::string_view under_lights = "+lights";
 
 // Whoever can write to the cache can put another tree there.

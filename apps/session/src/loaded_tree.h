@@ -64,16 +64,16 @@ Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree
 // and where it is not sure what the file refers to. Cost: reading the files once.
 std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
 
-// Of the tree of a mesh that was read, with its texture and document.
+// The key of the tree of a mesh that was read, with its texture and document.
 std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
                            bool conserves_light);
 
-// Of what a tree's folds change under lights, whichever these are. `key`: the tree's.
+// The key of what a tree's folds change under lights, whichever these are. `key`: the tree's.
 std::string lights_key(const std::string& key);
 
 // ---- scenes
 
-// Of a file that SceneFile has read, as Scene::load() says.
+// The scene of a file that SceneFile has read; see Scene::load().
 Result<Scene> scene_from(meshio::SceneFile file, const std::filesystem::path& name, const LoadOptions& options);
 
 } // namespace unseen::session

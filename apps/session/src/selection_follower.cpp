@@ -198,7 +198,7 @@ struct SelectionFollower::Impl {
             if (levels[objects[i]] >= 0) chosen[i] = levels[objects[i]];
             total += triangles(i, chosen[i]);
         }
-        // Of those that are finer than wanted, the one that loses least for each triangle, but not `without`.
+        // Among the objects finer than wanted, the one that loses least for each triangle, except `without`.
         const auto cheapest = [&](const std::vector<int>& now) {
             std::size_t best = objects.size();
             double least = 0;

@@ -293,7 +293,7 @@ Result<void> Session::State::measure(std::size_t object) {
     auto with_errors = measured_once(of.tree, place, messages);
     if (!with_errors) return with_errors.error();
     of.measurement.reset();
-    // Of all objects that have this tree.
+    // The same for all objects that have this tree.
     const vdtree::VertexTree before = of.tree.share();
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         if (&scene.objects[i].tree.data() != &before.data()) continue;

@@ -24,7 +24,7 @@ public:
     Result<std::vector<Sight>> look(const vdtree::View& view, ShadowMemory& memory);
     // Measures the errors of folds where a decision wants them.
     Result<Prepared> prepare(const vdtree::View& view, const Request& request, ShadowMemory& memory);
-    // Of all objects, then of the backdrop.
+    // Items count the objects, then the backdrop.
     Result<std::shared_ptr<const vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
 
     Scene scene;

@@ -25,7 +25,8 @@ constexpr double outward = 1 + 1e-6; // far more than rounding in floats, and of
 constexpr std::size_t most_balls = 40'000;
 constexpr double finest = 1.0 / 500; // of the scene's radius: smaller balls are not parted
 
-// Of the scene's radius: half the width of drawn edges of shadows, by texels of the maps that are fitted to the scene.
+// A share of the scene's radius: half the width of drawn edges of shadows, by texels of the maps that are fitted to the
+// scene.
 constexpr double edge_width = 1.0 / 300;
 
 // A node of an object's tree, or a part of a triangle.
@@ -175,7 +176,7 @@ bool is_alike(const LightSource& a, const LightSource& b) {
 
 // ---- what a light sees
 
-// Of a ball, in a map's coordinates.
+// The footprint of a ball, in a map's coordinates.
 struct Footprint {
     double low[2], high[2], from, to; // across, and along the light
 };

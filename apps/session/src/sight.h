@@ -23,7 +23,7 @@ struct ObjectCache {
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
-// Of all objects of a scene whose lights cast shadows.
+// Shadows of all objects of a scene whose lights cast them.
 struct SceneShadows {
     const Scene& scene;
     const std::vector<std::shared_ptr<ObjectCache>>& caches;
@@ -46,7 +46,7 @@ struct SceneShadows {
     std::shared_ptr<const perception::ShadowEdges> last_edges = {}; // also where none does any more
 };
 
-// Of an object whose lights cast shadows.
+// What is kept for an object whose lights cast shadows.
 struct ShadowState {
     std::shared_ptr<const KeptCriterion> of = {};                    // what all of this is of
     std::shared_ptr<const vdtree::Lighting> lighting = {};           // likewise, where lights stand still

@@ -243,7 +243,7 @@ void cover(SwitchDistances& switch_distances, ShownFold& a, const ShownFold& b) 
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
-// Of a textured tree: by how much the light of a ring's vertices differs where the texture is brightest. What is moved
+// For a textured tree: by how much the light of a ring's vertices differs where the texture is brightest. What is moved
 // of the texture is measured.
 double spread_of_vertices(const vdtree::SoundTree& tree, NodeId node) {
     constexpr float least_texture = 1.0f / 64; // that tells the vertices' luminance well

@@ -13,10 +13,10 @@ namespace unseen::perception {
 // Michelson's: the finer classes where few other things tell rows apart.
 inline constexpr ClassSeries coarse_contrasts{12, -9, 9}, fine_contrasts{48, -9, 9};
 inline constexpr ClassSeries shifts{3, -13, 14}; // of the mean over the middle of the range
-// Of colour, in both directions.
+// Contrasts of colour, in both directions.
 inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
 inline constexpr ClassSeries chroma_shifts{1, -13, 18};
-// Of textures: Michelson's, and by how much of a fold's extent they move.
+// Michelson contrasts of textures, and by how much of a fold's extent they move.
 inline constexpr ClassSeries texture_contrasts{4, -9, 9};
 inline constexpr ClassSeries texture_motions{1, -16, 16};
 
@@ -78,12 +78,12 @@ public:
     }
     double luminance(std::size_t luminance_class) const { return luminances_.value(luminance_class); }
 
-    // Of a difference in relative luminance against the middle of a range.
+    // The contrast of a difference in relative luminance against the middle of a range.
     double contrast(double difference, vdtree::LuminanceRange range) const {
         const double middle = (luminances_.in_cdm2(range.lo) + luminances_.in_cdm2(range.hi)) / 2;
         return luminances_.difference_in_cdm2(difference) / std::max(middle, luminances_.lowest());
     }
-    // Of differences in both directions of colour.
+    // The contrasts of differences in both directions of colour.
     glm::dvec2 chroma_contrast(glm::dvec2 difference, vdtree::LuminanceRange range) const {
         // What a damaged file holds may be no number, or negative: it can always be seen.
         const auto in = [&](double d) { return d >= 0 ? contrast(d, range) : std::numeric_limits<double>::infinity(); };

@@ -28,7 +28,7 @@ public:
           step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
 
     double at(double eccentricity_deg) {
-        // Of a fixed series of extents, so that more contrast never makes them larger.
+        // Extents are from a fixed series, so that more contrast never makes them larger.
         if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
             step_ = last_step;
             return std::numeric_limits<double>::infinity();
@@ -131,7 +131,7 @@ std::vector<vdtree::NormalSlabs> safe_facing(const vdtree::VertexTree& tree, con
 
 // ---- under the tree's own light
 
-// Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
+// Bins of eccentricity on the screen; beyond the last one sensitivity is taken as there.
 struct Bins {
     double degrees;
     std::size_t count;
@@ -241,7 +241,7 @@ struct Row {
             multiple = next;
         }
     }
-    // Of the shifts of the mean, at whatever frequency they are seen best, over areas of any size.
+    // The visibility of shifts of the mean, at the frequency where they are seen best, over areas of any size.
     double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
@@ -317,7 +317,7 @@ void saturate(RingLooks& parent, const RingLooks& child) {
     parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
 }
 
-// Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the
+// For a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the
 // vertices are, and how far that moves: no less than in the children, whose shares of their extents are rounded up.
 void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes,
                  std::vector<double>& motions) {
@@ -382,7 +382,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     const bool has_chroma = !rings.chroma.empty();
     // Where contrasts and luminances alone make the rows, these are few enough, and quickly found, to be fine.
     const bool is_fine = !has_chroma && rings.mean_shift.empty() && rings.vertices.empty() && lengths.empty();
-    // Of shifts of the mean alone.
+    // Only shifts of the mean need it.
     const Surround surround = rings.mean_shift.empty() ? Surround() : surround_of(tree, options);
     const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
     const Bins& bins = is_fine ? fine_bins : coarse_bins;

@@ -8,8 +8,8 @@
 
 namespace unseen::perception {
 
-// Of an interior node: where it is folded instead of the mesh's own surface, the larger of two cases: neighbours folded
-// as far as nodes no larger than it, or unfolded.
+// The error of folding an interior node instead of showing the mesh's own surface. The larger of two cases: neighbours
+// folded as far as nodes no larger than it, or unfolded.
 struct FoldError {
     // Mesh units. By how far an outline moves, no less than the children's; and the mean distance of points.
     float distance = 0, mean_distance = 0;
@@ -38,8 +38,8 @@ struct FoldErrors {
     std::span<const FoldStage> stages; // of the tree; empty where there are none
 };
 
-// Of a tree from measure_folds(). Fails where it is not, where it was measured with other settings, and where a value
-// is none that is measured: attributes of files are looked at here, by nobody before.
+// For a tree from measure_folds(). Fails if it is not one, if it was measured with other settings, or if a value
+// cannot come from measuring: attributes from files are first checked here.
 Result<FoldErrors> fold_errors_of(const vdtree::SoundTree& tree, const FoldModel& model = {});
 
 // What folds change under some lights.

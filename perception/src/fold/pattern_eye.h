@@ -89,11 +89,11 @@ inline Pattern rounded(Pattern p, int coarseness) {
     return p;
 }
 
-// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's
+// The step between the frequencies at which a strip's patterns are looked for, from the lowest one up to the display's
 // limit.
 inline constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
-// Of patterns, from far below any width that can be seen up to the lowest frequency's.
+// The widths of patterns, from far below any that can be seen up to the lowest frequency's.
 inline constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
 inline constexpr std::size_t width_count = 184;
 inline double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
@@ -197,7 +197,7 @@ private:
     using Thresholds = std::array<double, width_count>; // contrasts, by width
     using Sensitivities = std::vector<std::vector<double>>;
 
-    // Of unit contrast, in thresholds. `dimmed`: octaves, as Dimming has them; empty: none.
+    // The visibility of unit contrast, in thresholds. `dimmed`: octaves, as Dimming has them; empty: not dimmed.
     static double visibility(const Sensitivities& sensitivities, const PatternBands::Shares& shares,
                              std::span<const float> dimmed, std::size_t width) {
         const std::size_t bands = sensitivities.front().size();

@@ -7,7 +7,7 @@
 namespace unseen::perception {
 namespace {
 
-// Of illuminances from a four-thousandth of white to white; more light than that is cut off.
+// Illuminances range from a four-thousandth of white to white; more light than that is cut off.
 constexpr int illuminance_octaves = 12, illuminances_per_octave = 4;
 double illuminance_at(int i) {
     return std::exp2(static_cast<double>(i) / illuminances_per_octave - illuminance_octaves);

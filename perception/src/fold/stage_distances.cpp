@@ -23,7 +23,7 @@ using Bands = std::array<Band, finer_bands + FoldStage::band_count>;
 
 class Eye {
 public:
-    // Of the brightest of the mesh, and of what is behind it.
+    // Sees the brightest of the mesh, and what is behind it.
     Eye(const CsfTable& csf, double eccentricity_deg, Luminance mesh, Luminance behind, double highest_cpd,
         const BandElevation& masking) {
         for (std::size_t i = 0; i < angle_count; ++i) {
@@ -61,8 +61,8 @@ public:
     }
 
 private:
-    // Of the contrast of a grating of so many times the display's highest frequency: pixels show the mean over their
-    // area. What is beyond the limit is taken for a grating of the limit.
+    // The share of a grating's contrast that the display shows, by multiples of its highest frequency: pixels show the
+    // mean over their area. What is beyond the limit is taken for a grating of the limit.
     static double share_on_display(double times_highest) {
         if (!(times_highest < 2)) return 0;
         const double x = times_highest * std::numbers::pi / 2;

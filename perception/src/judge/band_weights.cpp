@@ -51,7 +51,7 @@ double level_response(double freq_cpd, double ppd, int level, Orientation orient
         response *= std::abs(in_both_axes(angular_frequency(freq_cpd, ppd, i), orientation, kernel_response));
     return response;
 }
-// Of a Laplacian band: of its level, less what the next level gives back.
+// The response of a Laplacian band: that of its level, less what the next level gives back.
 double band_response(double freq_cpd, double ppd, int level, Orientation orientation) {
     const double back = in_both_axes(angular_frequency(freq_cpd, ppd, level), orientation, kernel_response);
     return level_response(freq_cpd, ppd, level, orientation) * (1 - back * back);

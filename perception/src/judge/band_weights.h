@@ -48,7 +48,7 @@ Result<void> check(const JudgeOptions& options);
 double summation_area(const BandConditions& c, double freq_cpd);
 double summation_area_in_samples(const BandConditions& c, int level); // of a level, at its nominal frequency
 
-// Of one band's contrasts: far beyond all that is visible, and its power is a float.
+// The limit of one band's contrasts: far beyond all that is visible, and its power is still a float.
 float most_thresholds(double beta);
 
 // To unlimited gratings.
@@ -57,7 +57,7 @@ double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance
 double nominal_frequency(double ppd, int level); // cpd
 int base_level(int width, int height, double ppd);
 
-// Of samples in a row.
+// Weights of samples in a row.
 struct BandWeights {
     std::vector<float> sensitivity;   // to unlimited gratings of the nominal frequency
     std::vector<float> own, smoothed; // how contrasts count, in units of what the nominal frequency's should be
@@ -81,7 +81,7 @@ public:
     std::size_t eccentricities() const { return eccentricities_; }
     const std::vector<Node>& nodes() const { return nodes_; }
 
-    // Of samples with these luminances in cd/m2 and eccentricities in degrees; with none of those, where there is no
+    // Weighs samples with these luminances in cd/m2 and eccentricities in degrees; no eccentricities if there is no
     // gaze. What is beyond the conditions' ranges counts as their end.
     void weigh(std::span<const float> luminance, std::span<const float> eccentricity, BandWeights& weights) const;
 

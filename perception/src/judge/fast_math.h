@@ -10,7 +10,7 @@
 
 namespace unseen::perception {
 
-// Of a normal, positive number.
+// Precondition: a normal, positive number.
 inline float fast_log2(float x) {
     constexpr std::uint32_t half_root = 0x3f3504f3; // 1 / sqrt 2: mantissas are taken from there to sqrt 2
     const auto bits = std::bit_cast<std::uint32_t>(x);

@@ -192,7 +192,7 @@ private:
 struct Band {
     int level = 0;
     bool is_base = false;
-    // Of differences in cd/m2: contrasts in thresholds of unlimited gratings, masked, are
+    // Weights of differences in cd/m2: contrasts in thresholds of unlimited gratings, masked, are
     //   own x + smoothed (h*x).
     Plane own, smoothed;
     SummationWindow window{1};

@@ -19,7 +19,8 @@ constexpr double csf_peak_frequency = 3.248;        // cpd, of the CSF below at 
 constexpr double csf_reference_luminance = 100;     // cd/m2
 constexpr double largest_elevation = 10;
 constexpr std::array<double, 5> kernel = {0.05, 0.25, 0.4, 0.25, 0.05};
-// Of tables. Where TVI has a step or a bend, a table errs by up to 3% within one node's distance; elsewhere by 1e-5.
+// Resolution of tables. Where TVI has a step or a bend, a table errs by up to 3% within one node's distance; elsewhere
+// by 1e-5.
 constexpr int nodes_an_octave = 128;
 constexpr int first_octave = -17, last_octave = 20; // 0.8e-5 to 1e6 cd/m2: around the floor, and beyond the sun on snow
 constexpr float least_log2 = -126;                  // of a float: a sensitivity below it is none

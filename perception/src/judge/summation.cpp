@@ -5,7 +5,7 @@
 namespace unseen::perception {
 namespace {
 
-// Of the integral of e^-t f(t).
+// A node of the quadrature of the integral of e^-t f(t).
 struct Quadrature {
     double t, weight;
 };

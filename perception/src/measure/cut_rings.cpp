@@ -94,7 +94,7 @@ struct Lit {
     }
 };
 
-// Of grey trees.
+// Light of grey trees.
 struct GreyVertices {
     using Light = double;
     explicit GreyVertices(const VertexTree& tree) : luminance(tree.luminance()) {}
@@ -103,7 +103,7 @@ struct GreyVertices {
     std::span<const Unorm16> luminance;
 };
 
-// Of textured trees: the vertices' luminance alone, and times the texture's.
+// Light of textured trees: the vertices' luminance alone, and times the texture's.
 struct TexturedVertices {
     using Light = glm::dvec2;
     explicit TexturedVertices(const VertexTree& tree)

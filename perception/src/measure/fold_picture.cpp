@@ -65,7 +65,7 @@ UNSEEN_INLINE void draw_rows(const Shown<count>& t, const Canvas<count>& on) {
 }
 // ---- bands of frequency
 
-// Of the pyramid, of which no cell is left out; by distance in steps.
+// The kernel of the pyramid, of which no cell is left out; by distance in steps.
 constexpr std::array<float, 3> kernel = {static_cast<float>(kernel_middle), static_cast<float>(kernel_near),
                                          static_cast<float>(kernel_far)};
 constexpr std::size_t longest_step = std::size_t{1} << (bands - 1), margin = (kernel.size() - 1) * longest_step;

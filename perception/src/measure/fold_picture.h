@@ -59,7 +59,7 @@ public:
         // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
         float shift;
     };
-    // Of the first `compared` luminances alone, each band's difference times its cell's weight; null: 1.
+    // Compares only the first `compared` luminances, each band's difference times its cell's weight; null: 1.
     using Cells = std::array<float, side * side>;
     using BandCells = std::array<Cells, bands>;
     Difference difference(std::size_t compared = count, const BandCells* weights = nullptr) const;

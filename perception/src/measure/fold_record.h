@@ -34,12 +34,12 @@ struct FoldStage {
     // mask.
     float contrast[backgrounds.size()][band_count][masks.size()] = {};
 
-    // Of a band: cycles over the diameter of VertexTree::bounding_sphere().
+    // The frequency of a band: cycles over the diameter of VertexTree::bounding_sphere().
     static double frequency(std::size_t band);
 
     bool operator==(const FoldStage&) const = default;
 };
-// Of each contrast the larger one.
+// Keeps the larger one of each contrast.
 using ContrastsByBand = float[FoldStage::band_count][FoldStage::masks.size()];
 inline void include(const ContrastsByBand& other, float factor, ContrastsByBand& contrast) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b)
@@ -75,8 +75,8 @@ struct Illumination {
 // shadow, a contrast is no more than the larger one of the two: d and m are linear in the share. That is so of each
 // place. What masks a change there is taken from the picture of the single light: a measurement, as all of the stages.
 struct LitStages {
-    // Of what white that faces the light has of it, which is 1 in the pictures. Ascending; the last one: no other
-    // light.
+    // Shares of the light on a white surface that faces it, which is 1 in the pictures. Ascending; the last one: no
+    // other light.
     static constexpr std::array<float, 5> ambient_shares = {0, 0.1f, 0.2f, 0.4f, 1};
     static constexpr std::size_t lights = 3; // of a direction
     // What FoldStage::backgrounds are shares of, for a mesh in the shade may stand before what is not.
@@ -95,8 +95,8 @@ inline constexpr std::string_view record_name = "fold_errors", facing_name = "fo
                                   stage_of_name = "fold_stage", stages_name = "fold_stages",
                                   settings_name = "fold_measurement", texture_name = "fold_texture";
 
-// Of an interior node. Lengths in mesh units, luminances relative, 0..1. Neighbours: folded as far as nodes that are no
-// larger than this one and not much richer in luminance, or not at all; the larger of the two counts.
+// What is measured of an interior node. Lengths in mesh units, luminances relative, 0..1. Neighbours: folded as far as
+// nodes that are no larger than this one and not much richer in luminance, or not at all; the larger of the two counts.
 struct FoldRecord {
     using Component = float;
 
@@ -129,8 +129,8 @@ static_assert(sizeof(FoldRecord) == 18 * sizeof(float));
 struct FoldFacing {
     using Component = std::uint8_t;
 
-    // Of all triangles that touch the support, before and after the fold, with unfolded and with folded neighbours:
-    // where all of these face the eye, or none does, the fold moves no outline.
+    // The normals of all triangles that touch the support, before and after the fold, with unfolded and with folded
+    // neighbours: where all of these face the eye, or none does, the fold moves no outline.
     vdtree::NormalSlabs facing;
     std::uint8_t is_height_field = 0; // whether nothing is hidden under something else in the pictures
     // 0: as large over any area, systematic; 2: as random errors do; 3: errors that cancel each other.

@@ -19,8 +19,8 @@ Numbers around(const std::array<float, count>& sorted, float low, float high) {
     return n;
 }
 
-// Of a mesh before a background `times` as bright as the brightest of the pictures. With its change l of light and c of
-// cover, |l - times c| <= times |l - c| + (times - 1) |l|; and what that is divided by does not get less.
+// For a mesh before a background `times` as bright as the brightest of the pictures. With its change l of light and c
+// of cover, |l - times c| <= times |l - c| + (times - 1) |l|; and what that is divided by does not get less.
 void include_brighter(const FoldStage& stage, float times, ContrastsByBand& contrast) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b)
         for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)

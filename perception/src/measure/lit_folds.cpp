@@ -48,7 +48,7 @@ struct Shades {
 };
 static_assert(sizeof(Shades) == 10 * sizeof(float));
 
-// Of an interior node.
+// What light changes at an interior node.
 struct LitRecord {
     using Component = float;
 
@@ -105,7 +105,7 @@ Error refused(const std::string& what) {
                                            " Measure it again, or build the tree again from its mesh."};
 }
 
-// Of one light at a node.
+// What one light does at a node.
 struct Reach {
     float most = 0;   // of white that faces it, in the ring
     float uneven = 0; // by how much that is no plane over the ring
@@ -305,8 +305,8 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
     parallel_loop(NodeId{0}, tree.interior_count(), [&](NodeId node) {
         const VertexCone& cone = state_->bounds.cones()[node];
         const Sphere ring = tree.bounds()[node].ring;
-        // Of all lights that something in the ring faces: a light from l makes l a n of a vertex, so a change of a n by
-        // at most v along each axis comes to |l_k| v_k at most.
+        // Over all lights that something in the ring faces: a light from l makes l a n of a vertex, so a change of a n
+        // by at most v along each axis comes to |l_k| v_k at most.
         glm::vec3 most(0);
         float uneven = 0;
         for (std::size_t i = 0; i < alone.size(); ++i) {

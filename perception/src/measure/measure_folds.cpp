@@ -76,7 +76,7 @@ Result<SoundTree> in_units(const VertexTree& tree, float scale, std::shared_ptr<
 
 Error cancelled_error() { return {ErrorCode::cancelled, "Measuring what folds change was cancelled."}; }
 
-// Of trees that are the same but for their luminances, with what follows from each.
+// Measurements of trees that are the same but for their luminances, with what follows from each.
 struct Measured {
     std::vector<MeasuredFolds> found;           // by tree
     std::vector<std::vector<FoldError>> errors; // likewise, in the units that were measured in

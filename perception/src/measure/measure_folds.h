@@ -36,7 +36,7 @@ Result<MeasuredShadings> measure_shadings(const vdtree::VertexTree& tree, std::s
 // will be. `texture`: of texture_detail_of(). Cost: some 1.5 us a node.
 Result<void> add_luminance_bias(const vdtree::VertexTree& tree, const TextureDetail* texture, MeasuredFolds& measured);
 
-// Of the tree's texture; null where there is none. Fails where knows_texture() is false.
+// The detail of the tree's texture; null without one. Fails if knows_texture() is false.
 Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const vdtree::VertexTree& tree);
 
 // Nothing where there is no tree.

@@ -49,13 +49,13 @@ inline constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
 // ---- shifts of the mean (luminance_bias.cpp)
 inline constexpr float levels_per_octave = 1; // of the order in which nodes fold
 inline constexpr int most_levels = 40;
-// Of a surface's area that its vector area must come to; else its parts count without cancelling.
+// The share of a surface's area that its vector area must reach; else its parts count without cancelling.
 inline constexpr float flat_share = 0.5f;
 inline constexpr float spread = 1; // standard deviations by which what is folded may differ from all that could be
 inline constexpr float least_contrast = 2e-3f; // relative luminance: below, errors do not order the folds any more
 inline constexpr float darkest = 0.01f;        // relative luminance of areas; about a display's black
 inline constexpr float least_side = 0.25f;     // of a surface's area, as seen: less is not what the mean is taken of
-// Of a node, from the nearest on, that are looked at: trees may be as deep as they have vertices.
+// Ancestors of a node that are looked at, from the nearest on: trees may be as deep as they have vertices.
 inline constexpr int most_ancestors = 4096;
 
 // ---- pictures of the whole mesh, in stages (find_stages.cpp)
@@ -64,11 +64,11 @@ inline constexpr std::size_t stage_side = 128; // of pictures, in cells
 inline constexpr std::size_t cell_samples = 4;
 inline constexpr float stage_margin = 1.05f; // of the picture around the mesh's sphere: proxies may stand out of it
 inline constexpr std::size_t direction_count = 26;
-// Of the nodes that the first stage leaves; finer ones are for near views, which go by other errors.
+// The share of nodes that the first stage leaves; finer ones are for near views, which go by other errors.
 inline constexpr double first_share = 0.8;
 inline constexpr double stages_per_halving = 2;
 inline constexpr double fewest_left = 4; // nodes; then all fold
-// Of a typical outline: what a distance between surfaces changes of the light.
+// The contrast of a typical outline: what a distance between surfaces changes of the light.
 inline constexpr float outline_contrast = 0.6f;
 
 // What is kept with a measurement.

@@ -15,7 +15,7 @@ using namespace vdtree;
 
 namespace {
 
-// Of relative luminance; a hundredth of the least contrast of colour that eyes can see, and above the rounding of
+// In relative luminance: a hundredth of the least contrast of colour that eyes can see, and above the rounding of
 // greys.
 constexpr float grey_slack = 1e-5f;
 // Pure blue as bright as white has 11: whatever is beyond comes from impossible colours.

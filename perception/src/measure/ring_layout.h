@@ -112,7 +112,7 @@ private:
         float along_b, along_c, along_bc;                             // what lengths along the edges are divided by
         float inverse;                                                // of the determinant; 0: only its edges count
     };
-    // Of edges without a length, the first end is as near as any.
+    // On an edge without a length, the first end is as near as any point.
     static float divisor(float squared) { return squared > 0 ? squared : infinitely_far; }
 
     // The nearest point a + v b + w c of each triangle: of its inside, where the foot of the perpendicular lies there,

@@ -157,7 +157,7 @@ float TextureDetail::contrast(std::size_t number, const UvBox& box) const {
 
 namespace {
 
-// Of a triangle's side: equal parts of about so many texels each, in whose middles the texture's mean is looked up.
+// A triangle's side is cut into equal parts of about so many texels, in whose middles the texture's mean is looked up.
 // With coarser ones, what the means are wrong by looks like light that folds add; more than so many cost more than they
 // tell.
 constexpr float texels_of_part = 1;

@@ -12,7 +12,7 @@ namespace unseen::perception {
 // detail: patterns of about four of its texels a wave.
 class TextureDetail {
 public:
-    // Of a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count).
+    // Takes a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count).
     // Cost: some passes over the texels; 6 bytes of memory for each.
     explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
 
@@ -88,7 +88,7 @@ public:
     // Cost: one pass over the triangles.
     TextureDensities(const vdtree::SoundTree& tree, const TextureDetail& texture);
 
-    // Of the mesh's triangles that vanish under a node, and of these others around it.
+    // The density over the mesh's triangles that vanish under a node, and over these others around it.
     TextureDensity of(vdtree::NodeId node, std::span<const vdtree::Index> around) const;
 
 private:

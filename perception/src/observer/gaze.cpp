@@ -14,7 +14,7 @@
 namespace unseen::perception {
 namespace {
 
-// Of fixations and saccades, see the header.
+// Fixations and saccades: see the header.
 constexpr double median_fixation_s = 0.25, fixation_spread = 0.35; // standard deviation of the logarithm
 constexpr int amplitude_shape = 2;
 constexpr double mean_amplitude_deg = 5.5, least_amplitude_deg = 0.5, largest_amplitude_deg = 20;

@@ -51,7 +51,7 @@ std::vector<Index> find_first_equal_vertex(const MeshView& mesh) {
         });
 }
 
-// Of the used vertices, those whose first one is another used vertex.
+// Counts used vertices whose first one is another used vertex.
 std::uint64_t count_repeated(const std::vector<Index>& first, const std::vector<bool>& is_used) {
     std::vector<bool> is_met(first.size(), false);
     std::uint64_t repeated = 0;

@@ -379,7 +379,7 @@ private:
         return number;
     }
 
-    // Of PLY and the like: what the mesh itself has.
+    // For PLY and the like: what the mesh itself has.
     void add_plain(const Mesh& mesh, std::size_t level) {
         RestoredPart& part = parts_.emplace_back(1).front();
         SourceDocument document;

@@ -38,7 +38,7 @@ std::optional<std::string> decode_base64(std::string_view text) {
 
 bool is_data(std::string_view uri) { return uri.starts_with("data:"); }
 
-// Of views that are compressed: stands for what they hold uncompressed, and may have no data.
+// Whether a buffer stands for what compressed views hold uncompressed; it may have no data.
 bool is_fallback(const json& buffer) { return within(buffer, {"extensions", meshopt_extension, "fallback"}) == true; }
 
 } // namespace
@@ -277,7 +277,7 @@ namespace {
 // byte.
 constexpr std::size_t most_growth = 64;
 constexpr std::size_t least_bound = 4096; // bytes: headers count where there is little
-// Of all views together, where a file is small: bytes.
+// The bound of all views together for a small file: bytes.
 constexpr std::size_t least_bound_of_all = std::size_t{16} << 20;
 
 struct Packed {

@@ -29,7 +29,7 @@ class GltfFile {
 public:
     explicit GltfFile(const GltfOptions& options = {}) : options_(options) {}
 
-    // Of all positions of a mesh; unused where they are not to be quantized, or lie at one place.
+    // The grid for all positions of a mesh; unused if they are not quantized, or all lie at one place.
     GltfGrid grid_for(glm::vec3 low, glm::vec3 high) const;
     // A node's transform for a mesh on the grid.
     static nlohmann::json transform_of(const GltfGrid& grid);

@@ -210,7 +210,7 @@ private:
     bool lost_mirrors_ = false;
 };
 
-// Of all materials, no two the same.
+// Names of all materials, no two the same.
 std::vector<std::string> material_names(const json& document) {
     std::vector<std::string> names;
     std::set<std::string> taken;

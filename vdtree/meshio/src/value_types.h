@@ -52,7 +52,7 @@ inline void change_order(std::span<std::byte> values, std::size_t value_bytes, s
         std::reverse(values.data() + i, values.data() + i + value_bytes);
 }
 
-// Of an array of whole numbers. Those beyond 63 bits become the largest one, which is no index.
+// The values of an array of whole numbers. Those beyond 63 bits become the largest one, which is no index.
 inline std::vector<std::int64_t> whole_numbers(const VertexArray& array) {
     std::vector<std::int64_t> numbers;
     numbers.reserve(array.values.size() / byte_size(array.type));

@@ -135,7 +135,7 @@ struct Masks {
     }
 };
 
-// Of cells in all bands, those whose thresholds rise by a quarter or more: less does nearly nothing.
+// The share of cells in all bands whose thresholds rise by a quarter or more: less does nearly nothing.
 float share_raised(const perception::MaskingPicture::Elevations& a, const perception::MaskingPicture::Elevations& b) {
     constexpr float raised = 1.25f;
     std::size_t count = 0;

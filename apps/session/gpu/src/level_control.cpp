@@ -76,7 +76,7 @@ bool may_shade(const Caster& light, const WorldSphere& from, const WorldSphere& 
     return angle < std::asin(from.radius / far_a) + std::asin(to.radius / far_b);
 }
 
-// Of the sphere's outline, within the field that a flat window has at its middle.
+// The size of the sphere's outline at the scale that a flat window has at its middle.
 double pixels_of(const WorldSphere& sphere, const vdtree::View& view) {
     const double distance = std::max(glm::length(sphere.centre - view.eye), sphere.radius);
     const double focal = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
@@ -621,10 +621,10 @@ struct LevelControl::Impl {
     UploadedBackdrop backdrop;
     std::vector<WorldSphere> backdrop_spheres;
     std::optional<render::Ball> reach; // of shadows: around all that there is
-    // Of the picture; and, one after the other, those that mask a layer and those that what is tested casts. Made when
-    // they are first drawn.
+    // Shadows of the picture; and, one after the other, those that mask a layer and those that what is tested casts.
+    // Made when they are first drawn.
     std::optional<render::Shadows> shadows, other_shadows;
-    // Of the last frame: what casts shadows, first the objects, and the layer that each is in, or -1; and by layer
+    // From the last frame: what casts shadows, first the objects, and the layer that each is in, or -1; and by layer
     // whether any may fall on it from elsewhere.
     std::vector<render::Item> casters;
     std::vector<int> caster_layers;
@@ -724,7 +724,7 @@ Result<LevelFrame> LevelControl::settle(const vdtree::View& view, int most_frame
     return frame;
 }
 
-// Of the objects of each level the depth alone: the nearest level is what a pixel shows.
+// Draws only the depth of each level's objects: a pixel shows the nearest level.
 Result<std::vector<int>> LevelControl::read_levels() {
     Impl& own = *impl_;
     if (!own.passes) return no_picture();

@@ -21,7 +21,7 @@ constexpr int margin_px = 32;     // around the outline: what the judges look at
 
 double focal_px(const Lod& lod) { return lod.height_px / 2.0 / std::tan(lod.fov_y_degrees * std::numbers::pi / 360); }
 
-// Of the sphere's outline, from straight ahead. Precondition: the eye is outside.
+// The radius of the sphere's outline, seen straight ahead. Precondition: the eye is outside.
 double outline_px(const Lod& lod, double radius, double distance) {
     return focal_px(lod) * radius / std::sqrt((distance - radius) * (distance + radius));
 }
@@ -138,7 +138,7 @@ private:
         return open;
     }
 
-    // Of levels that begin at about one distance, the last does for all.
+    // When levels begin at about one distance, only the last stays.
     static void merge(std::vector<LodLevel>& levels, LodObject& made) {
         for (std::size_t i = levels.size(); i-- > 1;) {
             if (levels[i].distance >= lod_step * levels[i - 1].distance) continue;

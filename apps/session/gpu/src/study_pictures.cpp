@@ -41,7 +41,7 @@ struct Photographer {
             return ok.error();
         return file;
     }
-    // Of what a request makes of the view.
+    // Draws what a request makes of the view.
     Result<fs::path> take(Request request, const vdtree::View& view, const std::string& name) {
         request.purpose = Purpose::picture;
         const auto made = session.simplify(view, request);

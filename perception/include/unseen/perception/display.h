@@ -38,7 +38,7 @@ struct Display {
                                // included; from 0 to 1, strictly ascending, interpolated
     Lux ambient{0};
     double reflectivity = 0.005; // share of the ambient light that the screen scatters back, 0..1
-    // Of headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty:
+    // For headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty:
     // flat.
     std::vector<PixelsPerDegreeAt> lens;
     double field_deg =
@@ -52,10 +52,10 @@ Result<void> validate(const Display& display);
 // At the centre of the screen, where a flat picture has the fewest: 1 / (2 atan(pitch / (2 distance))). Of headsets: of
 // the flat picture, not the panel. This is what frequencies in a picture are told by, such as a judge's.
 PixelsPerDegree pixels_per_degree(const Display& display);
-// Of the largest pixel: what a change fills however small it is. Headsets: the picture's centre, or where the panel is
-// coarsest.
+// Pixels per degree where pixels are largest: a change fills at least one. Headsets: the picture's centre, or where the
+// panel is coarsest.
 PixelsPerDegree coarsest_pixels_per_degree(const Display& display);
-// Of the smallest pixel, whose nyquist() no detail exceeds. Headsets: where the panel is finest.
+// Pixels per degree where pixels are smallest: no detail exceeds its nyquist(). Headsets: where the panel is finest.
 PixelsPerDegree finest_pixels_per_degree(const Display& display);
 // At an angle from the centre, along the radius; above 0. Flat screens: ppd (tan(a + delta) - tan a) / tan delta, delta
 // half a pixel, so about ppd / cos^2 a; angles are clamped so that a + delta is at most 89.9 degrees. Headsets: by the

@@ -14,7 +14,8 @@ namespace unseen::perception {
 // Copies are cheap and share their data; any number of threads may ask at once.
 class MaskingPicture {
 public:
-    // Of one picture, in cells of a grid over it, from its top left: the factor by which thresholds are raised, at least.
+    // Elevations of one picture, by cells of a grid from its top left: the factor by which thresholds are raised, at
+    // least.
     struct Elevations {
         int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
         int columns = 0, rows = 0;

@@ -65,7 +65,7 @@ inline KernelClock kernel_clock(double now) {
 
 // The deadlines of up to sixteen slots that were tested.
 struct DeadlineBatch {
-    // Of the slots' blocks, now: the change of distance beyond that of the block's sphere, and the sphere's distance.
+    // For each slot's block, now: the change of distance beyond that of the block's sphere, and the sphere's distance.
     alignas(64) float passed[kernel_lanes], distance[kernel_lanes];
     float facing_clock; // or a little less
     float longest;      // no slack of distances is longer

@@ -69,7 +69,7 @@ public:
     SelectionFollower(SelectionFollower&&) noexcept = default;
     SelectionFollower& operator=(SelectionFollower&&) noexcept = default;
 
-    // Of the next frame. Cost: microseconds an object in the frame.
+    // Chooses the levels of the next frame. Cost: microseconds an object in the frame.
     Result<ChosenLevels> choose(const vdtree::View& view);
 
 private:

@@ -106,7 +106,8 @@ public:
     // LevelControlOptions::bias, from the next frame on; above 0 and finite.
     void set_bias(double bias);
 
-    // Of the method `given`, from the next frame on, by object; -1 and levels that an object lacks: its last one.
+    // Sets the levels of the method `given`, from the next frame on, by object; -1 and levels that an object lacks: its
+    // last one.
     void set_levels(std::span<const int> levels);
 
     // Waits for the GPU and applies its counts: for programs that write frames to files. Only `tests` and `times` of

@@ -15,7 +15,7 @@ inline constexpr int usual_lod_directions = 12;
 struct LodOptions {
     LevelChainOptions chain = {.levels = 5}; // with the full mesh
     int directions = usual_lod_directions;   // that each level is looked at from, 1 to 1000
-    // Of the pictures that are judged, a pixel, 1 to 256. What shows with fewer is looked at again with all of these.
+    // Samples a pixel of the judged pictures, 1 to 256. What shows with fewer is judged again with all of them.
     int samples = 64;
     std::uint64_t seed = 1; // of the directions
     // The vertical field of the target camera over the whole display, in (0, 180). Not set: the field that the display

@@ -34,7 +34,7 @@ struct PrecomputeOptions {
 struct PrecomputeReport {
     std::size_t corners = 0, cells = 0, cameras = 0; // cameras: that have an object in sight
     std::size_t resumed = 0;                         // corners that an earlier search had finished
-    // Of this process: seconds of the whole, of loading, and, of these, of drawing and reading back; of searching, by
+    // Seconds of this process: the whole, loading, and, of these, drawing and reading back; searching, by
     // all threads together.
     double seconds = 0, load_seconds = 0, draw_seconds = 0, read_seconds = 0, search_seconds = 0;
     std::uint64_t drawings = 0, drawn_triangles = 0, evaluations = 0;

@@ -46,7 +46,7 @@ public:
 
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
 
-    // Of the last draw; empty if no light casts shadows. Waits for the GPU.
+    // Facts of the last draw; empty if no light casts shadows. Waits for the GPU.
     std::optional<render::ShadowFacts> shadows() const;
 
 private:

@@ -7,9 +7,9 @@
 
 namespace unseen::perception {
 
-// Of linear RGB (Rec. 709): x towards red (negative: green), y towards violet (negative: yellow), in units of relative
-// luminance. White and all greys have (0, 0); pure red of the luminance 0.2126 has (0.121, -0.205), pure blue of 0.0722
-// (-0.035, 0.801). Linear, so interpolated colours lie between those they are interpolated from.
+// The chroma of linear RGB (Rec. 709): x towards red (negative: green), y towards violet (negative: yellow), in units
+// of relative luminance. White and all greys have (0, 0); pure red of the luminance 0.2126 has (0.121, -0.205), pure
+// blue of 0.0722 (-0.035, 0.801). Linear, so interpolated colours lie between those they are interpolated from.
 //
 // These are L - k M and k' S - (L + M) of the cones' responses (CIE 2006, 2 degrees, from CIE 1931 XYZ on an LED
 // display by the matrix that castleCSF's program uses), over L + M of white; k and k' such that white (D65) has
@@ -19,7 +19,7 @@ constexpr glm::dvec2 opponent_chroma(glm::dvec3 rgb) {
             -0.20453379289306542 * rgb.r - 0.5968319963708706 * rgb.g + 0.801365789263936 * rgb.b};
 }
 
-// Of both directions, by component.
+// The range in both directions, by component.
 struct ChromaRange {
     glm::vec2 lo = glm::vec2(0);
     glm::vec2 hi = glm::vec2(0);

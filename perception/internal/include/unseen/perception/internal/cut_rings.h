@@ -32,7 +32,7 @@ struct CutRings {
     // so uncover anything. True where it is of a child. Empty where it is of none.
     std::vector<bool> meets_another;
 
-    // Of textured trees; else empty. All of them at least the children's. `luminance` above is that of both together,
+    // For textured trees; else empty. Each at least the children's. `luminance` above is that of both together,
     // as drawn; what vertices and texture can be in any cut, each for itself:
     std::vector<vdtree::PackedRange> vertices; // what the texture is multiplied with
     std::vector<vdtree::PackedRange> texture;

@@ -27,7 +27,7 @@ struct Moments {
     }
 };
 
-// Of one window (eq. 13), -1 to 1, with biased covariance.
+// The similarity in one window (eq. 13), -1 to 1, with biased covariance.
 inline double similarity(const Moments& m) noexcept {
     constexpr double c1 = (k1 * data_range) * (k1 * data_range);
     constexpr double c2 = (k2 * data_range) * (k2 * data_range);

@@ -56,9 +56,9 @@ struct JudgeTables {
     int width = 0, height = 0;
     float floor_cdm2 = 0;
     float beta = 0, most_thresholds = 0;
-    // Of the pyramid: taps of its kernel, by distance in samples.
+    // The pyramid: taps of its kernel, by distance in samples.
     std::array<float, 3> kernel = {};
-    // Of masking: (1 + m^power)^(1 / knee), m from least_masker to most_masker.
+    // Masking: (1 + m^power)^(1 / knee), m from least_masker to most_masker.
     float masking_power = 0, masking_knee = 0, least_masker = 0, most_masker = 0;
     // Node l is where a float's bits, shifted right by luminance_shift, are first_luminance + l; what they lose is the
     // share of the way to the next one. Node e is at first_eccentricity + e eccentricity_step degrees. What lies beyond

@@ -75,7 +75,7 @@ struct Selections::Data {
 // Differs, but for bad luck, where objects, their places, or the triangles of their levels differ.
 std::uint64_t scene_fingerprint(const Scene& scene, std::span<const std::vector<std::uint32_t>> triangles);
 
-// Of all that corners depend on but the place: what selections say but for their corners and cells.
+// The key of everything that corners depend on except their place: all of `selections` but corners and cells.
 std::uint64_t search_key(const Selections::Data& selections);
 
 // Whether the corners' selections differ by more than so many levels, in the mean over the objects that any of them has
