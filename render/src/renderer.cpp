@@ -62,13 +62,27 @@ struct Renderer::Impl {
     GpuCut cut;
     std::optional<SampleSum> sum; // made for the first frame off screen, and for each of another size
 
+    Item item(const DrawOptions& options, const vdtree::Similarity& placement) const {
+        return {cut, placement, options.shading, options.wireframe, options.lighting};
+    }
+
     template <class Shown>
     Result<Frame> draw(const Shown& shown, const vdtree::View& view, const DrawOptions& options,
                        const vdtree::Similarity& placement) {
         if (auto followed = cut.follow(shown); !followed) return followed.error();
-        const Item one{cut, placement, options.shading, options.wireframe, options.lighting};
+        const Item one = item(options, placement);
         return draw_frame(sum, cut.tree().context(), {&one, 1}, view,
                           {options.samples, options.seed, options.background});
+    }
+    template <class Shown>
+    Result<void> draw_to_window(const Shown& shown, const vdtree::View& view, const DrawOptions& options,
+                                const vdtree::Similarity& placement) {
+        if (auto followed = cut.follow(shown); !followed) return followed;
+        if (auto valid = vdtree::validate(view); !valid) return valid;
+        auto window = Target::foreign(cut.tree().context(), view.width, view.height);
+        if (!window) return window.error();
+        const Item one = item(options, placement);
+        return render::draw({&one, 1}, {.view = view}, *window, {.colour = glm::vec4(options.background)});
     }
 };
 
@@ -88,6 +102,16 @@ Result<Frame> Renderer::draw(const vdtree::Cut& cut, const vdtree::View& view, c
 Result<Frame> Renderer::draw(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options,
                              const vdtree::Similarity& placement) {
     return impl_->draw(geomorph, view, options, placement);
+}
+
+Result<void> Renderer::draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
+                                      const vdtree::Similarity& placement) {
+    return impl_->draw_to_window(cut, view, options, placement);
+}
+
+Result<void> Renderer::draw_to_window(const vdtree::Geomorph& geomorph, const vdtree::View& view,
+                                      const DrawOptions& options, const vdtree::Similarity& placement) {
+    return impl_->draw_to_window(geomorph, view, options, placement);
 }
 
 } // namespace unseen::render

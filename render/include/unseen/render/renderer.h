@@ -37,6 +37,12 @@ public:
     Result<Frame> draw(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options = {},
                        const vdtree::Similarity& placement = {});
 
+    // Draws to the window's framebuffer, encoded as sRGB, with the hardware's multisampling if it has any.
+    Result<void> draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
+                                const vdtree::Similarity& placement = {});
+    Result<void> draw_to_window(const vdtree::Geomorph& geomorph, const vdtree::View& view,
+                                const DrawOptions& options = {}, const vdtree::Similarity& placement = {});
+
     std::uint64_t uploaded_bytes() const noexcept; // by the last draw, as in GpuCut
 
 private:
