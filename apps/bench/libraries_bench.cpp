@@ -38,7 +38,7 @@ std::vector<Cell> row_of_build(const std::string& file, const vdtree::Mesh& orig
     const Cell empty("", Json());
     const Json report = Json::parse(outcome.out, nullptr, false);
     if (outcome.status != 0 || !report.is_object()) { // not manifold, as a rule: stderr has said so
-        cells.insert(cells.end(), {"refused", empty, empty, empty, empty, empty});
+        cells.insert(cells.end(), {Cell("refused", Json()), empty, empty, empty, empty, empty});
         return cells;
     }
     const vdtree::VertexTree tree = require(vdtree::read_tree(tree_file));

@@ -276,6 +276,9 @@ std::string Setup::summary_of(const CLI::App& verb) const {
     return text;
 }
 
+// The name without dashes. (CLI11 tells none of an option that no help shows.)
+std::string key_of(const CLI::Option& option) { return option.get_lnames().front(); }
+
 std::string Setup::help() const {
     std::string text =
         "The setup: from where one looks, on what display, under what light, and how files are read. The verbs share\n"
@@ -298,7 +301,7 @@ void Setup::check(const CLI::App& verb) {
     const auto is_given = [](const CLI::Option* option) { return !option->empty(); };
     for (const auto& [option, part] : options_)
         if (is_given(option) && !(part & parts_of(verb)))
-            refuse(option->get_name() + " does not act in 'unseen " + verb.get_name() + "': leave it out.");
+            refuse("--" + key_of(*option) + " does not act in 'unseen " + verb.get_name() + "': leave it out.");
     if (is_given(program_.get_option("--setup")) && parts_of(verb) == 0)
         refuse("--setup does not act in 'unseen " + verb.get_name() + "': leave it out.");
     if (program_.get_option("--as")->empty() && (parts_of(verb) & scenes)) view_.as = session::LoadAs::automatic;
@@ -315,11 +318,10 @@ void Setup::read_file(const std::string& file) {
     const CLI::App* verb = &program_;
     while (!verb->get_subcommands().empty()) verb = verb->get_subcommands().front();
     for (const auto& [key, value] : json.items()) {
-        const auto own =
-            std::ranges::find(options_, "--" + key, [](const auto& known) { return known.first->get_name(); });
+        const auto own = std::ranges::find(options_, key, [](const auto& known) { return key_of(*known.first); });
         if (own == options_.end()) {
             std::vector<std::string> keys;
-            for (const auto& known : options_) keys.push_back(known.first->get_name().substr(2));
+            for (const auto& known : options_) keys.push_back(key_of(*known.first));
             const std::string near = suggestion(key, keys);
             refuse("'" + file + "': there is no option '" + key + "' of the setup" + (near.empty() ? "." : near));
         }

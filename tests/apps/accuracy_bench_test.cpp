@@ -75,8 +75,6 @@ TEST_F(AccuracyBenchTest, EveryAxisHasAFrontAndADefault) {
                              "cone",
                              "without conserving light",
                              "without stages",
-                             "modern, half the resolution",
-                             "modern, a quarter",
                              "modern, 1 band",
                              "modern, 5 bands",
                              "rpg99",

@@ -67,7 +67,7 @@ TEST_F(CsfCommandTest, ContradictionsAreRefused) {
         {{"--model", "stela", "--csf", "castle"}, "--model and --csf exclude each other"},
         {{"--velocity", "-1"}, "0 or more"},
         {{"--distance", "0"}, "above 0"},
-        {{"--distance", "3"}, "--distance needs --model daly"},
+        {{"--distance", "3"}, "--distance needs --csf or --model daly"},
         {{"--table", "--save-table", "table.json"}, "it holds all of them"},
         {{"--table", "--area", "1"}, "--area"},
         {{"--model", "barten"}, "barten"},
