@@ -91,7 +91,7 @@ public:
         std::vector<Index> triangles(around_.begin() + static_cast<std::ptrdiff_t>(start_[tree_.first_leaf()[node]]),
                                      around_.begin() + static_cast<std::ptrdiff_t>(start_[tree_.leaf_end()[node]]));
         std::ranges::sort(triangles);
-        triangles.erase(std::ranges::unique(triangles).begin(), triangles.end());
+        triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
         Ring ring;
         ring.sphere = tree_.bounds()[node].ring;
         for (const Index t : triangles) {

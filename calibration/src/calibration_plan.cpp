@@ -64,12 +64,13 @@ std::vector<GratingPlace> wide_places(const CalibrationPlan& plan, const percept
     const double side = std::min(perception::physical_field(display, display.width_px).value(),
                                  perception::physical_field(display, display.height_px).value());
     const double area = std::min(most_wide_deg2, std::numbers::pi * side * side / 16 * (1 - 1e-9)); // rounding
+    const auto count = static_cast<std::ptrdiff_t>(std::min(coarsest, frequencies.size()));
     std::vector<GratingPlace> wide;
     const auto is_useful = [&](const GratingPlace& place) {
         return area >= least_wide_deg2 && summation_gain(place) >= least_improvement && fits(display, place) &&
                is_measurable(plan, expected, place);
     };
-    for (const double frequency : frequencies | std::views::take(coarsest)) {
+    for (const double frequency : std::vector(frequencies.begin(), std::next(frequencies.begin(), count))) {
         const auto is_useful_at = [&](double eccentricity) { return is_useful({frequency, eccentricity, area}); };
         const auto nearest = std::ranges::find_if(eccentricities, is_useful_at);
         if (nearest == eccentricities.end()) continue;

@@ -294,8 +294,9 @@ public:
         }
         const auto key = [](const Contraction::OuterEdge& edge) { return std::pair(edge.cluster, edge.far_slot); };
         std::ranges::sort(c_.outer_edges, {}, key);
-        const auto repeated = std::ranges::unique(c_.outer_edges, {}, key);
-        c_.outer_edges.erase(repeated.begin(), repeated.end());
+        std::vector<Contraction::OuterEdge>& edges = c_.outer_edges;
+        const auto is_repeated = [&](const auto& a, const auto& b) { return key(a) == key(b); };
+        edges.erase(std::unique(edges.begin(), edges.end(), is_repeated), edges.end());
     }
 
 private:

@@ -132,11 +132,33 @@ Wedges collect_wedges(const MeshView& mesh, std::span<const Index> coincident, s
     return out;
 }
 
-// Whether every edge at a place has two triangles that run it in opposite ways: each neighbour follows once and precedes
-// once. Keeps its memory.
+// Looks at the wedges around one place after another.
 class Fan {
 public:
-    bool is_regular(std::span<const Wedge> wedges) {
+    // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
+    // precedes once.
+    bool is_regular(Index place, std::span<const Wedge> wedges) {
+        const std::uint64_t stamp = std::uint64_t{place} << 32;
+        for (const Wedge& wedge : wedges) {
+            std::uint64_t& seen = slot(wedge.following);
+            if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(wedges); // seen twice, or two in one slot
+            seen = stamp | wedge.following;
+        }
+        for (const Wedge& wedge : wedges) {
+            std::uint64_t& seen = slot(wedge.preceding);
+            if (seen != (stamp | wedge.preceding)) return false;
+            seen = stamp | nobody; // only once
+        }
+        return true;
+    }
+
+private:
+    static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
+    static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
+
+    std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
+
+    bool is_regular_by_sorting(std::span<const Wedge> wedges) {
         following_.clear();
         preceding_.clear();
         for (const Wedge& wedge : wedges) {
@@ -148,8 +170,9 @@ public:
         return following_ == preceding_ && std::adjacent_find(following_.begin(), following_.end()) == following_.end();
     }
 
-private:
     std::vector<Index> following_, preceding_;
+    // Neighbours in the lower halves, stamped with the place where they were seen; at first with no place's stamp.
+    std::vector<std::uint64_t> slots_ = std::vector(std::size_t{1} << slot_bits, ~std::uint64_t{0});
 };
 
 // How well the mesh's own normals agree with its faces: positive where they do.
@@ -183,7 +206,7 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
         Fan fan;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
             if (coincident[place] != place) continue;
-            surface.irregular[place] = !fan.is_regular(wedges.around(place));
+            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), wedges.around(place));
             surface.normals[place] = glm::vec3(unit(wedges.sums[place]));
         }
     });

@@ -12,6 +12,9 @@
 // A context and all that is in it belong to the thread that made it.
 #pragma once
 
+#include <unseen/render/context.h>
+#include <unseen/render/draw.h>
 #include <unseen/render/renderer.h>
 #include <unseen/render/sample_sum.h>
 #include <unseen/render/shadows.h>
+#include <unseen/render/target.h>

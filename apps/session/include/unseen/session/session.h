@@ -15,7 +15,13 @@
 
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
+#include <unseen/session/level_chain.h>
+#include <unseen/session/load.h>
+#include <unseen/session/observer.h>
+#include <unseen/session/request.h>
+#include <unseen/session/scene.h>
 #include <unseen/session/selection.h>
+#include <unseen/session/simplification.h>
 
 namespace unseen::session {
 

@@ -11,7 +11,10 @@
 
 #include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/gpu_judge.h>
+#include <unseen/session_gpu/level_control.h>
 #include <unseen/session_gpu/lod.h>
+#include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/precompute_selections.h>
+#include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/session_gpu/study_pictures.h>
 #include <unseen/session_gpu/tradeoff.h>
