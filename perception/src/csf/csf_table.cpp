@@ -2,6 +2,7 @@
 // the fold test, and inverted.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <unseen/perception/internal/motion.h>
@@ -11,7 +12,12 @@
 #include <unseen/vdtree/internal/number_text.h>
 
 namespace unseen::perception {
+
 namespace {
+
+// Buckets of the constant-time search per sample of an axis: enough for one sample or none per bucket on the usual
+// axes, although they are denser near the fovea.
+constexpr std::size_t buckets_per_sample = 16;
 
 // Queries of a batch that are answered together.
 constexpr std::size_t queries_in_step = 8;
@@ -242,7 +248,12 @@ std::vector<double> refined(std::span<const double> degrees) {
     return all;
 }
 
-using Axis = std::vector<double>; // positions of samples: log2 cpd, degrees, log2 cd/m2
+// The samples of one axis, with a uniform grid over them that finds the samples around a value in constant time.
+struct Axis {
+    std::vector<double> positions;         // log2 cpd, degrees, log2 cd/m2
+    std::vector<std::uint32_t> first_cell; // of each of the uniform buckets, and the last cell once more
+    double buckets_per_unit = 0;
+};
 
 // Two neighbouring samples and how far a position, clamped to the axis, lies between them, 0..1.
 struct Cell {
@@ -274,12 +285,46 @@ struct Branches {
     std::vector<double> ceiling;     // [l * frequencies + f], whatever the eccentricity
 };
 
+Axis make_axis(std::vector<double> positions) {
+    Axis axis;
+    if (positions.size() > 1) {
+        const std::size_t buckets = buckets_per_sample * positions.size(), last_cell = positions.size() - 2;
+        axis.buckets_per_unit = double(buckets) / (positions.back() - positions.front());
+        std::size_t cell = 0;
+        for (std::size_t b = 0; b <= buckets; ++b) {
+            const double start = positions.front() + double(b) / axis.buckets_per_unit;
+            while (cell < last_cell && positions[cell + 1] <= start) ++cell;
+            axis.first_cell.push_back(static_cast<std::uint32_t>(cell));
+        }
+        axis.first_cell.push_back(static_cast<std::uint32_t>(last_cell));
+    }
+    axis.positions = std::move(positions);
+    return axis;
+}
+
+// The cell whose samples enclose a position within the axis: the last one that does not start above it.
+std::size_t find_cell(const Axis& axis, double position) {
+    const auto bucket = static_cast<std::size_t>((position - axis.positions.front()) * axis.buckets_per_unit);
+    // One bucket more on either side: a position on a bucket's edge may be rounded into the neighbour.
+    std::size_t cell = axis.first_cell[bucket > 0 ? bucket - 1 : 0];
+    std::size_t last = axis.first_cell[std::min(bucket + 2, axis.first_cell.size() - 1)];
+    while (cell < last) {
+        const std::size_t middle = (cell + last + 1) / 2;
+        if (axis.positions[middle] <= position) {
+            cell = middle;
+        } else {
+            last = middle - 1;
+        }
+    }
+    return cell;
+}
+
 Cell locate(const Axis& axis, double position) {
-    if (axis.size() < 2) return {};
-    const double inside = std::clamp(position, axis.front(), axis.back());
-    const auto next = std::upper_bound(axis.begin() + 1, axis.end() - 1, inside);
-    const auto second = static_cast<std::size_t>(next - axis.begin());
-    return {second - 1, second, (inside - axis[second - 1]) / (*next - axis[second - 1])};
+    if (axis.positions.size() < 2) return {};
+    const double inside = std::clamp(position, axis.positions.front(), axis.positions.back());
+    const std::size_t cell = find_cell(axis, inside);
+    const double start = axis.positions[cell], length = axis.positions[cell + 1] - start;
+    return {cell, cell + 1, (inside - start) / length};
 }
 
 // Written so that NaN is not valid.
@@ -350,10 +395,10 @@ Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branch
     }
 
     const auto table = std::make_shared<State>();
-    table->frequency = std::move(log2_frequency);
-    table->eccentricity = samples.eccentricity_deg;
-    table->monotone_eccentricity = refined(samples.eccentricity_deg);
-    table->luminance = std::move(log2_luminance);
+    table->frequency = make_axis(std::move(log2_frequency));
+    table->eccentricity = make_axis(samples.eccentricity_deg);
+    table->monotone_eccentricity = make_axis(refined(samples.eccentricity_deg));
+    table->luminance = make_axis(std::move(log2_luminance));
     table->samples = std::move(samples);
     table->branches = std::move(branches);
     table->prepare_monotone();
@@ -404,7 +449,7 @@ Result<CsfTable> CsfTable::scaled(double gain) const {
 CsfTable CsfTable::of_half_waves() const {
     constexpr double steepest = -2; // octaves of sensitivity an octave: the share of a patch's area
     const auto table = std::make_shared<State>(*state_);
-    const std::vector<double>& positions = table->frequency;
+    const std::vector<double>& positions = table->frequency.positions;
     // A maximum over the same steps everywhere grows with what it is taken of, so the form stays monotone.
     for (std::size_t i = 1; i < table->log2_monotone.size(); ++i) {
         const std::size_t f = i % positions.size();
@@ -493,7 +538,7 @@ const CsfTable& CsfTable::standard() {
 
 Blend CsfTable::State::blend(double eccentricity_deg, double log2_luminance) const {
     const Cell e = locate(monotone_eccentricity, eccentricity_deg), l = locate(luminance, log2_luminance);
-    const std::size_t frequencies = frequency.size(), luminances = luminance.size();
+    const std::size_t frequencies = frequency.positions.size(), luminances = luminance.positions.size();
     const auto column = [&](std::size_t ei, std::size_t li) {
         return log2_monotone.data() + (ei * luminances + li) * frequencies;
     };
@@ -511,11 +556,11 @@ const std::vector<double>& CsfTable::State::surface() const {
 // Running maxima along the three axes in turn. Each is the largest value over a set that only shrinks along the axes
 // before it, so it leaves what they have reached. A ceiling is left out, which can only make the maxima larger.
 void CsfTable::State::prepare_monotone() {
-    const std::size_t frequencies = frequency.size();
-    const std::size_t plane = frequencies * luminance.size();
+    const std::size_t frequencies = frequency.positions.size();
+    const std::size_t plane = frequencies * luminance.positions.size();
     const std::vector<double> logs = log2_of(surface());
-    log2_monotone.reserve(plane * monotone_eccentricity.size());
-    for (const double degrees : monotone_eccentricity) {
+    log2_monotone.reserve(plane * monotone_eccentricity.positions.size());
+    for (const double degrees : monotone_eccentricity.positions) {
         const Cell e = locate(eccentricity, degrees);
         const double *low = logs.data() + e.first * plane, *high = logs.data() + e.second * plane;
         for (std::size_t i = 0; i < plane; ++i)
@@ -532,14 +577,14 @@ void CsfTable::State::prepare_monotone() {
 // One slope for the whole table: a slope per column could make a frequency rise with eccentricity. The shallowest is
 // the safe one.
 void CsfTable::State::prepare_extrapolation() {
-    const std::size_t frequencies = frequency.size();
+    const std::size_t frequencies = frequency.positions.size();
     double shallowest = -std::numeric_limits<double>::infinity();
     for (std::size_t start = 0; start < log2_monotone.size(); start += frequencies) {
         const float* column = log2_monotone.data() + start;
         std::size_t f = frequencies - 1;
         while (f > 0 && !(column[f - 1] > column[f])) --f;
         if (f == 0) continue;
-        const double octaves = frequency[f] - frequency[f - 1];
+        const double octaves = frequency.positions[f] - frequency.positions[f - 1];
         shallowest = std::max(shallowest, (double(column[f]) - double(column[f - 1])) / octaves);
     }
     last_slope = std::isfinite(shallowest) ? shallowest : 0;
@@ -568,7 +613,7 @@ double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Lu
     if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
     const Cell f = locate(state_->frequency, log2_cpd), e = locate(state_->eccentricity, eccentricity.value());
     const Cell l = locate(state_->luminance, log2_cdm2);
-    const std::size_t frequencies = state_->frequency.size(), luminances = state_->luminance.size();
+    const std::size_t frequencies = state_->frequency.positions.size(), luminances = state_->luminance.positions.size();
     const auto along_frequency = [&](const std::vector<double>& values, std::size_t ei, std::size_t li) {
         const double* column = values.data() + (ei * luminances + li) * frequencies;
         return std::lerp(std::log2(column[f.first]), std::log2(column[f.second]), f.fraction);
@@ -586,9 +631,9 @@ double CsfTable::monotone_sensitivity(CyclesPerDegree frequency, Degrees eccentr
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());
     if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
     const Blend column = state_->blend(eccentricity.value(), log2_cdm2);
-    const double beyond = log2_cpd - state_->frequency.back();
+    const double beyond = log2_cpd - state_->frequency.positions.back();
     if (beyond > 0 && state_->last_slope < 0)
-        return std::exp2(column[state_->frequency.size() - 1] + state_->last_slope * beyond);
+        return std::exp2(column[state_->frequency.positions.size() - 1] + state_->last_slope * beyond);
     const Cell f = locate(state_->frequency, log2_cpd);
     return std::exp2(std::lerp(column[f.first], column[f.second], f.fraction));
 }
@@ -601,7 +646,7 @@ double CsfTable::peak_sensitivity(Degrees eccentricity, Luminance luminance) con
 // behind those of the others, and no branch depends on the data.
 template <std::size_t Count>
 void CsfTable::State::bisect(std::array<Query, Count>& queries) const {
-    for (std::size_t count = frequency.size(); count > 1;) {
+    for (std::size_t count = frequency.positions.size(); count > 1;) {
         const std::size_t half = count / 2;
         for (Query& q : queries) q.sample += q.column[q.sample + half] >= q.log2_threshold ? half : 0;
         count -= half;
@@ -610,17 +655,17 @@ void CsfTable::State::bisect(std::array<Query, Count>& queries) const {
 
 double CsfTable::State::log2_crossing(const Query& q) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    const double value = q.column[q.sample], position = frequency[q.sample];
+    const double value = q.column[q.sample], position = frequency.positions[q.sample];
     if (!(value >= q.log2_threshold)) return -infinity; // only at the first sample: not even the peak
     const double excess = value - q.log2_threshold;
-    if (q.sample + 1 == frequency.size()) {
+    if (q.sample + 1 == frequency.positions.size()) {
         if (excess == 0) return position;
         return last_slope < 0 ? position - excess / last_slope : infinity;
     }
     // On a plateau, where only rounding tells two samples apart, its highest frequency.
     const double drop = value - q.column[q.sample + 1];
     const double share = drop > excess ? excess / drop : 1;
-    return position + share * (frequency[q.sample + 1] - position);
+    return position + share * (frequency.positions[q.sample + 1] - position);
 }
 
 CyclesPerDegree CsfTable::highest_visible_frequency(double contrast, Degrees eccentricity, Luminance luminance) const {
