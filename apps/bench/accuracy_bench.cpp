@@ -71,8 +71,8 @@ const AxisMeasure all_axes[] = {
      map_points},
     {{"levels",
       "levels by masking",
-      "What decides on discrete levels while the eye walks: recipe, layers, resolution and bits of maps, and how often "
-      "objects are tested. In half of the window.",
+      "What decides on discrete levels while the eye walks: the recipe of maps, layers, and how often objects "
+      "are tested. In half of the window.",
       {"ms a frame", "V at the end of the walk", "triangles", "pixels visible", "MB of textures"}},
      Of::scenes,
      level_points},
