@@ -317,18 +317,22 @@ void Setup::read_file(const std::string& file) {
     if (!json.is_object()) refuse("'" + file + "' is no JSON object of options, such as {\"size\": \"512x512\"}.");
     const CLI::App* verb = &program_;
     while (!verb->get_subcommands().empty()) verb = verb->get_subcommands().front();
+    const auto refuse_key = [&](const std::string& key) {
+        std::vector<std::string> keys;
+        for (const auto& known : options_) keys.push_back(key_of(*known.first));
+        const std::string near = suggestion(key, keys);
+        refuse("'" + file + "': there is no option '" + key + "' of the setup" + (near.empty() ? "." : near));
+    };
+    const auto refuse_value = [&](const std::string& key) {
+        refuse("'" + file + "', " + key + ": must be a number, a text, true, false, or an array.");
+    };
     for (const auto& [key, value] : json.items()) {
         const auto own = std::ranges::find(options_, key, [](const auto& known) { return key_of(*known.first); });
-        if (own == options_.end()) {
-            std::vector<std::string> keys;
-            for (const auto& known : options_) keys.push_back(key_of(*known.first));
-            const std::string near = suggestion(key, keys);
-            refuse("'" + file + "': there is no option '" + key + "' of the setup" + (near.empty() ? "." : near));
-        }
+        if (own == options_.end()) refuse_key(key);
         const auto& [option, part] = *own;
         if (!(part & parts_of(*verb)) || !option->empty()) continue;
         const std::vector<std::string> words = words_of(value);
-        if (words.empty()) refuse("'" + file + "', " + key + ": must be a number, a text, true, false, or an array.");
+        if (words.empty()) refuse_value(key);
         take(file, key, *option, words);
     }
 }

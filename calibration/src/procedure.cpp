@@ -377,8 +377,8 @@ namespace {
 constexpr std::string_view state_format = "unseen-calibration";
 constexpr int small_version = 1, wide_version = 2; // without and with the patches' areas
 
-// Of all numbers of a table, in hexadecimal. As floats, since another machine's logarithms may differ in a double's last
-// bits.
+// A hash of all numbers of a table, in hexadecimal. They count as floats, since another machine's logarithms may differ
+// in a double's last bits.
 std::string hash_of_table(const CsfTable& table) {
     std::string bytes;
     const auto add = [&](std::uint32_t bits) {

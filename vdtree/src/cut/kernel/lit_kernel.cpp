@@ -207,8 +207,8 @@ UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, float lea
                        beam.fade_rate * largest_albedo;
     const float full = rise + beam.growth * beam.least * least_albedo * moves +
                        beam.least_rate * beam.least * least_albedo + beam.fade_rate * largest_albedo;
-    // Where all of it faces the light, the difference of the extremes of n.l changes by less than 2 sine a radian, or the
-    // spread of the box; where some of it faces away, by the largest alone; and where all of it does, not at all.
+    // How fast the difference of the extremes of n.l changes. If all of it faces the light: by less than 2 sine a radian,
+    // or the spread of the box. If some of it faces away: as fast as the largest. If all of it does: not at all.
     const float turning_rate =
         beam.growth * (beam.least * least_albedo *
                            (std::max(2 * std::max(facing.sine, 0.0f), b.spread[i]) * beam.to.turn + 2 * beam.to.widen) +
