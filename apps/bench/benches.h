@@ -50,8 +50,8 @@ BenchReport bench_libraries(const BenchOptions& options);
 // which engines switch: what people would see, from the sides that the levels were looked at from.
 BenchReport bench_lod(const BenchOptions& options);
 
-// One factor of the fold model after the other takes other values, and the rest its own: the triangles that the test by
-// errors keeps in all views of a tuning set that is not that of the evidence, and what the first judge sees of that.
+// Varies one factor of the fold model at a time. Counts the triangles that the test by errors keeps in all views of a
+// tuning set, and what the first judge sees of that. The tuning set has no mesh of the evidence.
 struct FitOptions : BenchOptions {
     std::string factor = {}; // one of fit_factors(); empty: each
 };

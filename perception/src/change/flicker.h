@@ -9,9 +9,9 @@ namespace unseen::perception {
 // Over area: sensitivities to this power are summed, and a sum of so many square degrees is the threshold.
 inline constexpr double flicker_pooling = 3.80022, flicker_pooling_deg2 = 6.52801;
 
-// What share of a grating's contrast the flicker of the moment has, as three Gaussians over frequency, which are blurs
-// of a picture: within 0.02 of castleCSF's transient channel P(rho) rho sqrt(Ac) over its largest value, which it has at
-// 0.43 cpd, and 1 below.
+// The share of a grating's contrast that counts as flicker, as three Gaussians over frequency, which are blurs of a
+// picture. Within 0.02 of castleCSF's transient channel P(rho) rho sqrt(Ac) over its largest value, at 0.43 cpd, and 1
+// below that frequency.
 struct FlickerBlur {
     double weight, cpd; // exp(-(rho / cpd)^2)
 };

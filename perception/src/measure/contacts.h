@@ -9,9 +9,9 @@
 
 namespace unseen::perception {
 
-// A contact of triangles that are near to others which are no neighbours of theirs or of their neighbours, over or
-// under them and not beside them in one sheet; unless they face and look alike, so that it makes no difference which of
-// them is seen. Near is, as triangles go, nearer than a quarter of the circle around the first.
+// A contact of triangles with others near them, over or under them and not beside them in one sheet. Neighbours, and
+// neighbours of neighbours, do not count. Nor do triangles that face and look alike: it makes no difference which of them
+// is seen. Near means nearer than a quarter of the circle around the first triangle.
 struct Contact {
     float gap = std::numeric_limits<
         float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near

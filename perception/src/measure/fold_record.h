@@ -12,9 +12,9 @@
 namespace unseen::perception {
 
 // All nodes fold in one order, by about how much light each fold changes; after each stage a share of them is left.
-// Pictures from directions all around (parallel projection, the mesh's sphere over 128 cells, 16 samples a cell) of the
-// mesh and of the stage are split into bands of an octave each (Laplacian pyramid: Burt and Adelson 1983), and the
-// largest contrast of their difference is noted.
+// The mesh and the stage are drawn from directions all around (parallel projection, the mesh's sphere over 128 cells, 16
+// samples a cell). The pictures are split into bands of an octave each (Laplacian pyramid: Burt and Adelson 1983). The
+// record holds the largest contrast of their difference.
 //
 // A measurement, not a bound: the eye may stand between the directions, and near the mesh its picture is another one.
 struct FoldStage {

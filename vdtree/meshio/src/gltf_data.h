@@ -71,7 +71,7 @@ public:
 
 private:
     const tinygltf::Accessor& accessor(int index) const;
-    // Of rows of a size in bytes.
+    // Reads rows of `size` bytes.
     template <class Value, class Decode>
     std::vector<Value> read(int index, std::size_t size, Value missing, Decode&& decode) const;
 

@@ -155,8 +155,8 @@ public:
     Result<CsfTable> moving(DegreesPerSecond velocity) const;
 
     // The table for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180 degrees
-    // that a table can have; beyond the last column that stays below them, what it sees or one that is left out,
-    // whichever is more. Margins below `smallest_spacing` count as it, but for 0. Where the margin is 180 degrees or
+    // that a table can have. Columns that would lie beyond are left out; past the last one that stays, the largest of it
+    // and of those holds. Margins below `smallest_spacing` count as it, but for 0. Where the margin is 180 degrees or
     // more, infinite or NaN, everything is seen as it is best seen anywhere. Precondition: not below 0.
     CsfTable widened(Degrees margin) const;
 

@@ -66,7 +66,7 @@ UNSEEN_INLINE void for_each_asked(const KernelView& view, const NodeArrays& arra
     }
 }
 
-// Of each piece of the nodes, those whose facing matters are looked at together, so that all lanes are of use.
+// Collects the nodes of each piece whose facing matters and tests them together, so that all lanes are used.
 template <class NodeAt>
 UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, std::size_t count, NodeAt node_at,
                               std::uint64_t* unfolded) {

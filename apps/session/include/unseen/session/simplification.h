@@ -11,7 +11,7 @@ struct Effect {
     std::string name;
     bool on = false;
     Message why = {};
-    // Of passes alone, and of those that ran:
+    // Only for passes, and only if they ran:
     int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, with one sample each; of planes
     std::uint64_t texture_bytes = 0;                // on the GPU, the most at a time
     double milliseconds = 0;                        // wall-clock time

@@ -18,7 +18,7 @@ struct AbsoluteScale {
     double of(double relative) const { return offset + span * relative; }
 };
 
-// Of a criterion's interior classes under lights that may move: they follow from the range of luminances that the
+// A criterion's interior classes under lights that may move. They follow from the range of luminances that the
 // viewpoint's lighting gives to a node's vertices, adapted to the brightest of these.
 struct LitClasses {
     std::shared_ptr<const LightBounds> bounds; // of the tree
