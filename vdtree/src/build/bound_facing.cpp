@@ -75,7 +75,7 @@ public:
         Step* step = steps_.data();
         for (NodeId node = part.begin; node < part.end; ++node) step_from(node, *step++);
         for (Index leaf = part.first_leaf; leaf < part.leaf_end; ++leaf)
-            step_from(input.shape.node_of_leaf(leaf), *step++);
+            step_from(input.shape.place_of_leaf(leaf), *step++);
     }
 
     // `leaves`: the numbers of the triangle's corners among the part's leaves; none: elsewhere.
@@ -195,7 +195,7 @@ private:
     void follow_from_elsewhere(const Triangle& triangle, const Triangle& leaves) {
         Scattered c;
         for (std::size_t k = 0; k < 3; ++k) {
-            const NodeId leaf = in_.shape.node_of_leaf(triangle[k]);
+            const NodeId leaf = in_.shape.place_of_leaf(triangle[k]);
             c.put(k, leaf, step_from(leaf));
         }
         by_leaf_.add(leaves, c.at[0], c.at[1], c.at[2]);
@@ -215,7 +215,7 @@ private:
     void follow_further(const Followed& f) {
         Scattered c;
         for (std::size_t k = 0; k < 3; ++k) {
-            const NodeId node = ancestors_.highest_made_by(in_.shape.node_of_leaf(f.triangle[k]), f.next[k] - 1);
+            const NodeId node = ancestors_.highest_made_by(in_.shape.place_of_leaf(f.triangle[k]), f.next[k] - 1);
             c.put(k, node, {glm::vec3(f.at[k][0], f.at[k][1], f.at[k][2]), f.above[k], f.next[k]});
         }
         follow(c);
@@ -264,24 +264,14 @@ private:
 
 class FacingBounder {
 public:
-    FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+    FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, std::span<const std::uint8_t> irregular,
                   std::span<const Sphere> support, const Ancestors& ancestors)
-        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors),
-          facing_(input.shape.interior(), Unfilled()), welded_number_(input.shape.leaves()) {
-        Index welded = 0;
-        for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf)
-            welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
-        welded_.resize(welded);
-    }
+        : in_(input), triangles_(triangles), irregular_(irregular), support_(support), ancestors_(ancestors),
+          facing_(input.shape.interior(), Unfilled()) {}
 
     ParallelArray<Directions> run() {
         std::vector<Outcome> outcomes(in_.parts.count());
         parallel_loop(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
-        // The dilation runs over places: an unwelded crease is no end of the surface.
-        for (Index leaf = 0; leaf < in_.shape.leaves(); ++leaf)
-            if (places_.weld[leaf] != leaf) welded(places_.weld[leaf]) |= welded(leaf);
-        parallel_loop(std::size_t{0}, outcomes.size(),
-                      [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
         for (const Outcome& outcome : outcomes)
             for (const Letter& letter : outcome.letters) facing_[letter.to] |= letter.content;
         in_.parts.bottom_up([&] { return [&](NodeId node) { add_children(node); }; });
@@ -289,14 +279,13 @@ public:
     }
 
 private:
-    // What a part's leaves see that nodes of other parts are to know, and those that have not seen all.
+    // What a part's places see that nodes of other parts are to know.
     struct Letter {
         Directions content;
         NodeId to;
     };
     struct Outcome {
         std::vector<Letter> letters;
-        std::vector<Index> at_welds;
     };
 
     // What the part's nodes see when they fold, and what is around its leaves.
@@ -315,10 +304,7 @@ private:
             for (NodeId node = part.begin; node < part.end; ++node)
                 if (folds.too_many(node)) facing_[node] = Directions::everything();
         }
-        for (Index i = 0; i < leaves.size(); ++i) {
-            around[i].mark(places_.irregular[leaves[i]]);
-            if (!places_.alone[leaves[i]]) welded(leaves[i]) = around[i];
-        }
+        for (Index i = 0; i < leaves.size(); ++i) around[i].mark(irregular_[leaves[i]]);
         spread(part, leaves, around, out);
     }
 
@@ -349,53 +335,31 @@ private:
         std::vector<Index> scattered_; // above the other parts: ascending
     };
 
-    // Each leaf hears what is around itself and its neighbours, but for welds; those in other parts get a letter.
+    // Each place hears what is around itself and its neighbours; those in other parts get a letter.
     void spread(const TreePart& part, const OwnLeaves& leaves, std::span<const Directions> around, Outcome& out) {
         const bool is_top = in_.parts.is_top(part);
         for (Index i = 0; i < leaves.size(); ++i) {
             const auto ring = in_.rings.around(leaves[i]);
-            if (ring.empty()) continue;                                         // no triangle uses it
-            if (!is_top && is_inside(part, ring) && places_.alone[leaves[i]]) { // most
+            if (!is_top && is_inside(part, ring)) { // most
                 Directions seen = around[i];
                 for (const Index neighbour : ring) seen |= around[neighbour - part.first_leaf];
                 tell(part, listener(leaves[i]), seen, out);
                 continue;
             }
-            const bool alone = places_.alone[leaves[i]];
-            bool at_weld = !alone;
-            Directions seen = alone ? around[i] : Directions();
+            Directions seen = around[i];
             for (const Index neighbour : ring) {
-                const bool neighbour_alone = places_.alone[neighbour];
-                if (!neighbour_alone) at_weld = true;
-                if (!in_.parts.owns_leaf(part, neighbour)) {
-                    if (alone) out.letters.push_back({around[i], listener(neighbour)});
-                } else if (neighbour_alone) {
-                    seen |= around[leaves.number(neighbour)];
-                }
+                if (!in_.parts.owns_leaf(part, neighbour)) out.letters.push_back({around[i], listener(neighbour)});
+                else seen |= around[leaves.number(neighbour)];
             }
-            if (at_weld) out.at_welds.push_back(leaves[i]);
             tell(part, listener(leaves[i]), seen, out);
         }
     }
 
-    // Whether all of these are leaves of the part, which is not the top, and alone at their places.
+    // Whether all of these are places of the part, which is not the top.
     bool is_inside(const TreePart& part, std::span<const Index> leaves) const {
         bool inside = true;
-        for (const Index leaf : leaves)
-            inside &= leaf - part.first_leaf < part.leaf_end - part.first_leaf && places_.alone[leaf];
+        for (const Index leaf : leaves) inside &= leaf - part.first_leaf < part.leaf_end - part.first_leaf;
         return inside;
-    }
-
-    void look_across_welds(const TreePart& part, Outcome& out) {
-        for (const Index leaf : out.at_welds) {
-            Directions seen;
-            const auto look = [&](Index other) {
-                if (!places_.alone[other]) seen |= welded(places_.weld[other]);
-            };
-            look(leaf);
-            for (const Index neighbour : in_.rings.around(leaf)) look(neighbour);
-            tell(part, listener(leaf), seen, out);
-        }
     }
 
     void tell(const TreePart& part, NodeId node, const Directions& seen, Outcome& out) {
@@ -405,7 +369,7 @@ private:
 
     // The node that is to know what its leaf sees: those whose leaves are at one point do not.
     NodeId listener(Index leaf) const {
-        NodeId node = in_.shape.parents[in_.shape.node_of_leaf(leaf)];
+        NodeId node = in_.shape.parents[in_.shape.place_of_leaf(leaf)];
         while (support_[node].radius == 0 && node != 0) node = in_.shape.parents[node];
         return node;
     }
@@ -421,24 +385,20 @@ private:
         facing_[node] = seen;
     }
 
-    Directions& welded(Index leaf) { return welded_[welded_number_[leaf]]; }
-
     const BoundInput& in_;
     std::span<const Triangle> triangles_;
-    const LeafPlaces& places_;
+    std::span<const std::uint8_t> irregular_;
     std::span<const Sphere> support_;
     const Ancestors& ancestors_;
     ParallelArray<Directions> facing_; // by node
-    std::vector<Index> welded_number_; // by leaf: among those that are not alone at their places
-    std::vector<Directions> welded_;   // by these: what is around them, and then around all of the place
 };
 
 } // namespace
 
 ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
-                                       const LeafPlaces& places, std::span<const Sphere> support,
+                                       std::span<const std::uint8_t> irregular, std::span<const Sphere> support,
                                        const Ancestors& ancestors) {
-    return FacingBounder(input, triangles, places, support, ancestors).run();
+    return FacingBounder(input, triangles, irregular, support, ancestors).run();
 }
 
 } // namespace unseen::vdtree

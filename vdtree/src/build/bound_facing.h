@@ -12,9 +12,9 @@ namespace unseen::vdtree {
 // clusterer made it; and the same of all nodes below. Nothing for nodes whose leaves are at one point: when they fold
 // nothing moves.
 //
-// Marked where the ring has an irregular edge.
+// Marked where the ring has an irregular edge; `irregular`: by place, whether one ends there.
 ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
-                                       const LeafPlaces& places, std::span<const Sphere> support,
+                                       std::span<const std::uint8_t> irregular, std::span<const Sphere> support,
                                        const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

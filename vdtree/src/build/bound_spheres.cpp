@@ -68,7 +68,7 @@ private:
     }
 
     void bound() {
-        const auto leaves = in_.positions.subspan(in_.shape.node_of_leaf(0));
+        const auto leaves = in_.positions.subspan(in_.shape.place_of_leaf(0));
         std::array<Sphere, BallLanes::lanes> spheres;
         const std::span<Sphere> used = std::span(spheres).first(lanes_);
         for (std::size_t lane = 0; lane < lanes_; ++lane) {

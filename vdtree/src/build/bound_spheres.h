@@ -13,7 +13,7 @@ struct BoundInput {
     std::span<const glm::vec3> positions;
 
     glm::dvec3 position(NodeId node) const { return glm::dvec3(positions[node]); }
-    glm::dvec3 leaf_position(Index leaf) const { return position(shape.node_of_leaf(leaf)); }
+    glm::dvec3 leaf_position(Index leaf) const { return position(shape.place_of_leaf(leaf)); }
 };
 
 // By interior node. Each sphere contains those of the node's children exactly.

@@ -1,7 +1,6 @@
 // From a mesh and a clustering to a vertex tree: order the nodes, find where triangles vanish, bound every fold.
 #include <unseen/vdtree/builder.h>
 
-#include <atomic>
 #include <optional>
 
 #include <glm/geometric.hpp>
@@ -9,11 +8,13 @@
 
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
+#include "build/leaves.h"
 #include "build/order_nodes.h"
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
 #include "build/spatial_order.h"
 #include "build/surface.h"
+#include "build/wedges.h"
 #include "tree/mask_pool.h"
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/normal_mask.h>
@@ -21,7 +22,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
-#include <unseen/vdtree/internal/texture_fit.h>
+#include <unseen/vdtree/internal/vectors.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
@@ -46,22 +47,6 @@ void release(std::vector<T>& values) {
     std::vector<T>().swap(values);
 }
 
-Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was cancelled."}; }
-
-// The input less what cannot be built on: triangles that use a vertex twice, and vertices that no triangle uses
-// (these come back as leaves of a subtree of their own).
-struct CleanMesh {
-    Mesh storage;                        // used where something had to go, like the next
-    std::vector<Index> source_vertices;  // by clean vertex
-    std::vector<Index> source_triangles; // by clean triangle
-    std::vector<Index> unreferenced;     // source vertices
-    MeshView view;
-    std::uint64_t dropped = 0;
-
-    Index source_vertex(Index v) const { return source_vertices.empty() ? v : source_vertices[v]; }
-    Index source_triangle(Index t) const { return source_triangles.empty() ? t : source_triangles[t]; }
-};
-
 template <class T>
 std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
     std::vector<T> out;
@@ -71,38 +56,7 @@ std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
     return out;
 }
 
-CleanMesh clean(const MeshView& mesh) {
-    CleanMesh out;
-    std::vector<std::uint8_t> used(mesh.positions.size(), 0);
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        if (uses_a_vertex_twice(mesh.triangles[t])) continue;
-        out.source_triangles.push_back(static_cast<Index>(t));
-        for (const Index v : mesh.triangles[t]) used[v] = 1;
-    }
-    out.dropped = mesh.triangles.size() - out.source_triangles.size();
-    std::vector<Index> clean_number(mesh.positions.size(), 0);
-    for (std::size_t v = 0; v < used.size(); ++v) {
-        clean_number[v] = static_cast<Index>(out.source_vertices.size());
-        (used[v] ? out.source_vertices : out.unreferenced).push_back(static_cast<Index>(v));
-    }
-    if (out.dropped == 0 && out.unreferenced.empty()) {
-        out = {};
-        out.view = mesh;
-        return out;
-    }
-    Mesh& m = out.storage;
-    m.positions = select(mesh.positions, out.source_vertices);
-    m.normals = select(mesh.normals, out.source_vertices);
-    m.colours = select(mesh.colours, out.source_vertices);
-    m.uvs = select(mesh.uvs, out.source_vertices);
-    for (const Index t : out.source_triangles) {
-        Triangle tri = mesh.triangles[t];
-        for (Index& v : tri) v = clean_number[v];
-        m.triangles.push_back(tri);
-    }
-    out.view = m.view();
-    return out;
-}
+Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was cancelled."}; }
 
 // The origin of the tree's float positions. Float coordinates stay exact: where all coordinates of an axis have one
 // sign and the largest is at most twice the smallest, their differences are exact (Sterbenz), else the axis keeps 0.
@@ -215,7 +169,7 @@ public:
     TreeBuilder(const MeshView& source, const BuildOptions& options) : source_(source), options_(options) {}
 
     Result<VertexTree> build(const Clusterer& clusterer) {
-        if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+        if (const auto begun = begin(); !begun) return begun.error();
         if (is_cancelled(0.0, "analysing")) return cancelled_error();
         analyse();
         if (is_cancelled(clustering_begins, "clustering")) return cancelled_error();
@@ -225,16 +179,21 @@ public:
             if (options_.team) limit_threads(options_.threads_alone);
             if (is_cancelled(clustering_ends, "ordering")) return cancelled_error();
             order(*clustering);
-            place_vertices(*clustering);
-            release(surface_.areas); // bounding is what takes most memory
-            release(surface_.normals);
         }
         if (is_cancelled(0.8, "bounding")) return cancelled_error();
-        bound();
+        const Ancestors ancestors(nodes_.shape);
+        bound(ancestors);
+        find_vertices(ancestors);
+        take_links();
+        const TreeLinks links = links_of(*g_);
+        parts_.emplace(links);
+        parts_->assign_triangles(g_->first_triangle, g_->triangles);
         if (is_textured()) lay_texture();
+        mark_translucent();
 
         g_->closedness = surface_.closedness;
-        g_->dropped_triangles = clean_.dropped + options_.dropped_before;
+        g_->dropped_triangles = places_->dropped() + options_.dropped_before;
+        g_->source_vertex_count = static_cast<Index>(source_.positions.size());
         g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
         g_->document = std::vector<std::byte>(source_.document.begin(), source_.document.end());
         auto data = std::make_shared<VertexTree::Data>();
@@ -246,11 +205,10 @@ public:
     }
 
     Result<void> help() {
-        if (const auto cleaned = clean_up(); !cleaned) return cleaned.error();
+        if (const auto begun = begin(); !begun) return begun.error();
         analyse();
-        const std::vector<float> luminance = find_luminance();
         const auto helped =
-            cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, {}, options_.team);
+            with_cluster_input([&](const ClusterInput& input) { return cluster_quadric(input, {}, options_.team); });
         return helped ? Result<void>() : helped.error();
     }
 
@@ -266,130 +224,176 @@ private:
             limit_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
     }
 
-    Result<void> clean_up() {
+    Result<void> begin() {
         if (const auto valid = check_buildable(source_, options_); !valid) return valid.error();
         limit_threads(options_.threads);
-        clean_ = clean(source_);
-        if (mesh_.triangles.empty())
-            return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
+        places_.emplace(source_);
+        if (places_->mesh().triangles.empty())
+            return Error{ErrorCode::malformed_data,
+                         "The mesh has no triangle with corners at three different positions."};
         return {};
     }
 
     void analyse() {
-        prelit_ = options_.prelit && (!mesh_.colours.empty() || is_textured());
-        coincident_ = find_coincident(mesh_.positions);
-        surface_ = analyse_surface(mesh_, coincident_);
+        prelit_ = options_.prelit && (!source_.colours.empty() || is_textured());
+        surface_ = analyse_surface(places_->mesh());
+        const bool turns = surface_.closedness == Closedness::closed_inward && own_normals_agree(source_);
+        places_->find_leaves(surface_.normals, turns ? -1.0f : 1.0f);
+        uvs_ = select(source_.uvs, places_->sources());
+        colours_ = select(source_.colours, places_->sources());
     }
 
-    std::vector<float> find_luminance() const {
-        std::vector<float> luminance(mesh_.positions.size());
-        parallel_loop(std::size_t{0}, luminance.size(), [&](std::size_t v) {
-            luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v],
-                                            options_.light, prelit_, is_textured());
+    // What clusterers see. By place, normals and luminances are the means of the leaves there.
+    Result<Clustering> with_cluster_input(const Clusterer& clusterer) const {
+        const std::size_t places = places_->mesh().positions.size();
+        std::vector<float> leaf_luminance(places_->leaf_count()), luminance(places);
+        parallel_loop(std::size_t{0}, leaf_luminance.size(), [&](std::size_t leaf) {
+            leaf_luminance[leaf] =
+                vertex_luminance(places_->normals()[leaf], colours_.empty() ? nullptr : &colours_[leaf], options_.light,
+                                 prelit_, is_textured());
         });
-        return luminance;
+        std::vector<glm::vec3> normals(places);
+        parallel_loop(Index{0}, static_cast<Index>(places), [&](Index place) {
+            const Index begin = places_->first_leaf(place), end = places_->first_leaf(place + 1);
+            if (end - begin == 1) {
+                luminance[place] = leaf_luminance[begin];
+                normals[place] = places_->normals()[begin];
+                return;
+            }
+            glm::dvec3 normal(0);
+            double sum = 0;
+            for (Index leaf = begin; leaf < end; ++leaf) {
+                sum += static_cast<double>(leaf_luminance[leaf]);
+                normal += glm::dvec3(places_->normals()[leaf]);
+            }
+            luminance[place] = static_cast<float>(sum / (end - begin));
+            normals[place] = glm::vec3(unit(normal));
+        });
+        const LeafView leaves{
+            places_->triangles(), places_->places(),       leaf_luminance, places_->normals(), colours_, uvs_,
+            places_->materials(), !source_.normals.empty()};
+        return clusterer(ClusterInput{places_->mesh(), luminance, normals, surface_.areas, leaves});
     }
 
-    Result<Clustering> cluster(const Clusterer& clusterer) {
-        const std::vector<float> luminance = find_luminance();
-        Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
+    Result<Clustering> cluster(const Clusterer& clusterer) const {
+        Result<Clustering> clustering = with_cluster_input(clusterer);
         if (clustering)
-            if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
+            if (const auto valid = check(*clustering, places_->mesh().positions.size()); !valid) return valid.error();
         return clustering;
     }
 
+    // Numbers the places, places the proxies.
     void order(const Clustering& clustering) {
-        const Index vertices = static_cast<Index>(mesh_.positions.size());
-        nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
-        std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
-        parallel_loop(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
-            source_vertices[nodes_.leaf_of_vertex[v]] =
-                v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
-        });
-        g_->source_vertices = std::move(source_vertices);
+        const MeshView& mesh = places_->mesh();
+        nodes_ = order_nodes(clustering, static_cast<Index>(mesh.positions.size()));
         parts_.emplace(links_of(nodes_.shape));
-    }
-
-    void place_vertices(const Clustering& clustering) {
-        const Index vertices = static_cast<Index>(mesh_.positions.size());
         g_->origin = choose_origin(source_.positions);
-        // By leaf: weights, and normals of the leaves.
-        ParallelArray<double> weights(nodes_.shape.leaves());
-        ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
-        parallel_loop(Index{0}, vertices, [&](Index v) {
-            weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
-            normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
-        });
-        ProxyVertices proxies =
-            place_proxies(nodes_.shape, *parts_, {source_, g_->source_vertices, weights, normals, g_->origin},
+        positions_ =
+            place_proxies(nodes_.shape, *parts_, {mesh.positions, surface_.areas, nodes_.leaf_of_vertex, g_->origin},
                           {clustering.positions, nodes_.node_of_cluster});
-        g_->positions = std::move(proxies.positions);
-        g_->normals = std::move(proxies.normals);
-        g_->colours = std::move(proxies.colours);
-        g_->uvs = std::move(proxies.uvs);
+        release(surface_.areas); // bounding is what takes most memory
+        release(surface_.normals);
+        release(nodes_.node_of_cluster);
     }
 
-    void bound() {
-        TreeShape& shape = nodes_.shape;
-        const Ancestors ancestors(shape);
-        TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
-        if (!source_.ranges.empty()) {
-            for (Index& t : triangles.sources) t = clean_.source_triangle(t);
-            g_->source_triangles = std::move(triangles.sources);
-        }
-        release(triangles.sources);
-        const LeafPlaces places = find_places();
-        release(coincident_);
-        release(surface_.irregular);
-        release(nodes_.leaf_of_vertex);
-        release(nodes_.node_of_cluster);
+    // Bounds of what folds do to the surface, which know places only.
+    void bound(const Ancestors& ancestors) {
+        const TreeShape& shape = nodes_.shape;
+        order_ = order_triangles(places_->mesh().triangles, nodes_, ancestors);
         TreeParts& parts = *parts_;
-        parts.assign_triangles(triangles.first_triangle, triangles.triangles);
-        const LeafRings rings = find_rings(triangles.triangles, places, parts);
-        const BoundInput input{shape, parts, rings, g_->positions};
+        parts.assign_triangles(order_.first_triangle, order_.triangles);
+        std::vector<std::uint8_t> irregular(shape.leaves());
+        parallel_loop(std::size_t{0}, irregular.size(),
+                      [&](std::size_t v) { irregular[nodes_.leaf_of_vertex[v]] = surface_.irregular[v]; });
+        release(surface_.irregular);
+        const LeafRings rings = find_rings(order_.triangles, irregular, parts);
+        const BoundInput input{shape, parts, rings, positions_};
 
         NodeSpheres spheres = bound_spheres(input);
         g_->bounding_sphere = bound_corners(input);
         g_->displacement = bound_displacements(input, spheres.support);
         const ParallelArray<Directions> facing =
-            bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+            bound_facing(input, order_.triangles, irregular, spheres.support, ancestors);
         g_->support_spheres = std::move(spheres.support);
-        const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
-        std::vector<NodeBounds> bounds(shape.interior());
+        bounds_.resize(shape.interior());
         parallel_loop(NodeId{0}, shape.interior(), [&](NodeId node) {
-            const int irregular = facing[node].marked() ? irregular_ring : 0;
-            const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
-            bounds[node] = {spheres.ring[node], facing[node].slabs(),
-                            static_cast<std::uint8_t>(irregular | translucent), 0};
+            const int irregular_flag = facing[node].marked() ? irregular_ring : 0;
+            bounds_[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular_flag), 0};
         });
         PooledMasks masks = pool_masks(facing, shape.parents);
-        g_->bounds = std::move(bounds);
         g_->mask_at = std::move(masks.at);
         g_->mask_records = std::move(masks.records);
+    }
+
+    // The wedges of the nodes; from here on corners are leaves.
+    void find_vertices(const Ancestors& ancestors) {
+        const Index places = nodes_.shape.leaves(), leaves = places_->leaf_count();
+        // Leaves in the order of the tree's places.
+        std::vector<Index> place_at(places), first_leaf, given(leaves), number(leaves);
+        parallel_loop(Index{0}, places, [&](Index v) { place_at[nodes_.leaf_of_vertex[v]] = v; });
+        release(nodes_.leaf_of_vertex);
+        Index next = 0;
+        for (Index place = 0; place < places; ++place) {
+            if (places_->has_seams()) first_leaf.push_back(next);
+            for (Index leaf = places_->first_leaf(place_at[place]); leaf < places_->first_leaf(place_at[place] + 1);
+                 ++leaf) {
+                given[next] = leaf;
+                number[leaf] = next++;
+            }
+        }
+        if (places_->has_seams()) first_leaf.push_back(next);
+        std::vector<Triangle> triangles(order_.triangles.size());
+        parallel_loop(std::size_t{0}, triangles.size(), [&](std::size_t t) {
+            for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = number[places_->triangles()[order_.sources[t]][k]];
+        });
+        release(order_.triangles);
+        const std::vector<glm::vec3> normals = select(places_->normals(), given);
+        uvs_ = select(std::span<const glm::vec2>(uvs_), given);
+        colours_ = select(std::span<const glm::vec4>(colours_), given);
+        const std::vector<Index> materials = select(places_->materials(), given);
+        WedgeArrays wedges =
+            find_wedges(nodes_.shape, *parts_, positions_,
+                        {first_leaf, triangles, order_.first_triangle, normals, uvs_, colours_, materials}, ancestors);
+        if (!wedges.leaf_numbers.empty())
+            for (Triangle& t : triangles)
+                for (Index& leaf : t) leaf = wedges.leaf_numbers[leaf];
+        std::vector<Index> sources(leaves);
+        for (Index leaf = 0; leaf < leaves; ++leaf)
+            sources[wedges.leaf_numbers.empty() ? leaf : wedges.leaf_numbers[leaf]] = places_->sources()[given[leaf]];
+        g_->source_vertices = std::move(sources);
+        g_->triangles = std::move(triangles);
+        g_->positions = std::move(wedges.positions);
+        g_->normals = std::move(wedges.normals);
+        g_->uvs = std::move(wedges.uvs);
+        g_->colours = std::move(wedges.colours);
+        count_leaves(wedges.links);
+        g_->first_wedge = std::move(wedges.links.first_wedge);
+        g_->leaf_places = std::move(wedges.links.leaf_places);
+        g_->wedge_ranks = std::move(wedges.links.wedge_ranks);
+    }
+
+    // Up to here nodes have supported ranges of places.
+    void count_leaves(const WedgeLinks<std::vector<NodeId>>& links) {
+        if (links.first_wedge.empty()) return;
+        TreeShape& shape = nodes_.shape;
+        const NodeId interior = shape.interior();
+        const auto first_leaf = [&](Index place) {
+            return links.first_wedge[interior + place] - links.first_wedge[interior];
+        };
+        for (Index& leaf : shape.first_leaf) leaf = first_leaf(leaf);
+        for (Index& leaf : shape.leaf_end) leaf = first_leaf(leaf);
+    }
+
+    void take_links() {
+        TreeShape& shape = nodes_.shape;
         g_->parents = std::move(shape.parents);
         g_->first_leaf = std::move(shape.first_leaf);
         g_->leaf_end = std::move(shape.leaf_end);
         g_->subtree_end = std::move(shape.subtree_end);
-        g_->first_triangle = std::move(triangles.first_triangle);
-        g_->triangles = std::move(triangles.triangles);
-    }
-
-    LeafPlaces find_places() const {
-        const std::size_t leaves = nodes_.shape.leaves();
-        LeafPlaces places;
-        places.weld.resize(leaves);
-        std::iota(places.weld.begin(), places.weld.end(), Index{0});
-        places.irregular.assign(leaves, 0);
-        places.alone.assign(leaves, 1);
-        parallel_loop(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
-            const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
-            places.weld[leaf] = place;
-            places.irregular[leaf] = surface_.irregular[v];
-            if (leaf == place) return;
-            places.alone[leaf] = 0;
-            std::atomic_ref(places.alone[place]).store(0, std::memory_order_relaxed);
-        });
-        return places;
+        g_->first_triangle = std::move(order_.first_triangle);
+        if (source_.ranges.empty()) return;
+        for (Index& t : order_.sources) t = places_->source_triangle(t);
+        g_->source_triangles = std::move(order_.sources);
     }
 
     bool is_textured() const { return !source_.texture.empty(); }
@@ -398,37 +402,42 @@ private:
         const TextureView& texture = source_.texture;
         g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
         g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
-        std::vector<glm::vec2> uvs = TextureFits(*g_, *parts_).fitted_uvs(bound_footprints(*g_, *parts_));
-        g_->uvs = std::move(uvs);
         g_->ring_texture = bound_ring_texture(*g_, *parts_);
     }
 
-    // By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
-    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const {
-        const TreeShape& shape = nodes_.shape;
-        const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
-        const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
+    // Nodes with a corner of the ring that has an alpha below 1.
+    void mark_translucent() {
+        const TreeLinks links = links_of(*g_);
+        const auto shows_through = [&](Index leaf) { return !(g_->colours[links.wedge_of_leaf(leaf)].a >= 1); };
+        const Index leaves = g_->colours.empty() ? 0 : links.leaves();
         bool any = false;
         for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
-        if (!any) return {};
-        std::vector<std::uint8_t> translucent(shape.interior(), 0);
-        for (const Triangle& t : triangles)
-            if (std::any_of(t.begin(), t.end(), shows_through))
-                for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
-        for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
-        return translucent;
+        const auto mark = [&](NodeId node) {
+            bounds_[node].flags = static_cast<std::uint8_t>(bounds_[node].flags | translucent_ring);
+        };
+        if (any) {
+            for (const Triangle& t : g_->triangles)
+                if (std::any_of(t.begin(), t.end(), shows_through))
+                    for (const Index leaf : t) mark(links.parents[links.place_of_leaf(leaf)]);
+            for (NodeId node = links.interior(); node-- > 1;)
+                if (bounds_[node].flags & translucent_ring) mark(links.parents[node]);
+        }
+        g_->bounds = std::move(bounds_);
     }
 
     const MeshView& source_;
     const BuildOptions& options_;
     std::optional<tbb::global_control> limit_;
-    CleanMesh clean_;
-    const MeshView& mesh_ = clean_.view;
+    std::optional<PlaceMesh> places_;
 
     bool prelit_ = false;
-    std::vector<Index> coincident_;
     Surface surface_;
+    std::vector<glm::vec2> uvs_; // by leaf, as the next
+    std::vector<glm::vec4> colours_;
     NodeOrder nodes_;
+    TriangleOrder order_;
+    std::vector<glm::vec3> positions_; // by node
+    std::vector<NodeBounds> bounds_;
     std::optional<TreeParts> parts_;
     std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
 };

@@ -26,6 +26,37 @@ namespace unseen::vdtree {
 
 namespace {
 
+// The corners as vertices, some of which are at one place.
+struct LeafInput {
+    MeshView mesh;
+    std::span<const float> luminance;
+    std::span<const glm::vec3> normals;
+    std::vector<double> areas;
+    std::vector<Index> coincident; // the first leaf at the same place
+    std::span<const Index> places;
+    std::vector<glm::dvec3> positions;
+
+    explicit LeafInput(const ClusterInput& input)
+        : luminance(input.leaves.luminance), normals(input.leaves.normals), areas(input.leaves.places.size()),
+          coincident(areas.size()), places(input.leaves.places), positions(areas.size()) {
+        std::vector<Index> first(input.mesh.positions.size(), no_node), count(first.size(), 0);
+        for (Index leaf = 0; leaf < places.size(); ++leaf) {
+            Index& at = first[places[leaf]];
+            if (at == no_node) at = leaf;
+            ++count[places[leaf]];
+            coincident[leaf] = at;
+            positions[leaf] = input.mesh.positions[places[leaf]];
+        }
+        for (Index leaf = 0; leaf < places.size(); ++leaf)
+            areas[leaf] = input.areas[places[leaf]] / count[places[leaf]];
+        mesh = {.positions = positions,
+                .triangles = input.leaves.triangles,
+                .normals = input.leaves.has_own_normals ? normals : std::span<const glm::vec3>(),
+                .colours = input.leaves.colours,
+                .uvs = input.leaves.uvs};
+    }
+};
+
 // Largest number of welded vertices in a part, so that its quadrics fit a core's cache.
 constexpr Index largest_part = 1 << 15;
 // Parts, and joined parts, are contracted to at most this many clusters: one in 32 of a full part. Few enough that
@@ -212,7 +243,7 @@ Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, 
 
 class PartMaker {
 public:
-    PartMaker(const ClusterInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
+    PartMaker(const LeafInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
         measure();
         list_triangles();
     }
@@ -351,7 +382,7 @@ private:
         return numbering_.first_member[part_begin(part, numbering_.parts, slots())];
     }
 
-    const ClusterInput& input_;
+    const LeafInput& input_;
     const SpatialNumbering& numbering_;
     glm::dvec3 centre_{0};
     double scale_ = 1;      // mesh units to the unit box
@@ -487,11 +518,11 @@ private:
 // Numbers the clusters: vertices, joined coincident vertices, then the merges round by round, all parts side by side.
 class ClusteringWriter {
 public:
-    ClusteringWriter(const ClusterInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
+    ClusteringWriter(const LeafInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
         : input_(input), numbering_(numbering), maker_(maker) {}
 
     Clustering write(std::vector<Level>& levels) {
-        join_coincident();
+        begin();
         for (Level& level : levels) {
             write_level(level);
             level = {};
@@ -531,29 +562,20 @@ private:
         return number;
     }
 
-    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without
-    // cracks.
-    void join_coincident() {
-        const auto& first_member = numbering_.first_member;
+    void begin() {
         result_.parents.resize(vertices());
-        cluster_ = numbering_.vertex_of_slot;
-        made_by_joining_.resize(cluster_.size());
-        for (Index s = 0; s < cluster_.size(); ++s) {
-            if (first_member[s + 1] - first_member[s] == 1) continue;
-            const Index parent = make_cluster(input_.mesh.positions[cluster_[s]]);
-            for (Index i = first_member[s]; i < first_member[s + 1]; ++i)
-                result_.parents[numbering_.members[i]] = parent;
-            cluster_[s] = parent;
-        }
+        cluster_.resize(vertices());
+        for (Index s = 0; s < vertices(); ++s) cluster_[s] = input_.places[numbering_.vertex_of_slot[s]];
+        made_by_joining_.resize(vertices());
     }
 
     void raise(Index cluster, float deviation) {
         float& here = result_.deviations[cluster - vertices()];
         here = std::max(here, deviation);
     }
-    Index vertices() const { return static_cast<Index>(input_.mesh.positions.size()); }
+    Index vertices() const { return static_cast<Index>(numbering_.vertex_of_slot.size()); }
 
-    const ClusterInput& input_;
+    const LeafInput& input_;
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
@@ -563,7 +585,8 @@ private:
 
 } // namespace
 
-Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
+Result<Clustering> cluster_quadric(const ClusterInput& given, const Progress& progress, Team* team) {
+    const LeafInput input(given);
     const std::size_t slots = slot_count(input.coincident);
     const Members members{team, part_count(slots)};
     if (!members.has_part()) return Clustering();

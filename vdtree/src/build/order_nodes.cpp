@@ -22,8 +22,6 @@ struct ClusterPlace {
     NodeId node = no_node; // its own, or that of the cluster that it is the only child of
 };
 
-constexpr Index never = std::numeric_limits<Index>::max();
-
 // Parents lie anywhere in memory: prefetch them this many clusters ahead.
 constexpr Index ahead = 16;
 
@@ -50,15 +48,14 @@ namespace {
 
 class NodeOrderer {
 public:
-    NodeOrderer(const Clustering& clustering, Index vertices, Index lone)
-        : parents_(clustering.parents), vertices_(vertices), lone_(lone),
+    NodeOrderer(const Clustering& clustering, Index vertices)
+        : parents_(clustering.parents), vertices_(vertices),
           root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
 
     NodeOrder run() {
         count_up();
         make_room();
         number_down();
-        if (lone_ > 0) hang_in_lone_vertices();
         return std::move(order_);
     }
 
@@ -87,16 +84,14 @@ private:
     }
 
     void make_room() {
-        const NodeId extra = lone_ > 1 ? 2 : lone_; // the root above the clustering's, and the lone vertices' node
-        interior_ = place(root_).nodes + extra;
-        top_ = lone_ > 0 ? 0 : no_node;
+        interior_ = place(root_).nodes;
         TreeShape& shape = order_.shape;
-        shape.parents.resize(std::size_t{interior_} + vertices_ + lone_);
+        shape.parents.resize(std::size_t{interior_} + vertices_);
         shape.first_leaf.resize(interior_);
         shape.leaf_end.resize(interior_);
         shape.subtree_end.resize(interior_);
         shape.made.resize(interior_);
-        order_.leaf_of_vertex.resize(std::size_t{vertices_} + lone_);
+        order_.leaf_of_vertex.resize(vertices_);
         order_.node_of_cluster.assign(places_.size(), no_node);
     }
 
@@ -110,7 +105,7 @@ private:
     }
     void put_leaf(Index vertex, Index leaf, NodeId parent) {
         order_.leaf_of_vertex[vertex] = leaf;
-        order_.shape.parents[order_.shape.node_of_leaf(leaf)] = parent;
+        order_.shape.parents[order_.shape.place_of_leaf(leaf)] = parent;
     }
 
     // The last child takes the last leaves and nodes of its parent.
@@ -118,9 +113,9 @@ private:
         for (Index c = root_; c >= vertices_; --c) {
             expect(c - std::min(c, ahead));
             ClusterPlace& here = place(c);
-            const NodeId parent = c == root_ ? top_ : place(parents_[c]).node;
+            const NodeId parent = c == root_ ? no_node : place(parents_[c]).node;
             Index leaf_end = vertices_;
-            NodeId node_end = interior_ - (lone_ > 1 ? 1 : 0);
+            NodeId node_end = interior_;
             if (c != root_) {
                 ClusterPlace& up = place(parents_[c]);
                 leaf_end = up.leaves;
@@ -143,24 +138,17 @@ private:
         }
     }
 
-    void hang_in_lone_vertices() {
-        const NodeId group = lone_ > 1 ? interior_ - 1 : top_;
-        open(top_, no_node, 0, vertices_ + lone_, interior_, never);
-        if (group != top_) open(group, top_, vertices_, vertices_ + lone_, interior_, never - 1);
-        for (Index i = 0; i < lone_; ++i) put_leaf(vertices_ + i, vertices_ + i, group);
-    }
-
     std::span<const Index> parents_; // by cluster
-    Index vertices_, lone_, root_;
-    std::vector<ClusterPlace> places_;    // by cluster that is no vertex
-    NodeId interior_ = 0, top_ = no_node; // how many nodes; the root where there are lone vertices
+    Index vertices_, root_;
+    std::vector<ClusterPlace> places_; // by cluster that is no vertex
+    NodeId interior_ = 0;              // how many nodes
     NodeOrder order_;
 };
 
 } // namespace
 
-NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) {
-    return NodeOrderer(clustering, vertices, lone).run();
+NodeOrder order_nodes(const Clustering& clustering, Index vertices) {
+    return NodeOrderer(clustering, vertices).run();
 }
 
 TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
@@ -172,7 +160,7 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
         const Index a = nodes.leaf_of_vertex[t[0]], b = nodes.leaf_of_vertex[t[1]], c = nodes.leaf_of_vertex[t[2]];
         const Index low = std::min({a, b, c}), high = std::max({a, b, c});
         // The middle one of three leaves merges first with another.
-        vanishing[i] = ancestors.lowest(shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low ^ high)], [&](NodeId node) {
+        vanishing[i] = ancestors.lowest(shape.parents[shape.place_of_leaf(a ^ b ^ c ^ low ^ high)], [&](NodeId node) {
             return shape.first_leaf[node] <= low || high < shape.leaf_end[node];
         });
     });

@@ -7,14 +7,13 @@ namespace unseen::vdtree {
 
 struct NodeOrder {
     TreeShape shape;
-    std::vector<Index> leaf_of_vertex;   // by vertex of the clustering, then the lone vertices
+    std::vector<Index> leaf_of_vertex;   // by vertex of the clustering
     std::vector<NodeId> node_of_cluster; // by cluster that is no vertex; no_node for those with one child
 };
 
-// Depth-first pre-order, children in the order of their clusters, passing over clusters with one child. `lone` further
-// vertices, which no triangle uses, get a subtree of their own beside the clustering's root. Cost: two passes over the
-// clusters.
-NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone);
+// Depth-first pre-order, children in the order of their clusters, passing over clusters with one child. Cost: two passes
+// over the clusters.
+NodeOrder order_nodes(const Clustering& clustering, Index vertices);
 
 struct TriangleOrder {
     std::vector<Index> first_triangle; // by interior node, one longer

@@ -67,86 +67,76 @@ std::uint64_t hash(glm::dvec3 p) {
 
 // ---- around each position
 
-// The places of a triangle's corners; two are the same where the welding degenerates it.
-Triangle places_of(const Triangle& t, std::span<const Index> coincident) {
-    return {coincident[t[0]], coincident[t[1]], coincident[t[2]]};
-}
-bool is_degenerate(const Triangle& places) {
-    return places[0] == places[1] || places[1] == places[2] || places[2] == places[0];
-}
-
 // The other corners of a triangle at a place: the following and the preceding one.
-struct Wedge {
+struct CornerSides {
     Index following, preceding;
 };
 
-// What is collected at the places: the wedges of the triangles there, and the sum of these triangles' area
+// What is collected at the places: the corners of the triangles there, and the sum of these triangles' area
 // vectors, twice.
-struct Wedges {
+struct PlaceCorners {
     std::vector<Index> start; // one longer
-    ParallelArray<Wedge> wedges;
+    ParallelArray<CornerSides> corners;
     std::vector<glm::dvec3> sums;
 
-    std::span<const Wedge> around(std::size_t place) const {
-        return std::span<const Wedge>(wedges).subspan(start[place], start[place + 1] - start[place]);
+    std::span<const CornerSides> around(std::size_t place) const {
+        return std::span<const CornerSides>(corners).subspan(start[place], start[place + 1] - start[place]);
     }
 };
 
-// Triangles that the welding degenerates have neither edges nor an area. Adds to `vertex_areas`, by vertex.
-Wedges collect_wedges(const MeshView& mesh, std::span<const Index> coincident, std::span<double> vertex_areas) {
-    const std::size_t vertices = vertex_areas.size();
-    Wedges out;
-    out.start.assign(vertices + 1, 0);
-    out.sums.assign(vertices, glm::dvec3(0));
+// Adds to `areas`, by place.
+PlaceCorners collect_corners(const MeshView& mesh, std::span<double> areas) {
+    const std::size_t places = areas.size();
+    PlaceCorners out;
+    out.start.assign(places + 1, 0);
+    out.sums.assign(places, glm::dvec3(0));
     // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes
     // time. All sums are made in the order of the triangles.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_triangle = [&](auto&& use) {
         parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
-            const std::size_t begin = vertices * r / ranges, size = vertices * (r + 1) / ranges - begin;
+            const std::size_t begin = places * r / ranges, size = places * (r + 1) / ranges - begin;
             const auto is_own = [&](std::size_t place) { return place - begin < size; };
-            for (const Triangle& corners : mesh.triangles) {
-                const Triangle at = places_of(corners, coincident);
-                if (std::ranges::any_of(at, is_own) && !is_degenerate(at)) use(is_own, corners, at);
-            }
+            for (const Triangle& corners : mesh.triangles)
+                if (std::ranges::any_of(corners, is_own)) use(is_own, corners);
         });
     };
-    for_each_triangle([&](const auto& is_own, const Triangle&, const Triangle& at) {
-        for (const Index place : at)
+    for_each_triangle([&](const auto& is_own, const Triangle& corners) {
+        for (const Index place : corners)
             if (is_own(place)) ++out.start[place];
     });
     std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
-    out.wedges = ParallelArray<Wedge>(out.start.back(), Unfilled());
-    for_each_triangle([&](const auto& is_own, const Triangle& corners, const Triangle& at) {
+    out.corners = ParallelArray<CornerSides>(out.start.back(), Unfilled());
+    for_each_triangle([&](const auto& is_own, const Triangle& corners) {
         const glm::dvec3& a = mesh.positions[corners[0]];
         const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
         const double sixth = glm::length(vector) / 6; // what each corner has of the triangle's area
         for (std::size_t k = 0; k < 3; ++k) {
-            if (!is_own(at[k])) continue;
-            out.wedges[--out.start[at[k]]] = {at[(k + 1) % 3], at[(k + 2) % 3]};
-            out.sums[at[k]] += vector;
-            vertex_areas[corners[k]] += sixth;
+            if (!is_own(corners[k])) continue;
+            out.corners[--out.start[corners[k]]] = {corners[(k + 1) % 3], corners[(k + 2) % 3]};
+            out.sums[corners[k]] += vector;
+            areas[corners[k]] += sixth;
         }
     });
     return out;
 }
 
-// Looks at the wedges around one place after another.
+// Looks at the corners at one place after another.
 class Fan {
 public:
     // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
     // precedes once.
-    bool is_regular(Index place, std::span<const Wedge> wedges) {
+    bool is_regular(Index place, std::span<const CornerSides> corners) {
         const std::uint64_t stamp = std::uint64_t{place} << 32;
-        for (const Wedge& wedge : wedges) {
-            std::uint64_t& seen = slot(wedge.following);
-            if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(wedges); // seen twice, or two in one slot
-            seen = stamp | wedge.following;
+        for (const CornerSides& corner : corners) {
+            std::uint64_t& seen = slot(corner.following);
+            if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(corners); // seen twice, or two in one slot
+            seen = stamp | corner.following;
         }
-        for (const Wedge& wedge : wedges) {
-            std::uint64_t& seen = slot(wedge.preceding);
-            if (seen != (stamp | wedge.preceding)) return false;
+        for (const CornerSides& corner : corners) {
+            std::uint64_t& seen = slot(corner.preceding);
+            if (seen != (stamp | corner.preceding)) return false;
             seen = stamp | nobody; // only once
         }
         return true;
@@ -158,12 +148,12 @@ private:
 
     std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
 
-    bool is_regular_by_sorting(std::span<const Wedge> wedges) {
+    bool is_regular_by_sorting(std::span<const CornerSides> corners) {
         following_.clear();
         preceding_.clear();
-        for (const Wedge& wedge : wedges) {
-            following_.push_back(wedge.following);
-            preceding_.push_back(wedge.preceding);
+        for (const CornerSides& corner : corners) {
+            following_.push_back(corner.following);
+            preceding_.push_back(corner.preceding);
         }
         std::sort(following_.begin(), following_.end());
         std::sort(preceding_.begin(), preceding_.end());
@@ -175,42 +165,10 @@ private:
     std::vector<std::uint64_t> slots_ = std::vector(std::size_t{1} << slot_bits, ~std::uint64_t{0});
 };
 
-// How well the mesh's own normals agree with its faces: positive where they do.
-double agreement_of_own_normals(const MeshView& mesh) {
-    if (mesh.normals.empty()) return 0;
-    return sum(mesh.triangles.size(), [&](std::size_t t) {
-        const glm::dvec3 area = area_vector(mesh, mesh.triangles[t]);
-        double agreement = 0;
-        for (const Index v : mesh.triangles[t])
-            if (has_length(mesh.normals[v])) agreement += glm::dot(area, unit(glm::dvec3(mesh.normals[v])));
-        return agreement;
-    });
-}
-
-Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincident, const Surface& surface) {
-    const bool has_edges = std::ranges::any_of(
-        mesh.triangles, [&](const Triangle& t) { return !is_degenerate(places_of(t, coincident)); });
-    if (!has_edges || std::ranges::find(surface.irregular, 1) != surface.irregular.end()) return Closedness::open;
+Closedness find_closedness(const MeshView& mesh, const Surface& surface) {
+    if (std::ranges::find(surface.irregular, 1) != surface.irregular.end()) return Closedness::open;
     const double volume = signed_volume(mesh);
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
-}
-
-// By place: regularity and the sum of the faces; by vertex: areas.
-Surface survey(const MeshView& mesh, std::span<const Index> coincident) {
-    Surface surface;
-    surface.irregular.assign(coincident.size(), 0);
-    surface.areas.assign(coincident.size(), 0);
-    surface.normals.resize(coincident.size());
-    const Wedges wedges = collect_wedges(mesh, coincident, surface.areas);
-    parallel_loop_over(tbb::blocked_range<std::size_t>(0, coincident.size(), grain), [&](const auto& places) {
-        Fan fan;
-        for (std::size_t place = places.begin(); place < places.end(); ++place) {
-            if (coincident[place] != place) continue;
-            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), wedges.around(place));
-            surface.normals[place] = glm::vec3(unit(wedges.sums[place]));
-        }
-    });
-    return surface;
 }
 
 } // namespace
@@ -240,31 +198,35 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
     return first;
 }
 
-Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident) {
-    Surface surface = survey(mesh, coincident);
-    // From what is known by place to what is known by vertex.
-    const std::size_t vertices = coincident.size();
-    surface.closedness = find_closedness(mesh, coincident, surface);
-    const bool inward = surface.closedness == Closedness::closed_inward;
-    const float face_sign = inward ? -1 : 1;
-    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the
-    // others read them.
-    const auto spread = [&](bool standing) {
-        parallel_loop_over(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                const Index place = coincident[v];
-                if ((place == v) != standing) continue;
-                surface.irregular[v] = surface.irregular[place];
-                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
-                surface.normals[v] =
-                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
-            }
-        });
-    };
-    spread(false);
-    spread(true);
+Surface analyse_surface(const MeshView& mesh) {
+    const std::size_t places = mesh.positions.size();
+    Surface surface;
+    surface.irregular.resize(places);
+    surface.areas.assign(places, 0);
+    surface.normals.resize(places);
+    const PlaceCorners corners = collect_corners(mesh, surface.areas);
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, places, grain), [&](const auto& range) {
+        Fan fan;
+        for (std::size_t place = range.begin(); place < range.end(); ++place) {
+            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), corners.around(place));
+            surface.normals[place] = glm::vec3(unit(corners.sums[place]));
+        }
+    });
+    surface.closedness = find_closedness(mesh, surface);
+    if (surface.closedness == Closedness::closed_inward)
+        for (glm::vec3& normal : surface.normals) normal = -normal;
     return surface;
+}
+
+bool own_normals_agree(const MeshView& mesh) {
+    if (mesh.normals.empty()) return false;
+    return sum(mesh.triangles.size(), [&](std::size_t t) {
+               const glm::dvec3 area = area_vector(mesh, mesh.triangles[t]);
+               double agreement = 0;
+               for (const Index v : mesh.triangles[t])
+                   if (has_length(mesh.normals[v])) agreement += glm::dot(area, unit(glm::dvec3(mesh.normals[v])));
+               return agreement;
+           }) > 0;
 }
 
 } // namespace unseen::vdtree

@@ -105,7 +105,7 @@ void Cut::unfold_all() { state_->unfold_all(); }
 void Cut::fold_all() { state_->fold_subtree(VertexTree::root()); }
 
 std::span<const FoldChange> Cut::changes() const noexcept { return state_->changes(); }
-std::span<const NodeId> Cut::indices() const { return state_->indices(); }
+std::span<const WedgeId> Cut::indices() const { return state_->indices(); }
 std::optional<std::span<const IndexWrite>> Cut::index_writes() const noexcept { return state_->index_writes(); }
 std::uint64_t Cut::index_version() const noexcept { return state_->index_version(); }
 std::uint64_t Cut::index_writes_from() const noexcept { return state_->index_writes_from(); }
@@ -237,7 +237,7 @@ ExtractedMesh extract_with_sources(const Cut& cut) {
     const VertexTree& tree = cut.tree();
     ExtractedMesh out;
     Mesh& mesh = out.mesh;
-    std::vector<NodeId> in_order;
+    std::vector<WedgeId> in_order;
     if (!tree.ranges().empty()) {
         const auto order = triangles_in_order(cut);
         mesh.ranges = ranges_left(tree, order);
@@ -246,26 +246,26 @@ ExtractedMesh extract_with_sources(const Cut& cut) {
         for (const auto& [source, triangle] : order) {
             out.source_triangles.push_back(source);
             for (const Index leaf : unchecked_links(tree).triangles[triangle])
-                in_order.push_back(cut.proxy_of_leaf(leaf));
+                in_order.push_back(cut.wedge_of_leaf(leaf));
         }
     }
-    const std::span<const NodeId> indices = tree.ranges().empty() ? cut.indices() : in_order;
-    std::vector<Index> vertex_of_node(tree.node_count(), no_node);
+    const std::span<const WedgeId> indices = tree.ranges().empty() ? cut.indices() : in_order;
+    std::vector<Index> vertex_of_wedge(tree.wedge_count(), no_node);
     mesh.triangles.resize(cut.triangle_count());
     for (std::size_t i = 0; i < indices.size(); ++i) {
-        Index& vertex = vertex_of_node[indices[i]];
+        Index& vertex = vertex_of_wedge[indices[i]];
         if (vertex == no_node) {
-            vertex = static_cast<Index>(out.nodes.size());
-            out.nodes.push_back(indices[i]);
+            vertex = static_cast<Index>(out.wedges.size());
+            out.wedges.push_back(indices[i]);
         }
         mesh.triangles[i / 3][i % 3] = vertex;
     }
-    mesh.positions.reserve(out.nodes.size());
-    for (const NodeId node : out.nodes) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[node]));
+    mesh.positions.reserve(out.wedges.size());
+    for (const WedgeId w : out.wedges) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[w]));
     const auto gather = [&](auto values, auto& to) {
         if (values.empty()) return;
-        to.reserve(out.nodes.size());
-        for (const NodeId node : out.nodes) to.push_back(values[node]);
+        to.reserve(out.wedges.size());
+        for (const WedgeId w : out.wedges) to.push_back(values[w]);
     };
     gather(tree.normals(), mesh.normals);
     gather(tree.colours(), mesh.colours);

@@ -300,13 +300,13 @@ private:
                 front_.prefetch_slot(parent);
         }
         for (const NodeId child : cut.fetched_children()) {
-            if (tree_.is_leaf(child)) continue;
+            if (tree_.is_place(child)) continue;
             front_.prefetch_slot(child);
             if (!folds) rules_.tester->prefetch(child);
         }
         if (folds) {
             for (const NodeId child : cut.fetched_children())
-                if (!tree_.is_leaf(child)) front_.prefetch_deadlines(child);
+                if (!tree_.is_place(child)) front_.prefetch_deadlines(child);
         } else {
             for (const NodeId node : nodes)
                 if (const NodeId parent = unchecked_links(tree_).parents[node]; parent != no_node)
@@ -327,12 +327,12 @@ private:
             if (!cut.is_unfolded_interior(node)) continue;
             const auto children = cut.fetched_children(i % changes_at_once);
             const auto has_fold = [&](NodeId child) {
-                return !tree_.is_leaf(child) && cut.is_unfolded_interior(child);
+                return !tree_.is_place(child) && cut.is_unfolded_interior(child);
             };
             if (std::ranges::none_of(children, has_fold)) { // nearly always
                 cut.apply_fold(node, children);
                 for (const NodeId child : children)
-                    if (!tree_.is_leaf(child)) front_.remove(child);
+                    if (!tree_.is_place(child)) front_.remove(child);
             } else {
                 cut.fold_below(node, [&](NodeId folded) {
                     for (NodeId child = folded + 1; child < subtree_end[folded]; child = subtree_end[child])
@@ -371,7 +371,7 @@ private:
             front_.remove(unchecked_links(tree_).parents[node]);
         candidates_.clear();
         for (const NodeId child : children)
-            if (!tree_.is_leaf(child)) candidates_.push_back(rules_.tester->candidate(child));
+            if (!tree_.is_place(child)) candidates_.push_back(rules_.tester->candidate(child));
         rules_.tester->find_still_rows(candidates_);
         for (const FoldCandidate& candidate : candidates_) {
             front_.insert(candidate, front_.slot_of(node));

@@ -74,14 +74,14 @@ void CutState::set_folded(NodeId node) {
     triangle_count_ -= unchecked_links(tree_).triangles_of(node);
 }
 
-// Makes the leaves of a node stand for the node itself.
+// Makes a node stand for its leaves.
 void CutState::assign(NodeId node) {
-    if (tree_.is_leaf(node)) {
-        proxy_[node - tree_.interior_count()] = node;
+    const Index begin = first_leaf_of(node);
+    if (tree_.is_place(node)) {
+        std::fill_n(proxy_.begin() + begin, tree_.wedge_end(node) - tree_.first_wedge(node), node);
         return;
     }
-    const auto& links = unchecked_links(tree_);
-    std::fill(proxy_.begin() + links.first_leaf[node], proxy_.begin() + links.leaf_end[node], node);
+    std::fill(proxy_.begin() + begin, proxy_.begin() + unchecked_links(tree_).leaf_end[node], node);
 }
 
 std::span<const NodeId> CutState::children_of(NodeId node) {
@@ -101,7 +101,7 @@ void CutState::make_stale() {
 }
 
 bool CutState::unfold(NodeId node) {
-    assert(!tree_.is_leaf(node) && (is_active(node) || is_unfolded(node)));
+    assert(!tree_.is_place(node) && (is_active(node) || is_unfolded(node)));
     if (test_bit(unfolded_, node) || !tree_.is_sound(node)) return false;
     make_stale();
     set_unfolded(node);
@@ -110,7 +110,7 @@ bool CutState::unfold(NodeId node) {
 }
 
 bool CutState::fold(NodeId node) {
-    assert(!tree_.is_leaf(node));
+    assert(!tree_.is_place(node));
     if (!test_bit(unfolded_, node)) return false;
     tree_.for_each_child(node, [&]([[maybe_unused]] NodeId child) { assert(!is_unfolded(child)); });
     make_stale();
@@ -120,7 +120,7 @@ bool CutState::fold(NodeId node) {
 }
 
 bool CutState::unfold_ancestors(NodeId node) {
-    const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
+    const Index leaf = first_leaf_of(node);
     bool changed = false;
     // What stands for the node's first leaf is an ancestor as long as its number is lower.
     while (leaf < tree_.leaf_count() && proxy_[leaf] < node && unfold(proxy_[leaf])) changed = true;
@@ -128,7 +128,7 @@ bool CutState::unfold_ancestors(NodeId node) {
 }
 
 bool CutState::fold_subtree(NodeId node) {
-    if (tree_.is_leaf(node) || !test_bit(unfolded_, node)) return false;
+    if (tree_.is_place(node) || !test_bit(unfolded_, node)) return false;
     make_stale();
     for (NodeId below = node; below < unchecked_links(tree_).subtree_end[node]; ++below)
         if (test_bit(unfolded_, below)) set_folded(below);
@@ -144,7 +144,7 @@ void CutState::unfold_all() {
         return;
     }
     for (NodeId node = 0; node < tree_.interior_count(); ++node) set_bit(unfolded_, node);
-    for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) proxy_[leaf] = tree_.interior_count() + leaf;
+    for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) proxy_[leaf] = tree_.place_of_leaf(leaf);
     triangle_count_ = tree_.triangle_count();
 }
 
@@ -305,8 +305,8 @@ void CutState::replay(std::span<const std::uint64_t> unfolded) {
         unfolded, [&](NodeId node) { apply_unfold(node); }, [&](NodeId node) { apply_fold(node); });
 }
 
-// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for
-// themselves.
+// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and places for those of
+// other leaves.
 void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
     const auto& links = unchecked_links(tree_);
     const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, subtree_end = links.subtree_end;
@@ -329,7 +329,11 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
         for (; leaf < leaves_end; ++leaf) proxies[leaf] = proxy_of(leaf);
         leaf = leaves_end;
     };
-    const auto stand_for_themselves = [&](Index leaves_end) { write(leaves_end, [end](Index l) { return end + l; }); };
+    const bool has_seams = tree_.has_seams();
+    const auto stand_for_themselves = [&](Index leaves_end) {
+        if (has_seams) write(leaves_end, [&](Index l) { return tree_.place_of_leaf(l); });
+        else write(leaves_end, [end](Index l) { return end + l; });
+    };
     for (NodeId node = 0; node < end; node = subtree_end[node]) {
         node = next_folded(node);
         if (node >= end) break;
@@ -404,13 +408,13 @@ void CutState::assign_changed(const std::vector<std::uint64_t>& unfolded) {
         } else {
             triangle_count_ += links.triangles_of(node);
             tree_.for_each_child(node, [&](NodeId child) {
-                if (tree_.is_leaf(child) || !test_bit(unfolded, child)) assign(child);
+                if (tree_.is_place(child) || !test_bit(unfolded, child)) assign(child);
             });
         }
     }
 }
 
-std::span<const NodeId> CutState::indices() const {
+std::span<const WedgeId> CutState::indices() const {
     if (!indices_) indices_ = std::make_unique<Indices>(tree_);
     if (indices_->is_stale) {
         indices_->buffer.gather(unfolded_, proxy_, triangle_count_);

@@ -30,12 +30,17 @@ public:
     // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
     std::uint64_t revision() const noexcept { return revision_; }
     bool is_unfolded_interior(NodeId node) const noexcept { return test_bit(unfolded_, node); }
-    bool is_unfolded(NodeId node) const noexcept { return !tree_.is_leaf(node) && is_unfolded_interior(node); }
+    bool is_unfolded(NodeId node) const noexcept { return !tree_.is_place(node) && is_unfolded_interior(node); }
     bool is_active(NodeId node) const noexcept {
         // Not by its parent, which a damaged file may lie about.
-        const Index leaf =
-            tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
+        const Index leaf = first_leaf_of(node);
         return leaf < tree_.leaf_count() && proxy_[leaf] == node;
+    }
+
+    // The first leaf that a node, or a place, supports.
+    Index first_leaf_of(NodeId node) const noexcept {
+        return tree_.is_place(node) ? tree_.first_wedge(node) - tree_.interior_wedge_count()
+                                    : unchecked_links(tree_).first_leaf[node];
     }
 
     // By the follower, which is made when it is first asked for.
@@ -73,7 +78,7 @@ public:
 
     // ---- the index buffer
 
-    std::span<const NodeId> indices() const;
+    std::span<const WedgeId> indices() const;
     std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
     std::uint64_t index_version() const noexcept;
     std::uint64_t index_writes_from() const noexcept;

@@ -38,14 +38,15 @@ Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Sim
     const Projector project(view);
     std::vector<Footprint> footprints(tree.node_count());
     parallel_loop(NodeId{0}, tree.node_count(), [&](NodeId node) {
-        footprints[node] = project(placement.to_world(tree.origin() + glm::dvec3(tree.positions()[node])));
+        footprints[node] = project(placement.to_world(tree.origin() + glm::dvec3(tree.position(node))));
     });
-    // Leaves: all triangles that touch them. From their own places, not from what has grown.
-    std::vector<Footprint> leaves(footprints.begin() + interior, footprints.end());
+    // Places: all triangles that touch them. From their own positions, not from what has grown.
+    std::vector<Footprint> places(footprints.begin() + interior, footprints.end());
     for (const Triangle& triangle : sound->triangles())
         for (const Index corner : triangle)
-            for (const Index other : triangle) leaves[corner].add(footprints[interior + other]);
-    std::copy(leaves.begin(), leaves.end(), footprints.begin() + interior);
+            for (const Index other : triangle)
+                places[tree.place_of_leaf(corner) - interior].add(footprints[tree.place_of_leaf(other)]);
+    std::copy(places.begin(), places.end(), footprints.begin() + interior);
     for (NodeId node = tree.node_count(); node-- > 1;) footprints[sound->parents()[node]].add(footprints[node]);
     footprints.resize(interior);
     return footprints;

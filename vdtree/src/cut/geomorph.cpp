@@ -16,13 +16,13 @@ constexpr std::size_t fewest_of_a_jump = 64;
 // As a share of a glide: so near its end it is there. Sums of time steps that make up its time come this near.
 constexpr double arrived = 1e-9;
 
-MovedVertex at_rest(const VertexTree& tree, NodeId node) {
-    return {node, tree.positions()[node], tree.luminance()[node],
-            tree.colours().empty() ? glm::vec4(0) : tree.colours()[node]};
+MovedVertex at_rest(const VertexTree& tree, WedgeId wedge) {
+    return {wedge, tree.positions()[wedge], tree.luminance()[wedge],
+            tree.colours().empty() ? glm::vec4(0) : tree.colours()[wedge]};
 }
 
 MovedVertex between(const MovedVertex& proxy, const MovedVertex& own, float share) {
-    return {own.node, glm::mix(proxy.position, own.position, share), glm::mix(proxy.luminance, own.luminance, share),
+    return {own.wedge, glm::mix(proxy.position, own.position, share), glm::mix(proxy.luminance, own.luminance, share),
             glm::mix(proxy.colour, own.colour, share)};
 }
 
@@ -36,11 +36,16 @@ struct Geomorph::State {
     struct Glide {
         double weight = 0; // 0: the children are at the proxy, 1: at their own places
         bool unfolds = true;
-        NodeId parent = no_node;
-        MovedVertex own;   // the node, in its own place
-        MovedVertex drawn; // where it would be drawn, as of the step `placed`
+        NodeId node = no_node, parent = no_node;
+        std::vector<MovedVertex> own;   // the node's wedges, in their own place
+        std::vector<MovedVertex> drawn; // where they would be drawn, as of the step `placed`
         std::uint64_t placed = 0;
-        std::vector<MovedVertex> children; // in their own places
+        struct Child {
+            NodeId node;
+            std::size_t above; // which of the node's wedges holds it
+            MovedVertex own;
+        };
+        std::vector<Child> children; // wedges of the node's children, in their own places
     };
 
     State(const VertexTree& tree, double seconds, double jump_share)
@@ -84,7 +89,7 @@ struct Geomorph::State {
     }
 
     void become(const CutState& cut) {
-        for (const Glide& glide : glides) slot_of_node[glide.own.node] = no_slot;
+        for (const Glide& glide : glides) slot_of_node[glide.node] = no_slot;
         glides.clear();
         moved.clear();
         AdjustStats unused;
@@ -110,7 +115,7 @@ struct Geomorph::State {
                 begin(node, 1);
             }
         }
-        for (Glide& glide : glides) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
+        for (Glide& glide : glides) glide.unfolds = cut.is_unfolded_interior(glide.node);
     }
 
     // A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner;
@@ -120,12 +125,12 @@ struct Geomorph::State {
         const bool at_once = !(glide_s > 0);
         for (const Glide& glide : glides)
             if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived))
-                arrived_nodes.push_back(glide.own.node);
+                arrived_nodes.push_back(glide.node);
         std::sort(arrived_nodes.begin(), arrived_nodes.end(), std::greater<>()); // children first
         for (const NodeId node : arrived_nodes) {
             if (!glides[slot_of_node[node]].unfolds) {
                 bool is_flat = true;
-                for (const MovedVertex& child : glides[slot_of_node[node]].children)
+                for (const Glide::Child& child : glides[slot_of_node[node]].children)
                     is_flat &= !drawn.is_unfolded(child.node);
                 if (!is_flat) continue;
                 drawn.apply_fold(node);
@@ -141,9 +146,9 @@ struct Geomorph::State {
             place(slot);
             const Glide& glide = glides[slot];
             const float share = static_cast<float>(glide.weight);
-            for (const MovedVertex& child :
-                 glide.children) // those of a node that is unfolded are active, or unfolded, too
-                if (!drawn.is_unfolded(child.node)) moved.push_back(between(glide.drawn, child, share));
+            for (const Glide::Child& child : glide.children) // those of an unfolded node are active, or unfolded, too
+                if (!drawn.is_unfolded(child.node))
+                    moved.push_back(between(glide.drawn[child.above], child.own, share));
         }
     }
 
@@ -157,9 +162,12 @@ struct Geomorph::State {
             Glide& glide = glides[unplaced.back()];
             const Slot parent = slot_of(glide.parent);
             glide.placed = steps;
-            glide.drawn = parent == no_slot
-                              ? glide.own
-                              : between(glides[parent].drawn, glide.own, static_cast<float>(glides[parent].weight));
+            glide.drawn = glide.own;
+            if (parent == no_slot) continue;
+            const Glide& above = glides[parent];
+            for (MovedVertex& vertex : glide.drawn)
+                vertex =
+                    between(above.drawn[place_in(above.node, vertex.wedge)], vertex, static_cast<float>(above.weight));
         }
     }
 
@@ -167,8 +175,18 @@ struct Geomorph::State {
         const VertexTree& tree = drawn.tree();
         if (slot_of_node.empty()) slot_of_node.assign(tree.interior_count(), no_slot);
         slot_of_node[node] = static_cast<Slot>(glides.size());
-        glides.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
-        tree.for_each_child(node, [&](NodeId child) { glides.back().children.push_back(at_rest(tree, child)); });
+        Glide glide{weight, weight == 0, node, unchecked_links(tree).parents[node], {}, {}, 0, {}};
+        for (WedgeId w = tree.first_wedge(node); w < tree.wedge_end(node); ++w) glide.own.push_back(at_rest(tree, w));
+        tree.for_each_child(node, [&](NodeId child) {
+            for (WedgeId w = tree.first_wedge(child); w < tree.wedge_end(child); ++w)
+                glide.children.push_back({child, place_in(node, w), at_rest(tree, w)});
+        });
+        glides.push_back(std::move(glide));
+    }
+
+    // Which of a node's wedges holds a wedge below.
+    std::size_t place_in(NodeId node, WedgeId below) const {
+        return drawn.tree().wedge_above(node, below) - drawn.tree().first_wedge(node);
     }
 
     void end(NodeId node) {
@@ -176,14 +194,15 @@ struct Geomorph::State {
         slot_of_node[node] = no_slot;
         if (slot + 1 < glides.size()) {
             glides[slot] = std::move(glides.back());
-            slot_of_node[glides[slot].own.node] = slot;
+            slot_of_node[glides[slot].node] = slot;
         }
         glides.pop_back();
     }
 
     std::uint64_t byte_size() const noexcept {
         std::uint64_t children = 0;
-        for (const Glide& glide : glides) children += glide.children.capacity();
+        for (const Glide& glide : glides)
+            children += glide.children.capacity() + glide.own.capacity() + glide.drawn.capacity();
         return drawn.byte_size() + sizeof(Glide) * glides.capacity() + sizeof(MovedVertex) * children +
                sizeof(Slot) * slot_of_node.capacity() + sizeof(MovedVertex) * moved.capacity() +
                sizeof(FoldChange) * found.capacity() + sizeof(NodeId) * arrived_nodes.capacity() +

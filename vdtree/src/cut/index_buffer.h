@@ -16,9 +16,10 @@ namespace unseen::vdtree {
 // has come since is looked up in the tree.
 class IndexBuffer {
 public:
-    explicit IndexBuffer(const VertexTree& tree) : tree_(&tree) {}
+    explicit IndexBuffer(const VertexTree& tree) : tree_(&tree), has_seams_(tree.has_seams()) {}
 
-    std::span<const NodeId> indices() const noexcept { return indices_; }
+    // Wedges.
+    std::span<const WedgeId> indices() const noexcept { return has_seams_ ? wedges_ : indices_; }
     bool can_patch() const noexcept { return has_lists_; }
 
     // Everything anew, in the order of the triangles. `unfolded` has one bit a node, `proxies` one node a leaf. Cost: a
@@ -34,6 +35,11 @@ public:
                 for (const Index leaf : leaves_[i + ahead]) prefetch(&proxies[leaf]);
             for (const Index leaf : leaves_[i]) *out++ = proxies[leaf];
         }
+        if (!has_seams_) return;
+        wedges_.resize(indices_.size());
+        for (std::size_t i = 0; i < triangles; ++i)
+            for (std::size_t k = 0; k < 3; ++k)
+                wedges_[3 * i + k] = tree_->wedge_at(indices_[3 * i + k], leaves_[i][k]);
     }
 
     // Makes the lists for what was gathered just now. Cost: a few times gather()'s. Buffers that are too large for them
@@ -99,100 +105,14 @@ public:
     // Precondition of all: can_patch(). Between begin_patch() and end_patch() the buffer may have holes.
     void begin_patch() { write_count_ = 0; }
     // All children are active, and `children` are they.
-    // Which triangles vanish, and which corners are whose, is unpredictable: branch-free, here and below.
     void fold(NodeId node, std::span<const NodeId> children) {
-        std::size_t most = 0;
-        for (const NodeId child : children) most += list(block_of_node_[child]).size();
-        scratch_.resize(most);
-        vanished_.resize(most);
-        NodeId* const indices = indices_.data();
-        IndexWrite* written = room_for(4 * most); // a vanishing triangle is of two corners at least
-        std::size_t count = 0, vanished = 0, kept = 0;
-        for (const NodeId child : children) {
-            const Block block = block_of_node_[child];
-            for (const Entry& entry : list(block)) {
-                const Index c0 = entry.corner / 3 * 3;
-                const bool is_shown = indices[entry.corner] == child; // else it waits for its removal
-                // The triangles that vanish are those that show the node twice now.
-                const bool is_second =
-                    (indices[c0] == node) + (indices[c0 + 1] == node) + (indices[c0 + 2] == node) == 1;
-                indices[entry.corner] = is_shown ? node : no_node;
-                *written = {entry.corner, node};
-                written += is_shown;
-                scratch_[count] = entry;
-                count += is_shown;
-                vanished_[vanished] = c0;
-                vanished += is_shown & is_second;
-            }
-            discard(block);
-            block_of_node_[child] = no_block;
-        }
-        for (std::size_t i = 0; i < vanished; ++i) {
-            const Index c0 = vanished_[i];
-            for (Index corner = c0; corner < c0 + 3; ++corner) {
-                if (indices[corner] != node) removals_.push_back({corner, indices[corner]});
-                indices[corner] = no_node;
-                *written++ = {corner, no_node};
-            }
-            holes_.push_back(c0 / 3);
-        }
-        take_room_until(written);
-        for (std::size_t i = 0; i < count; ++i) {
-            const Entry entry = scratch_[i];
-            scratch_[kept] = entry;
-            kept += indices[entry.corner] == node;
-        }
-        block_of_node_[node] = no_block;
-        give(node, std::span(scratch_).first(kept));
+        if (has_seams_) fold_to<true>(node, children);
+        else fold_to<false>(node, children);
     }
-
     // `proxies` is current: the children stand for their leaves.
     void unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies) {
-        remove_all();
-        const auto& links = unchecked_links(*tree_);
-        const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end;
-        // The corners under the node, those of the triangles that come last.
-        const Block block = block_of_node_[node];
-        const auto shown = list(block);
-        scratch_.assign(shown.begin(), shown.end());
-        discard(block);
-        block_of_node_[node] = no_block;
-        const Index first_triangle = links.first_triangle[node], triangle_end = links.first_triangle[node + 1];
-        IndexWrite* written = room_for(scratch_.size() + std::size_t{3} * (triangle_end - first_triangle));
-        for (Index t = first_triangle; t < triangle_end; ++t) {
-            const Index c0 = new_triangle() * 3;
-            for (Index k = 0; k < 3; ++k) {
-                const Entry entry{c0 + k, links.triangles[t][k]};
-                if (entry.leaf - first_leaf[node] < leaf_end[node] - first_leaf[node]) {
-                    scratch_.push_back(entry);
-                } else {
-                    const NodeId other = proxies[entry.leaf];
-                    indices_[entry.corner] = other;
-                    *written++ = {entry.corner, other};
-                    append(other, entry);
-                }
-            }
-        }
-        // Every child takes its own.
-        dealt_.resize(scratch_.size());
-        NodeId* const indices = indices_.data();
-        for (const NodeId child : children) {
-            const bool is_leaf = tree_->is_leaf(child);
-            const Index begin = is_leaf ? child - tree_->interior_count() : first_leaf[child];
-            const Index leaves = is_leaf ? 1 : leaf_end[child] - begin;
-            std::size_t count = 0;
-            for (const Entry& entry : scratch_) {
-                dealt_[count] = entry;
-                count += entry.leaf - begin < leaves;
-            }
-            for (std::size_t i = 0; i < count; ++i) {
-                indices[dealt_[i].corner] = child;
-                *written++ = {dealt_[i].corner, child};
-            }
-            block_of_node_[child] = no_block;
-            give(child, std::span(dealt_).first(count));
-        }
-        take_room_until(written);
+        if (has_seams_) unfold_to<true>(node, children, proxies);
+        else unfold_to<false>(node, children, proxies);
     }
 
     // Bring nearer what changes around active nodes will read: their lists' places, then the lists, then what these
@@ -233,7 +153,8 @@ public:
             for (Index k = 0; k < 3; ++k) {
                 const Index to = hole * 3 + k, from = static_cast<Index>(end) * 3 + k;
                 indices_[to] = indices_[from];
-                *written++ = {to, indices_[from]};
+                if (has_seams_) wedges_[to] = wedges_[from];
+                *written++ = {to, has_seams_ ? wedges_[from] : indices_[from]};
                 replace(indices_[from], from, to);
             }
         }
@@ -241,16 +162,18 @@ public:
         while (end > 0 && is_hole(static_cast<Index>(end - 1))) --end;
         holes_.clear();
         indices_.resize(3 * end);
+        if (has_seams_) wedges_.resize(3 * end);
     }
 
     // What the patches since begin_patch() wrote, in order; places may come twice, and lie beyond the end by now.
     std::span<const IndexWrite> writes() const noexcept { return std::span(writes_).first(write_count_); }
     std::uint64_t byte_size() const noexcept {
-        std::uint64_t bytes =
-            sizeof(NodeId) * indices_.capacity() + sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
-            sizeof(std::uint64_t) * shown_by_.capacity() + sizeof(Index) * (places_.capacity() + coming_.capacity()) +
-            sizeof(Block) * block_of_node_.capacity() + sizeof(Line) * pool_.capacity() +
-            sizeof(IndexWrite) * writes_.capacity();
+        std::uint64_t bytes = sizeof(NodeId) * (indices_.capacity() + wedges_.capacity()) +
+                              sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
+                              sizeof(std::uint64_t) * shown_by_.capacity() +
+                              sizeof(Index) * (places_.capacity() + coming_.capacity()) +
+                              sizeof(Block) * block_of_node_.capacity() + sizeof(Line) * pool_.capacity() +
+                              sizeof(IndexWrite) * writes_.capacity();
         for (const auto& blocks : free_blocks_) bytes += sizeof(Block) * blocks.capacity();
         return bytes;
     }
@@ -276,6 +199,115 @@ private:
     struct alignas(64) Line {
         Entry entries[8];
     };
+
+    // Which triangles vanish, and which corners are whose, is unpredictable: branch-free, here and below.
+    template <bool seams>
+    void fold_to(NodeId node, std::span<const NodeId> children) {
+        std::size_t most = 0;
+        for (const NodeId child : children) most += list(block_of_node_[child]).size();
+        scratch_.resize(most);
+        vanished_.resize(most);
+        NodeId* const indices = indices_.data();
+        IndexWrite* written = room_for(4 * most); // a vanishing triangle is of two corners at least
+        std::size_t count = 0, vanished = 0, kept = 0;
+        for (const NodeId child : children) {
+            const Block block = block_of_node_[child];
+            for (const Entry& entry : list(block)) {
+                const Index c0 = entry.corner / 3 * 3;
+                const bool is_shown = indices[entry.corner] == child; // else it waits for its removal
+                // The triangles that vanish are those that show the node twice now.
+                const bool is_second =
+                    (indices[c0] == node) + (indices[c0 + 1] == node) + (indices[c0 + 2] == node) == 1;
+                indices[entry.corner] = is_shown ? node : no_node;
+                const WedgeId wedge = seams ? tree_->wedge_at(node, entry.leaf) : node;
+                if constexpr (seams) wedges_[entry.corner] = is_shown ? wedge : no_node;
+                *written = {entry.corner, wedge};
+                written += is_shown;
+                scratch_[count] = entry;
+                count += is_shown;
+                vanished_[vanished] = c0;
+                vanished += is_shown & is_second;
+            }
+            discard(block);
+            block_of_node_[child] = no_block;
+        }
+        for (std::size_t i = 0; i < vanished; ++i) {
+            const Index c0 = vanished_[i];
+            for (Index corner = c0; corner < c0 + 3; ++corner) {
+                if (indices[corner] != node) removals_.push_back({corner, indices[corner]});
+                indices[corner] = no_node;
+                if constexpr (seams) wedges_[corner] = no_node;
+                *written++ = {corner, no_node};
+            }
+            holes_.push_back(c0 / 3);
+        }
+        take_room_until(written);
+        for (std::size_t i = 0; i < count; ++i) {
+            const Entry entry = scratch_[i];
+            scratch_[kept] = entry;
+            kept += indices[entry.corner] == node;
+        }
+        block_of_node_[node] = no_block;
+        give(node, std::span(scratch_).first(kept));
+    }
+
+    template <bool seams>
+    void unfold_to(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies) {
+        remove_all();
+        const auto& links = unchecked_links(*tree_);
+        const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end;
+        // The corners under the node, those of the triangles that come last.
+        const Block block = block_of_node_[node];
+        const auto shown = list(block);
+        scratch_.assign(shown.begin(), shown.end());
+        discard(block);
+        block_of_node_[node] = no_block;
+        const Index first_triangle = links.first_triangle[node], triangle_end = links.first_triangle[node + 1];
+        IndexWrite* written = room_for(scratch_.size() + std::size_t{3} * (triangle_end - first_triangle));
+        for (Index t = first_triangle; t < triangle_end; ++t) {
+            const Index c0 = new_triangle() * 3;
+            for (Index k = 0; k < 3; ++k) {
+                const Entry entry{c0 + k, links.triangles[t][k]};
+                if (entry.leaf - first_leaf[node] < leaf_end[node] - first_leaf[node]) {
+                    scratch_.push_back(entry);
+                } else {
+                    const NodeId other = proxies[entry.leaf];
+                    indices_[entry.corner] = other;
+                    *written++ = {entry.corner, show<seams>(entry, other)};
+                    append(other, entry);
+                }
+            }
+        }
+        // Every child takes its own.
+        const WedgeId first_of_leaves = tree_->interior_wedge_count();
+        dealt_.resize(scratch_.size());
+        NodeId* const indices = indices_.data();
+        for (const NodeId child : children) {
+            const bool is_place = tree_->is_place(child);
+            const Index begin = is_place ? tree_->first_wedge(child) - first_of_leaves : first_leaf[child];
+            const Index leaves =
+                is_place ? tree_->wedge_end(child) - tree_->first_wedge(child) : leaf_end[child] - begin;
+            std::size_t count = 0;
+            for (const Entry& entry : scratch_) {
+                dealt_[count] = entry;
+                count += entry.leaf - begin < leaves;
+            }
+            for (std::size_t i = 0; i < count; ++i) {
+                indices[dealt_[i].corner] = child;
+                *written++ = {dealt_[i].corner, show<seams>(dealt_[i], child)};
+            }
+            block_of_node_[child] = no_block;
+            give(child, std::span(dealt_).first(count));
+        }
+        take_room_until(written);
+    }
+
+    // The wedge of a node that shows an entry's leaf, put where it is shown.
+    template <bool seams>
+    WedgeId show(const Entry& entry, NodeId node) {
+        if constexpr (!seams) return node;
+        return wedges_[entry.corner] = tree_->wedge_at(node, entry.leaf);
+    }
 
     // Lines follow each other without gaps: one array of entries.
     static_assert(sizeof(Line) == sizeof(Line::entries));
@@ -426,13 +458,16 @@ private:
         }
         const Index triangle = static_cast<Index>(indices_.size() / 3);
         indices_.resize(indices_.size() + 3, no_node);
+        if (has_seams_) wedges_.resize(indices_.size(), no_node);
         return triangle;
     }
 
     bool is_hole(Index triangle) const { return indices_[std::size_t{3} * triangle] == no_node; }
 
     const VertexTree* tree_;
-    std::vector<NodeId> indices_;
+    bool has_seams_;
+    std::vector<NodeId> indices_; // the nodes at the corners
+    std::vector<WedgeId> wedges_; // their wedges, where these are not the nodes themselves
     bool has_lists_ = false;
     std::vector<Block> block_of_node_;   // by node; no_block without lists
     std::vector<Line> pool_;             // of entries; blocks are whole lines

@@ -61,7 +61,7 @@ private:
     void enter(const Triangle& t, std::vector<std::vector<Crossing>>& columns) {
         glm::dvec3 p[3];
         for (std::size_t k = 0; k < 3; ++k)
-            p[k] = (glm::dvec3(tree_.positions()[tree_.interior_count() + t[k]]) - corner_) / cell_;
+            p[k] = (glm::dvec3(tree_.positions()[tree_.wedge_of_leaf(t[k])]) - corner_) / cell_;
         const glm::dvec3 low = glm::min(p[0], glm::min(p[1], p[2])), high = glm::max(p[0], glm::max(p[1], p[2]));
         const glm::ivec3 first = glm::ivec3(glm::floor(low - rounding)), last = glm::ivec3(glm::floor(high + rounding));
         const glm::dvec3 n = glm::cross(p[1] - p[0], p[2] - p[0]);

@@ -19,7 +19,7 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 5;
+constexpr std::uint32_t format_version = 6;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;     // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
@@ -60,7 +60,7 @@ struct Facts {
     std::uint32_t closedness;
     std::uint32_t prelit;
     float fill;
-    std::uint32_t spare;
+    std::uint32_t source_vertices;
 };
 static_assert(sizeof(Facts) == 88);
 
@@ -72,6 +72,9 @@ std::uint64_t pages_of(const Section& s) { return (s.count * s.element_bytes + p
 template <class Geometry, class Luminance, class F>
 void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("parents", g.parents);
+    f("first_wedge", g.first_wedge);
+    f("leaf_places", g.leaf_places);
+    f("wedge_ranks", g.wedge_ranks);
     f("positions", g.positions);
     f("normals", g.normals);
     f("colours", g.colours);
@@ -101,7 +104,10 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
 bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
 
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return is_of_texture(name) || name == "document"; }
+bool is_of_seams(std::string_view name) {
+    return name == "first_wedge" || name == "leaf_places" || name == "wedge_ranks";
+}
+bool is_optional(std::string_view name) { return is_of_texture(name) || is_of_seams(name) || name == "document"; }
 
 template <class T>
 constexpr std::uint32_t component_bytes() {
@@ -162,7 +168,7 @@ Facts facts_of(const TreeGeometry& g, const TreeLuminance& l) {
             static_cast<std::uint32_t>(g.closedness),
             l.prelit ? 1u : 0u,
             l.light.fill,
-            0};
+            g.source_vertex_count};
 }
 
 // ---- writing
@@ -450,6 +456,7 @@ private:
         g.origin = {f.origin[0], f.origin[1], f.origin[2]};
         g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
         g.dropped_triangles = f.dropped_triangles;
+        g.source_vertex_count = f.source_vertices;
         g.closedness = static_cast<Closedness>(f.closedness);
         l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3], f.fill};
         l.prelit = f.prelit != 0;
@@ -467,13 +474,20 @@ private:
         const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
         if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
             return fail("The tree has no nodes or no triangles.");
-        const std::size_t leaves = nodes - interior;
+        const bool has_seams = !g.first_wedge.empty();
+        const std::size_t leaves = has_seams ? g.leaf_places.size() : nodes - interior;
+        const std::size_t wedges = g.positions.size();
+        if (has_seams && (g.first_wedge.size() != nodes + 1 || wedges >= no_node))
+            return fail("Section first_wedge has the wrong length.");
+        const std::size_t first_leaf = has_seams ? g.first_wedge[interior] : interior;
         const std::pair<bool, const char*> checks[] = {
-            {g.positions.size() == nodes, "positions"},
-            {g.normals.size() == nodes, "normals"},
-            {g.colours.empty() || g.colours.size() == nodes, "colours"},
-            {g.uvs.empty() || g.uvs.size() == nodes, "uvs"},
-            {l.luminance.size() == nodes, "luminance"},
+            {wedges == first_leaf + leaves, "positions"},
+            {g.leaf_places.empty() == !has_seams, "leaf_places"},
+            {g.wedge_ranks.size() == (has_seams ? wedges : 0), "wedge_ranks"},
+            {g.normals.size() == wedges, "normals"},
+            {g.colours.empty() || g.colours.size() == wedges, "colours"},
+            {g.uvs.empty() || g.uvs.size() == wedges, "uvs"},
+            {l.luminance.size() == wedges, "luminance"},
             {g.leaf_end.size() == interior, "leaf_end"},
             {g.subtree_end.size() == interior, "subtree_end"},
             {g.first_triangle.size() == interior + 1, "first_triangle"},

@@ -97,13 +97,13 @@ Result<BakedLight> find_baked_light(const VertexTree& given) {
     Samples samples;
     DirectionCount directions;
     const Index stride = given.leaf_count() / most_samples + 1;
-    for (NodeId node = given.interior_count(); node < given.node_count();
-         node += std::min(stride, given.node_count() - node)) {
-        const PackedNormal packed = given.normals()[node];
+    for (WedgeId leaf = given.interior_wedge_count(); leaf < given.wedge_count();
+         leaf += std::min(stride, given.wedge_count() - leaf)) {
+        const PackedNormal packed = given.normals()[leaf];
         const glm::dvec3 normal{glm::vec3(packed)};
         if (normal == glm::dvec3(0)) continue;
-        const double albedo = static_cast<double>(albedo_of(given, node));
-        samples.push_back({normal, texture.empty() ? albedo : albedo * texel_luminance(texture, given.uvs()[node])});
+        const double albedo = static_cast<double>(albedo_of(given, leaf));
+        samples.push_back({normal, texture.empty() ? albedo : albedo * texel_luminance(texture, given.uvs()[leaf])});
         directions.include(packed);
     }
     constexpr double parameters = 4; // a, and b times the direction

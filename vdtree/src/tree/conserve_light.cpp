@@ -27,9 +27,9 @@ public:
         });
         for (const NodeId node : sequence) fold(node);
         std::vector<Unorm16> packed(luminance_.size());
-        for (NodeId node = 0; node < tree_.node_count(); ++node)
-            packed[node] =
-                node < interior_ ? Unorm16::nearest(static_cast<double>(luminance_[node])) : tree_.luminance()[node];
+        for (WedgeId w = 0; w < tree_.wedge_count(); ++w)
+            packed[w] = w < tree_.interior_wedge_count() ? Unorm16::nearest(static_cast<double>(luminance_[w]))
+                                                         : tree_.luminance()[w];
         return packed;
     }
 
@@ -37,26 +37,29 @@ private:
     void fold(NodeId node) {
         glm::vec3 light(0); // to be kept
         tree_.for_each_child(node, [&](NodeId child) {
-            if (!tree_.is_leaf(child)) light += missing_[child];
+            if (!tree_.is_place(child)) light += missing_[child];
         });
-        mesh_.fold(node, [&](const Triangle& t) { light += luminance_of(t) * mesh_.vector_area(t); });
+        mesh_.fold(node, [&](Index t) { light += luminance_of(t) * mesh_.vector_area(t); });
         if (tree_.support_spheres()[node].radius > 0) choose(node, light);
         glm::vec3 kept(0);
-        for (const Index t : mesh_.ring(node))
-            kept += luminance_of(mesh_.corners(t)) * mesh_.vector_area(mesh_.corners(t));
+        for (const Index t : mesh_.ring(node)) kept += luminance_of(t) * mesh_.vector_area(t);
         missing_[node] = light - kept;
     }
 
+    // Several wedges get brighter or darker by the same amount.
     void choose(NodeId node, const glm::vec3& light) {
-        glm::vec3 area(0), others(0); // vector area; light of the other corners
+        const WedgeId first = tree_.first_wedge(node), end = tree_.wedge_end(node);
+        const bool is_single = end - first == 1;
+        glm::vec3 area(0), others(0); // vector area; light of the other corners, and of those that stay with the node
         float total = 0;
         for (const Index t : mesh_.ring(node)) {
-            const Triangle& at = mesh_.corners(t);
-            const glm::vec3 of_triangle = mesh_.vector_area(at);
+            const glm::vec3 of_triangle = mesh_.vector_area(t);
             area += of_triangle;
             total += glm::length(of_triangle);
+            const std::array<WedgeId, 3> wedges = mesh_.wedges(t);
             float sum = 0;
-            for (const NodeId corner : at) sum += corner == node ? 0 : luminance_[corner];
+            for (std::size_t k = 0; k < 3; ++k)
+                sum += is_single && mesh_.corners(t)[k] == node ? 0 : luminance_[wedges[k]];
             others += sum / 3 * of_triangle;
         }
         const float facing = glm::length(area);
@@ -64,10 +67,14 @@ private:
         const float wanted = 3 * glm::dot(light - others, area) / (facing * facing);
         if (!std::isfinite(wanted)) return;
         const LuminanceRange ring = tree_.ring_luminance()[node];
-        luminance_[node] = std::clamp(wanted, ring.lo, ring.hi);
+        for (WedgeId w = first; w < end; ++w)
+            luminance_[w] = std::clamp(is_single ? wanted : luminance_[w] + wanted, ring.lo, ring.hi);
     }
 
-    float luminance_of(const Triangle& t) const { return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3; }
+    float luminance_of(Index triangle) const {
+        const auto [a, b, c] = mesh_.wedges(triangle);
+        return (luminance_[a] + luminance_[b] + luminance_[c]) / 3;
+    }
 
     const SoundTree& tree_;
     NodeId interior_;
@@ -78,7 +85,8 @@ private:
 
 void include_proxies(const SoundTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
-        support[node] = unite(support[node], PackedRange{luminance[node], luminance[node]});
+        for (WedgeId w = tree.first_wedge(node); w < tree.wedge_end(node); ++w)
+            support[node] = unite(support[node], PackedRange{luminance[w], luminance[w]});
         if (node > 0) support[tree.parents()[node]] = unite(support[tree.parents()[node]], support[node]);
     }
 }

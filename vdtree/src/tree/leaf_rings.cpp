@@ -2,11 +2,12 @@
 
 namespace unseen::vdtree {
 
-LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& places, const TreeParts& parts) {
-    const std::size_t leaves = places.weld.size();
+LeafRings find_rings(std::span<const Triangle> triangles, std::span<const std::uint8_t> irregular,
+                     const TreeParts& parts) {
+    const std::size_t leaves = irregular.size();
     // Around a regular vertex the triangles close up: each neighbour follows it in one triangle and precedes it in
     // another.
-    const auto closed = [&](Index leaf) { return places.alone[leaf] && !places.irregular[leaf]; };
+    const auto closed = [&](Index leaf) { return !irregular[leaf]; };
     LeafRings rings;
     rings.start.assign(leaves + 1, 0);
     parts.for_each_triangle([&](const TreePart& part) {

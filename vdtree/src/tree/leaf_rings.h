@@ -1,4 +1,4 @@
-// What surrounds each leaf.
+// What surrounds each place while the tree is built.
 #pragma once
 
 #include "build/parallel_array.h"
@@ -7,14 +7,7 @@
 
 namespace unseen::vdtree {
 
-// By leaf: the surface at its place.
-struct LeafPlaces {
-    std::vector<Index> weld;             // a leaf that stands for all at the same position
-    std::vector<std::uint8_t> irregular; // whether an irregular edge ends there
-    std::vector<std::uint8_t> alone;     // whether no other vertex is at the position
-};
-
-// By leaf: the leaves that it shares triangles with; once each where the surface is regular, else perhaps more often.
+// By place: the places that it shares triangles with; once each where the surface is regular, else perhaps more often.
 struct LeafRings {
     std::vector<Index> start; // one longer
     ParallelArray<Index> neighbours;
@@ -24,6 +17,8 @@ struct LeafRings {
     }
 };
 
-LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& places, const TreeParts& parts);
+// `irregular`: by place, whether an irregular edge ends there.
+LeafRings find_rings(std::span<const Triangle> triangles, std::span<const std::uint8_t> irregular,
+                     const TreeParts& parts);
 
 } // namespace unseen::vdtree

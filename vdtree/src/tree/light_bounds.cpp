@@ -23,21 +23,21 @@ class Measurer {
 public:
     explicit Measurer(const SoundTree& tree)
         : tree_(tree), interior_(tree.interior_count()), cones_(interior_), angles_(interior_),
-          normals_(tree.node_count()), albedo_(tree.node_count()), start_(tree.leaf_count() + 1, 0),
+          normals_(tree.wedge_count()), albedo_(tree.wedge_count()), start_(tree.leaf_count() + 1, 0),
           sums_(tree.leaf_count() + 1, glm::dvec3(0)) {}
 
     std::vector<VertexCone> run(const FunctionRef<void(const LightBounds::FurtherVertex&)>* further_vertices) {
-        parallel_loop(NodeId{0}, tree_.node_count(), [&](NodeId node) {
-            normals_[node] = tree_.normals()[node];
-            albedo_[node] = albedos_of(node);
+        parallel_loop(WedgeId{0}, tree_.wedge_count(), [&](WedgeId w) {
+            normals_[w] = tree_.normals()[w];
+            albedo_[w] = albedos_of(w);
         });
         find_neighbours();
         for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf)
-            sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
+            sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[tree_.wedge_of_leaf(leaf)]);
         if (further_vertices) {
             further_.resize(interior_);
             parallel_loop(NodeId{0}, interior_, [&](NodeId node) { further_[node] = nothing_of(node); });
-            const auto add = [&](NodeId node, NodeId vertex) {
+            const auto add = [&](NodeId node, WedgeId vertex) {
                 if (vertex != no_node) see(vertex, further_[node]);
                 else further_[node].is_unknown = true;
             };
@@ -77,10 +77,10 @@ private:
     };
 
     // With a texture, over the channels of the colour that it is multiplied with.
-    LuminanceRange albedos_of(NodeId node) const {
-        const float albedo = albedo_of(tree_, node);
+    LuminanceRange albedos_of(WedgeId wedge) const {
+        const float albedo = albedo_of(tree_, wedge);
         if (tree_.texture().empty() || tree_.colours().empty()) return {albedo, albedo};
-        return channel_range(tree_.colours()[node], Unorm16::nearest(static_cast<double>(albedo)));
+        return channel_range(tree_.colours()[wedge], Unorm16::nearest(static_cast<double>(albedo)));
     }
 
     bool is_small(NodeId node) const { return tree_.leaf_end()[node] - tree_.first_leaf()[node] <= looked_at_each; }
@@ -109,10 +109,10 @@ private:
         return seen;
     }
 
-    void see(NodeId node, Seen& seen) const {
-        seen.lo = std::min(seen.lo, albedo_[node].lo);
-        seen.hi = std::max(seen.hi, albedo_[node].hi);
-        const glm::vec3 normal = normals_[node], apart = normal - seen.axis;
+    void see(WedgeId wedge, Seen& seen) const {
+        seen.lo = std::min(seen.lo, albedo_[wedge].lo);
+        seen.hi = std::max(seen.hi, albedo_[wedge].hi);
+        const glm::vec3 normal = normals_[wedge], apart = normal - seen.axis;
         if (normal == glm::vec3(0)) seen.everywhere = true;
         seen.squared_chord = std::max(seen.squared_chord, glm::dot(apart, apart));
         for (int k = 0; k < 2; ++k) {
@@ -122,8 +122,13 @@ private:
         }
     }
     void see_leaf(Index leaf, Seen& seen) const {
-        see(interior_ + leaf, seen);
-        for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) see(interior_ + neighbours_[i], seen);
+        const WedgeId first = tree_.wedge_of_leaf(0);
+        see(first + leaf, seen);
+        for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) see(first + neighbours_[i], seen);
+    }
+
+    void see_all(WedgeId begin, WedgeId end, Seen& seen) const {
+        for (WedgeId w = begin; w < end; ++w) see(w, seen);
     }
 
     void end(NodeId node, const Seen& seen) {
@@ -147,15 +152,19 @@ private:
     void measure_each(NodeId node) {
         Seen seen = begin(node);
         for (Index leaf = tree_.first_leaf()[node]; leaf < tree_.leaf_end()[node]; ++leaf) see_leaf(leaf, seen);
-        for (NodeId below = node; below < tree_.subtree_end()[node]; ++below) see(below, seen);
+        see_all(tree_.first_wedge(node), tree_.first_wedge(tree_.subtree_end()[node]), seen);
         end(node, seen);
     }
 
     void measure_children(NodeId node) {
         Seen seen = begin(node);
-        see(node, seen);
+        see_all(tree_.first_wedge(node), tree_.wedge_end(node), seen);
         tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) return see_leaf(child - interior_, seen);
+            if (tree_.is_place(child)) {
+                for (WedgeId w = tree_.first_wedge(child); w < tree_.wedge_end(child); ++w)
+                    see_leaf(w - tree_.wedge_of_leaf(0), seen);
+                return;
+            }
             const VertexCone& cone = cones_[child];
             seen.lo = std::min(seen.lo, cone.albedo.lo);
             seen.hi = std::max(seen.hi, cone.albedo.hi);
@@ -169,8 +178,8 @@ private:
     NodeId interior_;
     std::vector<VertexCone> cones_;
     std::vector<float> angles_;             // by interior node
-    std::vector<glm::vec3> normals_;        // by node
-    std::vector<LuminanceRange> albedo_;    // by node
+    std::vector<glm::vec3> normals_;        // by wedge
+    std::vector<LuminanceRange> albedo_;    // by wedge
     std::vector<Index> start_, neighbours_; // by leaf: those that it shares triangles with, some more than once
     std::vector<glm::dvec3> sums_;          // by leaf: of the normals of those before it
     std::vector<Seen> further_;             // by interior node, where there are further vertices: what they have

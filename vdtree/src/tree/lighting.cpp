@@ -60,8 +60,8 @@ double nearest_vertex_distance(const VertexTree& tree, glm::dvec3 point) {
         const Sphere& support = tree.support_spheres()[node];
         if (glm::length(point - glm::dvec3(support.centre)) - static_cast<double>(support.radius) >= nearest) continue;
         tree.for_each_child(node, [&](NodeId child) {
-            if (tree.is_leaf(child))
-                nearest = std::min(nearest, glm::length(point - glm::dvec3(tree.positions()[child])));
+            if (tree.is_place(child))
+                nearest = std::min(nearest, glm::length(point - glm::dvec3(tree.position(child))));
             else waiting.push_back(child);
         });
     }
@@ -80,7 +80,7 @@ bool crosses_oddly(const VertexTree& tree, glm::dvec3 origin, glm::dvec3 directi
     const auto& links = unchecked_links(tree);
     bool odd = false;
     std::vector<NodeId> waiting = {VertexTree::root()};
-    const auto at = [&](Index leaf) { return glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - origin; };
+    const auto at = [&](Index leaf) { return glm::dvec3(tree.positions()[tree.wedge_of_leaf(leaf)]) - origin; };
     while (!waiting.empty()) {
         const NodeId node = waiting.back();
         waiting.pop_back();
@@ -96,7 +96,7 @@ bool crosses_oddly(const VertexTree& tree, glm::dvec3 origin, glm::dvec3 directi
             if (along > 0) odd = !odd;
         }
         tree.for_each_child(node, [&](NodeId child) {
-            if (!tree.is_leaf(child)) waiting.push_back(child);
+            if (!tree.is_place(child)) waiting.push_back(child);
         });
     }
     return odd;
@@ -183,8 +183,8 @@ double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 n
     return std::min(sum, 1.0);
 }
 
-float albedo_of(const VertexTree& tree, NodeId node) {
-    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[node], {}, true,
+float albedo_of(const VertexTree& tree, WedgeId wedge) {
+    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[wedge], {}, true,
                             !tree.texture().empty());
 }
 

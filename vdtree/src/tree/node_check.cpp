@@ -3,6 +3,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/tree_shape.h>
 
 #include "tree/mask_pool.h"
 
@@ -21,23 +22,31 @@ bool has_finite_floats(const T& value) {
 }
 
 constexpr const char* links_fault = "contradicts its neighbours in the tree.";
+constexpr const char* wedges_fault = "has wedges that are not its own.";
 constexpr const char* triangles_fault = "has triangles of another node.";
 constexpr const char* corner_fault = "has a triangle with a corner out of range or twice.";
 constexpr const char* vanishing_fault = "has a triangle that does not vanish there.";
 
+// That a node has a wedge, and its wedges lie within the arrays.
+const char* fault_in_wedges(const TreeGeometry& g, const TreeLinks& tree, NodeId node) {
+    const WedgeId first = tree.first_wedge_of(node), end = tree.first_wedge_of(node + 1);
+    return first < end && end <= g.positions.size() ? nullptr : wedges_fault;
+}
+
 // Calls f for every child; null or what is wrong.
 template <class F>
 const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const Index leaves = static_cast<Index>(g.parents.size() - interior);
-    const Index end = g.leaf_end[node];
+    const TreeLinks tree = links_of(g);
+    const NodeId interior = tree.interior();
+    const Index leaves = tree.leaves(), end = g.leaf_end[node];
     const NodeId skip = g.subtree_end[node];
     if (!(g.first_leaf[node] < end && end <= leaves && node < skip && skip <= interior)) return links_fault;
     NodeId child = node + 1;
     for (Index leaf = g.first_leaf[node]; leaf < end;) {
         const bool inner = child < skip && g.first_leaf[child] == leaf;
-        const NodeId id = inner ? child : interior + leaf;
-        if (g.parents[id] != node) return links_fault;
+        const NodeId id = inner ? child : tree.place_of_leaf(leaf);
+        if (id >= g.parents.size() || g.parents[id] != node) return links_fault;
+        if (const char* fault = fault_in_wedges(g, tree, id)) return fault;
         if (inner) {
             if (!(leaf < g.leaf_end[child] && g.leaf_end[child] <= end && child < g.subtree_end[child] &&
                   g.subtree_end[child] <= skip))
@@ -45,7 +54,11 @@ const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
             leaf = g.leaf_end[child];
             child = g.subtree_end[child];
         } else {
-            ++leaf;
+            const Index leaf_end = leaf + tree.first_wedge_of(id + 1) - tree.first_wedge_of(id);
+            if (id < interior || tree.first_wedge_of(id) != tree.wedge_of_leaf(leaf) || leaf_end > end)
+                return wedges_fault;
+            for (; leaf < leaf_end; ++leaf)
+                if (tree.place_of_leaf(leaf) != id) return wedges_fault;
         }
         if (const char* fault = f(id)) return fault;
     }
@@ -74,22 +87,26 @@ bool vanishes(Triangle t, Index begin, Index end, std::span<const Index> child_s
 
 const char* fault_in_root(const TreeGeometry& g) noexcept {
     const std::size_t interior = g.first_leaf.size();
-    if (g.parents[0] != no_node || g.first_leaf[0] != 0 || g.leaf_end[0] != g.parents.size() - interior ||
+    const TreeLinks tree = links_of(g);
+    if (g.parents[0] != no_node || g.first_leaf[0] != 0 || g.leaf_end[0] != tree.leaves() ||
         g.subtree_end[0] != interior)
         return links_fault;
+    if (fault_in_wedges(g, tree, 0) || tree.first_wedge_of(0) != 0) return wedges_fault;
     return g.first_triangle[0] == 0 && g.first_triangle[interior] == g.triangles.size() ? nullptr : triangles_fault;
 }
 
 const char* fault_in_links(const TreeGeometry& g, NodeId node) {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const std::size_t leaves = g.parents.size() - interior;
+    const TreeLinks tree = links_of(g);
+    const NodeId interior = tree.interior();
+    const std::size_t leaves = tree.leaves();
     // In depth-first order, the triangles of the node come before those of its children's subtrees.
     Index before = g.first_triangle[node + 1];
     if (g.first_triangle[node] > before || before > g.triangles.size()) return triangles_fault;
     thread_local std::vector<Index> child_starts; // kept: most nodes have two children
     child_starts.clear();
     const char* fault = walk_children(g, node, [&](NodeId child) -> const char* {
-        child_starts.push_back(child < interior ? g.first_leaf[child] : child - interior);
+        child_starts.push_back(child < interior ? g.first_leaf[child]
+                                                : tree.first_wedge_of(child) - tree.wedge_of_leaf(0));
         if (child >= interior) return nullptr;
         const Index end = g.first_triangle[g.subtree_end[child]];
         if (g.first_triangle[child] != before || end < before || end > g.triangles.size()) return triangles_fault;
@@ -107,9 +124,11 @@ const char* fault_in_links(const TreeGeometry& g, NodeId node) {
 }
 
 const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept {
-    if (!has_finite_floats(g.positions[node]) || (!g.colours.empty() && !has_finite_floats(g.colours[node])) ||
-        (!g.uvs.empty() && !has_finite_floats(g.uvs[node])))
-        return "has a value that is not finite.";
+    const TreeLinks tree = links_of(g);
+    for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w)
+        if (!has_finite_floats(g.positions[w]) || (!g.colours.empty() && !has_finite_floats(g.colours[w])) ||
+            (!g.uvs.empty() && !has_finite_floats(g.uvs[w])))
+            return "has a value that is not finite.";
     if (node >= g.bounds.size()) return nullptr;
     for (const Sphere& sphere : {g.bounds[node].ring, g.support_spheres[node]})
         if (!has_finite_floats(sphere) || sphere.radius < 0) return "has a bounding sphere that is none.";
@@ -141,8 +160,12 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
         return "A range of the texture's luminance ends before it begins.";
     if (std::ranges::any_of(g.displacement, [](float moved) { return moved < 0; }))
         return "A displacement is negative.";
+    // Everybody looks for leaves by these.
+    const std::size_t leaves = g.leaf_places.size();
+    if (std::ranges::any_of(g.wedge_ranks, [&](Index rank) { return rank >= leaves; }))
+        return "A wedge's rank is out of range.";
     // Users index their own arrays with these.
-    if (std::ranges::any_of(g.source_vertices, [&](Index v) { return v >= g.source_vertices.size(); }))
+    if (std::ranges::any_of(g.source_vertices, [&](Index v) { return v >= g.source_vertex_count; }))
         return "A source vertex is out of range.";
     if (std::ranges::any_of(g.source_triangles, [&](Index t) { return t >= g.triangles.size() + g.dropped_triangles; }))
         return "A source triangle is out of range.";

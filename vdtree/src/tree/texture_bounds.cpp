@@ -30,52 +30,48 @@ PackedRange channel_range(const glm::vec4& colour, Unorm16 luminance) {
 
 std::vector<UvBox> bound_footprints(const TreeGeometry& g, const TreeParts& parts) {
     const TreeLinks tree = links_of(g);
-    const NodeId interior = tree.interior();
-    std::vector<UvBox> around(tree.leaves()), boxes(interior);
-    for (Index leaf = 0; leaf < tree.leaves(); ++leaf) around[leaf].include(g.uvs[interior + leaf]);
+    const WedgeId first = tree.wedge_of_leaf(0);
+    std::vector<UvBox> around(tree.leaves()), boxes(first);
+    for (Index leaf = 0; leaf < tree.leaves(); ++leaf) around[leaf].include(g.uvs[first + leaf]);
     parts.for_each_triangle([&](const TreePart& part) {
         return [&](Index triangle) {
             const Triangle& t = g.triangles[triangle];
             UvBox box;
-            for (const Index leaf : t) box.include(g.uvs[interior + leaf]);
+            for (const Index leaf : t) box.include(g.uvs[first + leaf]);
             for (const Index leaf : t)
                 if (parts.owns_leaf(part, leaf)) around[leaf].include(box);
         };
     });
     parts.bottom_up([&] {
         return [&](NodeId node) {
-            UvBox box;
-            box.include(g.uvs[node]);
+            for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w)
+                boxes[w].include(g.uvs[w]);
             tree.for_each_child(
-                node, [&](NodeId child) { box.include(boxes[child]); }, [&](Index leaf) { box.include(around[leaf]); });
-            boxes[node] = box;
+                node,
+                [&](NodeId child) {
+                    for (WedgeId w = tree.first_wedge_of(child); w < tree.first_wedge_of(child + 1); ++w)
+                        boxes[tree.wedge_above(node, w)].include(boxes[w]);
+                },
+                [&](Index leaf) { boxes[tree.wedge_above(node, first + leaf)].include(around[leaf]); });
         };
     });
     return boxes;
 }
 
 std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreeParts& parts) {
+    const TreeLinks tree = links_of(g);
     const std::vector<UvBox> boxes = bound_footprints(g, parts);
     const TexturePyramid pyramid(g.texture_view());
-    std::vector<PackedRange> ranges(boxes.size());
-    parallel_loop(std::size_t{0}, boxes.size(), [&](std::size_t node) { ranges[node] = pyramid.range(boxes[node]); });
-    return ranges;
-}
-
-std::vector<std::uint8_t> find_texture_moves(const TreeGeometry& g, const TreeParts& parts) {
-    const TreeLinks tree = links_of(g);
-    std::vector<std::uint8_t> moves(tree.interior(), 0);
-    parts.bottom_up([&] {
-        return [&](NodeId node) {
-            const glm::vec2 here = g.uvs[node];
-            bool differs = false;
-            tree.for_each_child(
-                node, [&](NodeId child) { differs = differs || moves[child] || g.uvs[child] != here; },
-                [&](Index leaf) { differs = differs || g.uvs[tree.node_of_leaf(leaf)] != here; });
-            moves[node] = differs;
-        };
+    std::vector<PackedRange> ranges(tree.interior(), empty_range);
+    parallel_loop(std::size_t{0}, ranges.size(), [&](std::size_t i) {
+        const NodeId node = static_cast<NodeId>(i);
+        for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w)
+            ranges[node] = unite(ranges[node], pyramid.range(boxes[w]));
     });
-    return moves;
+    // Pyramids may find a little less for a larger box: what grows up the tree is made to.
+    for (NodeId node = tree.interior(); node-- > 1;)
+        ranges[tree.parents[node]] = unite(ranges[tree.parents[node]], ranges[node]);
+    return ranges;
 }
 
 } // namespace unseen::vdtree

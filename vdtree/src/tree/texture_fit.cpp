@@ -5,8 +5,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/texture_bounds.h>
-
 namespace unseen::vdtree {
 
 namespace {
@@ -37,11 +35,11 @@ constexpr double least_determinant = 1e-12;
 
 TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g) {
     const TreeLinks tree = links_of(g);
-    const NodeId interior = tree.interior();
-    std::vector<Moments> around(tree.leaves()), sums(interior);
+    const WedgeId first = tree.wedge_of_leaf(0);
+    std::vector<Moments> around(tree.leaves()), sums(first);
     // Around each leaf's own coordinates, lest small rings far from 0 lose their digits: moved to the parent's where
     // they are summed.
-    const auto add = [&](Moments& to, const glm::vec2& uv0, const glm::vec3& p0, NodeId vertex) {
+    const auto add = [&](Moments& to, const glm::vec2& uv0, const glm::vec3& p0, WedgeId vertex) {
         to.add(glm::dvec2(g.uvs[vertex]) - glm::dvec2(uv0), glm::dvec3(g.positions[vertex]) - glm::dvec3(p0));
     };
     const auto moved = [](const Moments& m, glm::dvec2 by, glm::dvec3 off) { // coordinates and positions grow by these
@@ -61,56 +59,45 @@ TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g)
             for (const Index leaf : t)
                 if (parts.owns_leaf(part, leaf))
                     for (const Index corner : t)
-                        add(around[leaf], g.uvs[interior + leaf], g.positions[interior + leaf], interior + corner);
+                        add(around[leaf], g.uvs[first + leaf], g.positions[first + leaf], first + corner);
         };
     });
-    maps_.resize(interior);
+    maps_.resize(first);
+    moves_.assign(tree.interior(), 0);
+    const auto fit = [&](WedgeId wedge, const Moments& sum) {
+        const glm::dvec2 uv0(g.uvs[wedge]);
+        const glm::dvec3 p0(g.positions[wedge]);
+        const double n = sum.count, uu = sum.uu - sum.u * sum.u / n, uv = sum.uv - sum.u * sum.v / n,
+                     vv = sum.vv - sum.v * sum.v / n;
+        const double determinant = uu * vv - uv * uv;
+        const glm::dvec3 pu = sum.pu - sum.p * (sum.u / n), pv = sum.pv - sum.p * (sum.v / n);
+        Map map{sum.p / n, glm::dvec3(0), glm::dvec3(0)};
+        if (determinant > least_determinant * uu * vv) {
+            map.along_u = (pu * vv - pv * uv) / determinant;
+            map.along_v = (pv * uu - pu * uv) / determinant;
+        }
+        map.at = p0 + map.at - (sum.u / n + uv0.x) * map.along_u - (sum.v / n + uv0.y) * map.along_v;
+        maps_[wedge] = map;
+    };
     parts.bottom_up([&] {
         return [&](NodeId node) {
-            const glm::dvec2 uv0(g.uvs[node]);
-            const glm::dvec3 p0(g.positions[node]);
-            Moments sum;
-            const auto take = [&](const Moments& m, NodeId vertex) {
-                sum += moved(m, glm::dvec2(g.uvs[vertex]) - uv0, glm::dvec3(g.positions[vertex]) - p0);
+            const auto take = [&](const Moments& m, WedgeId vertex) {
+                const WedgeId to = tree.wedge_above(node, vertex);
+                sums[to] += moved(m, glm::dvec2(g.uvs[vertex]) - glm::dvec2(g.uvs[to]),
+                                  glm::dvec3(g.positions[vertex]) - glm::dvec3(g.positions[to]));
+                moves_[node] |= g.uvs[vertex] != g.uvs[to];
             };
             tree.for_each_child(
-                node, [&](NodeId child) { take(sums[child], child); },
-                [&](Index leaf) { take(around[leaf], interior + leaf); });
-            sums[node] = sum;
-
-            const double n = sum.count, uu = sum.uu - sum.u * sum.u / n, uv = sum.uv - sum.u * sum.v / n,
-                         vv = sum.vv - sum.v * sum.v / n;
-            const double determinant = uu * vv - uv * uv;
-            const glm::dvec3 pu = sum.pu - sum.p * (sum.u / n), pv = sum.pv - sum.p * (sum.v / n);
-            Map map{sum.p / n, glm::dvec3(0), glm::dvec3(0)};
-            if (determinant > least_determinant * uu * vv) {
-                map.along_u = (pu * vv - pv * uv) / determinant;
-                map.along_v = (pv * uu - pu * uv) / determinant;
-            }
-            map.at = p0 + map.at - (sum.u / n + uv0.x) * map.along_u - (sum.v / n + uv0.y) * map.along_v;
-            maps_[node] = map;
+                node,
+                [&](NodeId child) {
+                    moves_[node] |= moves_[child];
+                    for (WedgeId w = tree.first_wedge_of(child); w < tree.first_wedge_of(child + 1); ++w)
+                        take(sums[w], w);
+                },
+                [&](Index leaf) { take(around[leaf], first + leaf); });
+            for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w) fit(w, sums[w]);
         };
     });
-    moves_ = find_texture_moves(g, parts);
-}
-
-std::vector<glm::vec2> TextureFits::fitted_uvs(const std::vector<UvBox>& footprints) const {
-    std::vector<glm::vec2> uvs(g_->uvs.begin(), g_->uvs.end());
-    parallel_loop(std::size_t{0}, maps_.size(), [&](std::size_t node) {
-        const Map& map = maps_[node];
-        if (!moves_[node]) return;
-        const double uu = glm::dot(map.along_u, map.along_u), uv = glm::dot(map.along_u, map.along_v),
-                     vv = glm::dot(map.along_v, map.along_v);
-        const double determinant = uu * vv - uv * uv;
-        if (!(determinant > least_determinant * uu * vv)) return;
-        const glm::dvec3 off = glm::dvec3(g_->positions[node]) - map.at;
-        const double u = glm::dot(off, map.along_u), v = glm::dot(off, map.along_v);
-        const glm::vec2 fitted((u * vv - v * uv) / determinant, (v * uu - u * uv) / determinant);
-        for (int k = 0; k < 2; ++k) // NaN leaves what there is
-            if (fitted[k] >= -std::numeric_limits<float>::max())
-                uvs[node][k] = std::clamp(fitted[k], footprints[node].lo[k], footprints[node].hi[k]);
-    });
-    return uvs;
 }
 
 double TextureFits::residual_of_subtree(NodeId node) const {
@@ -120,12 +107,13 @@ double TextureFits::residual_of_subtree(NodeId node) const {
     NodeId ancestors = 0;
     for (NodeId above = g_->parents[node]; above != no_node; above = g_->parents[above])
         if (++ancestors > most_ancestors) return std::numeric_limits<double>::infinity();
-    const NodeId interior = static_cast<NodeId>(g_->first_leaf.size());
+    const TreeLinks tree = links_of(*g_);
     double largest = 0;
-    for (NodeId below = node; below < g_->subtree_end[node]; ++below)
-        largest = std::max(largest, residual(node, below));
-    for (Index leaf = g_->first_leaf[node]; leaf < g_->leaf_end[node]; ++leaf)
-        largest = std::max(largest, residual(node, interior + leaf));
+    const auto look_at = [&](WedgeId begin, WedgeId end) {
+        for (WedgeId w = begin; w < end; ++w) largest = std::max(largest, residual(tree.wedge_above(node, w), w));
+    };
+    look_at(tree.first_wedge_of(node), tree.first_wedge_of(g_->subtree_end[node]));
+    look_at(tree.wedge_of_leaf(g_->first_leaf[node]), tree.wedge_of_leaf(g_->leaf_end[node]));
     return largest;
 }
 

@@ -41,6 +41,7 @@ public:
                                                                 "."};
         for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
             check_rings(g_.triangles[t]);
+            check_wedges(g_.triangles[t]);
             if (!fault_.empty())
                 return Error{ErrorCode::malformed_data, "Triangle " + std::to_string(t) + ": " + fault_};
         }
@@ -54,33 +55,50 @@ private:
 
     // What the node promises of its own proxy and of the leaves that are its children.
     void check_vertices(NodeId node) {
-        const glm::vec3 proxy = g_.positions[node];
+        const glm::vec3 proxy = tree_.position(node);
         expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
-        const Unorm16 y = l_.luminance[node];
-        expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
-        if (pyramid_) {
-            const PackedRange texture = texture_of({node});
-            expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
-            expect(g_.support_spheres[node].radius == 0 ||
-                       contains(l_.ring_range[node], product(shade_of({node}), texture)),
-                   "the ring's luminance does not contain what its proxy shows.");
-        }
+        for (WedgeId w = tree_.first_wedge(node); w < tree_.wedge_end(node); ++w) check_wedge(node, w);
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
         for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
-            const glm::vec3 p = g_.positions[tree_.interior_count() + leaf];
+            const glm::vec3 p = g_.positions[tree_.wedge_of_leaf(leaf)];
             expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
                    "a leaf moves farther than the displacement.");
         }
     }
 
+    void check_wedge(NodeId node, WedgeId w) {
+        expect(g_.positions[w] == tree_.position(node), "its wedges are at different places.");
+        const Unorm16 y = l_.luminance[w];
+        expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
+        if (tree_.has_seams() && w > tree_.first_wedge(node))
+            expect(g_.wedge_ranks[w - 1] < g_.wedge_ranks[w], "its wedges are not in the order of their ranks.");
+        if (!pyramid_) return;
+        const PackedRange texture = texture_of({w});
+        expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
+        expect(contains(l_.ring_range[node], product(shade_of({w}), texture)),
+               "the ring's luminance does not contain what its proxy shows.");
+    }
+
+    // That corners of a triangle which meet in a node are of one wedge from there up.
+    void check_wedges(const Triangle& t) {
+        for (std::size_t k = 0; k < 3 && tree_.has_seams(); ++k) {
+            const Index a = t[k], b = t[(k + 1) % 3];
+            for (NodeId node = g_.parents[tree_.place_of_leaf(a)]; node != no_node; node = g_.parents[node])
+                if (g_.first_leaf[node] <= b && b < g_.leaf_end[node])
+                    expect(tree_.wedge_at(node, a) == tree_.wedge_at(node, b),
+                           "two of its corners meet in a node and are not of one wedge.");
+        }
+    }
+
     void check_children(NodeId node) {
         tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) {
-                expect(contains(g_.support_spheres[node], g_.positions[child], 0),
+            if (tree_.is_place(child)) {
+                expect(contains(g_.support_spheres[node], tree_.position(child), 0),
                        "the support's sphere does not contain a leaf.");
-                expect(contains(l_.support_range[node], {l_.luminance[child], l_.luminance[child]}),
-                       "the support's luminance does not contain a leaf's.");
+                for (WedgeId w = tree_.first_wedge(child); w < tree_.wedge_end(child); ++w)
+                    expect(contains(l_.support_range[node], {l_.luminance[w], l_.luminance[w]}),
+                           "the support's luminance does not contain a leaf's.");
                 return;
             }
             const Sphere &s = g_.support_spheres[child], &r = g_.bounds[child].ring;
@@ -101,20 +119,18 @@ private:
 
     // That the lowest node which moves a corner knows the whole triangle; nesting carries it to the nodes above.
     void check_rings(const Triangle& t) {
-        const NodeId interior = tree_.interior_count();
-        const glm::dvec3 a = g_.positions[interior + t[0]], b = g_.positions[interior + t[1]],
-                         c = g_.positions[interior + t[2]];
+        const WedgeId first = tree_.wedge_of_leaf(0);
+        const glm::dvec3 a = g_.positions[first + t[0]], b = g_.positions[first + t[1]], c = g_.positions[first + t[2]];
         const glm::dvec3 normal = glm::cross(b - a, c - a);
         const int cell = normal_cell(normal);
-        const PackedRange texture =
-            pyramid_ ? texture_of({interior + t[0], interior + t[1], interior + t[2]}) : PackedRange{};
+        const PackedRange texture = pyramid_ ? texture_of({first + t[0], first + t[1], first + t[2]}) : PackedRange{};
         const PackedRange shown =
-            pyramid_ ? product(shade_of({interior + t[0], interior + t[1], interior + t[2]}), texture) : PackedRange{};
+            pyramid_ ? product(shade_of({first + t[0], first + t[1], first + t[2]}), texture) : PackedRange{};
         const bool shows_through = !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) {
-            return !(g_.colours[interior + leaf].a >= 1);
+            return !(g_.colours[first + leaf].a >= 1);
         });
         for (const Index leaf : t) {
-            NodeId node = g_.parents[interior + leaf];
+            NodeId node = g_.parents[tree_.place_of_leaf(leaf)];
             while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
             if (node == no_node) continue; // everything is at one point
             expect(!shows_through || (g_.bounds[node].flags & translucent_ring),
@@ -126,8 +142,8 @@ private:
             expect(!pyramid_ || contains(l_.ring_range[node], shown),
                    "what a triangle shows is outside of the luminance of the ring of a corner's parent.");
             for (const Index corner : t) {
-                const Unorm16 y = l_.luminance[interior + corner];
-                expect(contains(g_.bounds[node].ring, g_.positions[interior + corner], 0),
+                const Unorm16 y = l_.luminance[first + corner];
+                expect(contains(g_.bounds[node].ring, g_.positions[first + corner], 0),
                        "a corner is outside of the ring sphere of another corner's parent.");
                 expect(pyramid_ || contains(l_.ring_range[node], {y, y}),
                        "a corner's luminance is outside of the ring's of another corner's parent.");
@@ -136,16 +152,16 @@ private:
     }
 
     // Luminance ranges of the texture over the box of these vertices, and of the vertices themselves.
-    PackedRange texture_of(std::initializer_list<NodeId> nodes) const {
+    PackedRange texture_of(std::initializer_list<WedgeId> wedges) const {
         UvBox box;
-        for (const NodeId node : nodes) box.include(g_.uvs[node]);
+        for (const WedgeId w : wedges) box.include(g_.uvs[w]);
         return pyramid_->range(box);
     }
-    PackedRange shade_of(std::initializer_list<NodeId> nodes) const {
+    PackedRange shade_of(std::initializer_list<WedgeId> wedges) const {
         PackedRange range = empty_range;
-        for (const NodeId node : nodes) {
-            const Unorm16 y = l_.luminance[node];
-            range = unite(range, g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y));
+        for (const WedgeId w : wedges) {
+            const Unorm16 y = l_.luminance[w];
+            range = unite(range, g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[w], y));
         }
         return range;
     }
@@ -158,7 +174,7 @@ private:
         };
         NodeId deepest = no_node;
         for (const Index leaf : t) {
-            NodeId node = g_.parents[tree_.interior_count() + leaf];
+            NodeId node = g_.parents[tree_.place_of_leaf(leaf)];
             while (inside(node) < 2) node = g_.parents[node];
             if (deepest == no_node || node > deepest) deepest = node;
         }

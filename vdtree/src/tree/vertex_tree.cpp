@@ -4,6 +4,7 @@
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/leaf_runs.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
 
 #include "tree/mask_pool.h"
@@ -18,29 +19,23 @@ PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y})
 // Rounded up: eyes adapted to more light see no less.
 Unorm16 middle(PackedRange r) { return {static_cast<std::uint16_t>((r.lo.value + r.hi.value + 1) / 2)}; }
 
-// The range of the same length as `spread` that begins where `ring` does, within `ring`.
-PackedRange shortened(PackedRange ring, PackedRange spread) {
-    const int hi = ring.lo.value + (spread.hi.value - spread.lo.value);
-    return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
-}
-
-// By leaf: the luminance of the triangles around it (of itself without any), and a third of their area, in double against
-// overflow at extreme scales. And the luminance of all corners.
+// By leaf: the luminance of the triangles around it, and a third of their area, in double against overflow at extreme
+// scales. And the luminance of all corners.
 struct LeafSurroundings {
     std::vector<PackedRange> ring;
     std::vector<double> areas;
     PackedRange corners = empty_range;
 };
 
-// By node: what the texture is multiplied with, over the three channels of colour; for others, the luminance alone.
+// By wedge: what the texture is multiplied with, over the three channels of colour; for others, the luminance alone.
 class Shades {
 public:
     Shades(const TreeGeometry& g, std::span<const Unorm16> luminance, bool textured)
         : luminance_(luminance), colours_(textured && !g.colours.empty() ? g.colours.data() : nullptr) {}
 
-    PackedRange operator[](NodeId node) const {
-        return colours_ ? channel_range(colours_[node], luminance_[node])
-                        : PackedRange{luminance_[node], luminance_[node]};
+    PackedRange operator[](WedgeId wedge) const {
+        return colours_ ? channel_range(colours_[wedge], luminance_[wedge])
+                        : PackedRange{luminance_[wedge], luminance_[wedge]};
     }
 
 private:
@@ -48,19 +43,20 @@ private:
     const glm::vec4* colours_; // null where they do not matter
 };
 
-LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, const Shades& shades) {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeLinks& tree, const TreeParts& parts,
+                               const Shades& shades) {
+    const WedgeId first = tree.wedge_of_leaf(0);
     LeafSurroundings out;
-    out.ring.assign(g.leaf_end[0], empty_range);
-    out.areas.assign(g.leaf_end[0], 0.0);
+    out.ring.assign(tree.leaves(), empty_range);
+    out.areas.assign(tree.leaves(), 0.0);
     parts.for_each_triangle([&](const TreePart& part) {
         return [&](Index triangle) {
             const Triangle& t = g.triangles[triangle];
-            const glm::dvec3 a = g.positions[interior + t[0]], b = g.positions[interior + t[1]],
-                             c = g.positions[interior + t[2]];
+            const glm::dvec3 a = g.positions[first + t[0]], b = g.positions[first + t[1]],
+                             c = g.positions[first + t[2]];
             const double area = glm::length(glm::cross(b - a, c - a)) / 6;
             PackedRange range = empty_range;
-            for (const Index leaf : t) range = unite(range, shades[interior + leaf]);
+            for (const Index leaf : t) range = unite(range, shades[first + leaf]);
             for (const Index leaf : t) {
                 if (!parts.owns_leaf(part, leaf)) continue;
                 out.areas[leaf] += area;
@@ -68,29 +64,29 @@ LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, co
             }
         };
     });
-    for (Index leaf = 0; leaf < out.ring.size(); ++leaf) {
-        if (out.ring[leaf] == empty_range) out.ring[leaf] = shades[interior + leaf];
-        else out.corners = unite(out.corners, shades[interior + leaf]);
-    }
+    for (Index leaf = 0; leaf < out.ring.size(); ++leaf) out.corners = unite(out.corners, shades[first + leaf]);
     return out;
 }
 
-// Area-weighted means over ranges of leaves.
+// Area-weighted means over runs of leaves.
 class RunningSums {
 public:
-    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance) : before_(areas.size() + 1) {
+    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance, const LeafRuns& runs)
+        : runs_(runs), before_(areas.size() + 1) {
         double largest = 0;
         for (const double a : areas) largest = std::max(largest, a);
         const double scale = largest > 0 ? 1 / largest : 0;
-        for (std::size_t leaf = 0; leaf < areas.size(); ++leaf) {
+        for (Index rank = 0; rank < areas.size(); ++rank) {
+            const Index leaf = runs.leaf(rank);
             const double area = areas[leaf] * scale, y = luminance[leaf].value;
-            const Sums& sums = before_[leaf];
-            before_[leaf + 1] = {sums.area + area, sums.weighted + area * y, sums.plain + y};
+            const Sums& sums = before_[rank];
+            before_[rank + 1] = {sums.area + area, sums.weighted + area * y, sums.plain + y};
         }
     }
 
     // In units of Unorm16.
-    double mean(Index begin, Index end) const {
+    double mean(WedgeId wedge) const {
+        const Index begin = runs_.begin(wedge), end = runs_.end(wedge);
         // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
         constexpr double least_mean_area = 1e-9;
         const Sums &first = before_[begin], &last = before_[end];
@@ -103,37 +99,26 @@ private:
     struct Sums {
         double area = 0, weighted = 0, plain = 0;
     };
-    std::vector<Sums> before_; // by leaf: over those before it
+    const LeafRuns& runs_;
+    std::vector<Sums> before_; // by leaf, in the order of the runs: over those before it
 };
 
-void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool textured, std::span<Unorm16> luminance) {
-    constexpr NodeId grain = 4096; // leaves
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size()), nodes = static_cast<NodeId>(luminance.size());
-    parallel_loop_over(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
-        for (NodeId node = range.begin(); node < range.end(); ++node)
-            luminance[node] = Unorm16::nearest(vertex_luminance(
-                g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
+void light_leaves(const TreeGeometry& g, WedgeId first, const Light& light, bool prelit, bool textured,
+                  std::span<Unorm16> luminance) {
+    constexpr WedgeId grain = 4096; // leaves
+    const WedgeId end = static_cast<WedgeId>(luminance.size());
+    parallel_loop_over(tbb::blocked_range<WedgeId>(first, end, grain), [&](const auto& range) {
+        for (WedgeId leaf = range.begin(); leaf < range.end(); ++leaf)
+            luminance[leaf] = Unorm16::nearest(vertex_luminance(
+                g.normals[leaf], g.colours.empty() ? nullptr : &g.colours[leaf], light, prelit, textured));
     });
 }
 
-void shade_by(const FunctionRef<float(NodeId)>& given, std::span<Unorm16> luminance) {
-    parallel_loop(NodeId{0}, static_cast<NodeId>(luminance.size()), [&](NodeId node) {
-        luminance[node] = Unorm16::nearest(std::min(1.0f, std::max(0.0f, given(node)))); // NaN: 0
+void shade_by(const FunctionRef<float(WedgeId)>& given, std::span<Unorm16> luminance) {
+    parallel_loop(WedgeId{0}, static_cast<WedgeId>(luminance.size()), [&](WedgeId wedge) {
+        luminance[wedge] = Unorm16::nearest(std::min(1.0f, std::max(0.0f, given(wedge)))); // NaN: 0
     });
 }
-
-// What a node and all below it are multiplied with, or show.
-PackedRange range_below(const TreeGeometry& g, const Shades& shades, NodeId node) {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    PackedRange range = empty_range;
-    for (NodeId below = node; below < g.subtree_end[node]; ++below) range = unite(range, shades[below]);
-    for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++leaf)
-        range = unite(range, shades[interior + leaf]);
-    return range;
-}
-
-// Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
-bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_spheres[node].radius == 0; }
 
 } // namespace
 
@@ -155,64 +140,37 @@ struct InteriorShader {
     const Shades& shades;
     const LeafSurroundings& leaf;
     const RunningSums& sums;
-    std::span<const std::uint8_t> moves_texture; // by node; empty without a texture
-    bool has_given;                              // luminances of proxies are the caller's
+    bool has_given; // luminances of proxies are the caller's
     LuminanceArrays<Vector>& out;
     std::vector<PackedRange>& of_vertices; // the rings' ranges without the texture; empty without one
 
-    struct Ranges {
-        PackedRange support = empty_range, ring = empty_range;
-        // Rings of coincident children, which may be several nodes deep, as they are stored: shortened.
-        PackedRange shortened_rings = empty_range, shortened_vertices = empty_range;
-        Unorm16 adaptation;
-    };
-
-    Ranges collect(NodeId node) const {
+    void operator()(NodeId node) const {
         const bool textured = !of_vertices.empty();
-        Ranges all;
+        PackedRange support = empty_range, ring = empty_range;
+        Unorm16 adaptation;
         tree.for_each_child(
             node,
             [&](NodeId child) {
-                all.support = unite(all.support, out.support_range[child]);
-                all.ring = unite(all.ring, textured ? of_vertices[child] : out.ring_range[child]);
-                if (is_coincident(g, child)) { // its ring_range is narrower than its ring
-                    for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l)
-                        all.ring = unite(all.ring, leaf.ring[l]);
-                    all.shortened_rings = unite(all.shortened_rings, out.ring_range[child]);
-                    if (textured) all.shortened_vertices = unite(all.shortened_vertices, of_vertices[child]);
-                }
-                all.adaptation = std::max(all.adaptation, out.adaptation[child]);
+                support = unite(support, out.support_range[child]);
+                ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
+                adaptation = std::max(adaptation, out.adaptation[child]);
             },
             [&](Index l) {
-                all.support = unite(all.support, out.luminance[tree.interior() + l]);
-                all.ring = unite(all.ring, leaf.ring[l]);
+                support = unite(support, out.luminance[tree.wedge_of_leaf(l)]);
+                ring = unite(ring, leaf.ring[l]);
             });
-        return all;
-    }
-
-    void operator()(NodeId node) const {
-        const bool textured = !of_vertices.empty();
-        auto [support, ring, shortened_rings, shortened_vertices, adaptation] = collect(node);
-        // The mean lies within the leaves' range except for rounding.
-        const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
-        const Unorm16 y = has_given ? out.luminance[node]
-                                    : std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
-        out.luminance[node] = y;
-        support = unite(support, y);
-        ring = unite(ring, shades[node]);
-        if (is_coincident(g, node) && !(textured && moves_texture[node])) {
-            // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The contrast
-            // of that is largest on the ring's darkest luminance.
-            ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
-            ring = unite(ring, textured ? shortened_vertices : shortened_rings);
+        const PackedRange below = support;
+        for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w) {
+            // The mean lies within the leaves' range except for rounding.
+            if (!has_given)
+                out.luminance[w] = std::clamp(Unorm16::nearest(sums.mean(w) / Unorm16::largest), below.lo, below.hi);
+            support = unite(support, out.luminance[w]);
+            ring = unite(ring, shades[w]);
         }
         out.support_range[node] = support;
         if (textured) {
             of_vertices[node] = ring;
-            PackedRange texture = g.ring_texture[node];
-            if (is_coincident(g, node) && !moves_texture[node])
-                texture.lo = texture.hi; // the brightest shows the spread best
-            ring = unite(product(ring, texture), shortened_rings);
+            ring = product(ring, g.ring_texture[node]);
         }
         out.ring_range[node] = ring;
         out.adaptation[node] = std::max(adaptation, middle(ring));
@@ -220,31 +178,31 @@ struct InteriorShader {
 };
 
 TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit,
-                               bool textured, const FunctionRef<float(NodeId)>* given) {
+                               bool textured, const FunctionRef<float(WedgeId)>* given) {
     textured = textured && !g.texels.empty();
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
     LuminanceArrays<Vector> out;
-    out.luminance.resize(g.parents.size());
+    out.luminance.resize(g.positions.size());
     out.support_range.resize(interior);
     out.ring_range.resize(interior);
     out.adaptation.resize(interior);
 
+    const WedgeId first = tree.wedge_of_leaf(0);
     if (given) shade_by(*given, out.luminance);
-    else light_leaves(g, light, prelit, textured, out.luminance);
+    else light_leaves(g, first, light, prelit, textured, out.luminance);
     const Shades shades(g, out.luminance, textured);
-    const LeafSurroundings leaf = survey_leaves(g, parts, shades);
+    const LeafSurroundings leaf = survey_leaves(g, tree, parts, shades);
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
-    const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
+    const LeafRuns runs(tree);
+    const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(first), runs);
 
     std::vector<PackedRange> of_vertices(textured ? interior : 0);
-    const std::vector<std::uint8_t> moves_texture =
-        textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
-    const InteriorShader shade{g, tree, shades, leaf, sums, moves_texture, given != nullptr, out, of_vertices};
+    const InteriorShader shade{g, tree, shades, leaf, sums, given != nullptr, out, of_vertices};
     parts.bottom_up([&] { return [&](NodeId node) { shade(node); }; });
 
     PackedRange drawn = leaf.corners;
-    if (given && interior > 0) drawn = unite(drawn, out.support_range[VertexTree::root()]); // proxies may go beyond
+    if (given) drawn = unite(drawn, out.support_range[VertexTree::root()]); // proxies may go beyond
     return {
         {std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range), std::move(out.adaptation)},
         light,
@@ -264,7 +222,13 @@ TreeLuminance copy_of(const TreeLuminance& light) {
 
 VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {
     const TreeGeometry& g = *data_->geometry;
-    links_ = {g.parents, g.subtree_end, g.first_leaf, g.leaf_end, g.first_triangle, g.triangles};
+    links_ = {{g.first_wedge, g.leaf_places, g.wedge_ranks},
+              g.parents,
+              g.subtree_end,
+              g.first_leaf,
+              g.leaf_end,
+              g.first_triangle,
+              g.triangles};
 }
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
@@ -296,6 +260,7 @@ std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { ret
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
 
 std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
+Index VertexTree::source_vertex_count() const noexcept { return data_->geometry->source_vertex_count; }
 std::span<const Index> VertexTree::source_triangles() const noexcept { return data_->geometry->source_triangles; }
 std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->geometry->ranges; }
 std::span<const std::byte> VertexTree::document() const noexcept { return data_->geometry->document; }
@@ -320,7 +285,7 @@ namespace {
 
 // A tree whose luminance is found anew. There is nothing left to check.
 Result<VertexTree> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured,
-                               const FunctionRef<float(NodeId)>* given = nullptr) {
+                               const FunctionRef<float(WedgeId)>* given = nullptr) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     auto data = std::make_shared<VertexTree::Data>();
@@ -338,7 +303,7 @@ Result<VertexTree> VertexTree::relit(const Light& light) const {
     return shaded_anew(*this, light, false, data_->light->textured);
 }
 
-Result<VertexTree> VertexTree::shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture) const {
+Result<VertexTree> VertexTree::shaded(const FunctionRef<float(WedgeId)>& luminance, bool keeps_texture) const {
     return shaded_anew(*this, light(), true, keeps_texture && data_->light->textured, &luminance);
 }
 
@@ -390,9 +355,10 @@ std::uint64_t VertexTree::byte_size() const noexcept {
     const TreeGeometry& g = *data_->geometry;
     const TreeLuminance& l = *data_->light;
     return attributes + g.ranges.capacity() * sizeof(MeshRange) +
-           bytes_of(g.parents, g.positions, g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end, g.subtree_end,
-                    g.first_triangle, g.bounds, g.support_spheres, g.mask_at, g.mask_records, g.displacement,
-                    g.triangles, g.source_triangles, g.source_vertices, g.document, g.texels, g.ring_texture) +
+           bytes_of(g.parents, g.first_wedge, g.leaf_places, g.wedge_ranks, g.positions, g.normals, g.colours, g.uvs,
+                    g.first_leaf, g.leaf_end, g.subtree_end, g.first_triangle, g.bounds, g.support_spheres, g.mask_at,
+                    g.mask_records, g.displacement, g.triangles, g.source_triangles, g.source_vertices, g.document,
+                    g.texels, g.ring_texture) +
            bytes_of(l.luminance, l.support_range, l.ring_range, l.adaptation);
 }
 

@@ -8,8 +8,8 @@
 
 namespace unseen::vdtree {
 
-// A hierarchy over n vertices: clusters 0 .. n-1 are the vertices themselves, the others are numbered in the order
-// in which they were made, so a cluster's parent has a higher number. The last cluster is the root.
+// A hierarchy over the n vertices of ClusterInput::mesh: clusters 0 .. n-1 are the vertices themselves, the others are
+// numbered in the order in which they were made, so a cluster's parent has a higher number. The last cluster is the root.
 struct Clustering {
     std::vector<Index> parents;        // by cluster; the root is its own parent
     std::vector<glm::dvec3> positions; // by cluster from n on: the proxy's position; empty: area-weighted means
@@ -21,13 +21,27 @@ struct Clustering {
 struct BuildOptions;
 class Team; // several processes that build one tree together; for the command
 
-// A clusterer's input, valid during the call. Arrays are by vertex.
+// What the corners of the triangles use: distinct tuples of position, normal, texture coordinates, colour and material.
+// Arrays are by leaf. Without seams and hard edges leaves are the vertices of ClusterInput::mesh.
+struct LeafView {
+    std::span<const Triangle> triangles;   // over leaves, in the order of ClusterInput::mesh.triangles
+    std::span<const Index> places;         // the vertex of ClusterInput::mesh
+    std::span<const float> luminance;      // relative, 0..1
+    std::span<const glm::vec3> normals;    // unit length or zero
+    std::span<const glm::vec4> colours;    // empty if the mesh has none
+    std::span<const glm::vec2> uvs;        // likewise
+    std::span<const Index> materials = {}; // a number for each; empty if there is one for all
+    bool has_own_normals = false;          // from the mesh, rather than from its faces
+};
+
+// A clusterer's input, valid during the call. The vertices of `mesh` are the distinct positions that triangles use, and
+// its triangles have three different ones each; it has no attributes. The other arrays are by vertex of it.
 struct ClusterInput {
     MeshView mesh;
     std::span<const float> luminance;   // relative, 0..1
     std::span<const glm::vec3> normals; // unit length or zero
     std::span<const double> areas;      // a third of the area of the triangles around it, mesh units squared
-    std::span<const Index> coincident;  // the first vertex at the same position
+    LeafView leaves;
 };
 
 // A clusterer of the caller's own. Called once, on the calling thread. Every vertex must reach the root. Clusters may have
@@ -35,7 +49,7 @@ struct ClusterInput {
 using Clusterer = FunctionRef<Result<Clustering>(const ClusterInput&)>;
 
 // Fast clustering by an octree over the bounding cube, subdivided until a cell holds one position. Cells that do not split
-// their points are skipped, so any depth works; coincident vertices share a node. Parallel. Memory: 32 bytes a vertex.
+// their points are skipped, so any depth works. Parallel. Memory: 32 bytes a vertex.
 Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& progress = {});
 
 // Contracts vertex pairs in the order of their quadric error over position, luminance and the mesh's own attributes
@@ -65,8 +79,8 @@ struct BuildOptions {
     int threads_alone = 0; // like `threads`, for the work after the clustering, when the other members are done
 };
 
-// Drops triangles that use a vertex twice and counts them in the tree. Fails if no triangle is left, on non-finite
-// positions, and on indices out of range. Memory: about 220 bytes a triangle while building.
+// Drops triangles with two corners at one position and counts them in the tree, and leaves out vertices that no triangle
+// uses. Fails if no triangle is left, on non-finite positions, and on indices out of range. Memory: about 220 bytes a triangle while building.
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
 // Fails with a team, which could not help the caller's own clusterer.
 Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options = {});

@@ -1,8 +1,9 @@
 // A cut: one view's current simplification of a vertex tree.
 //
 // A cut divides the interior nodes into unfolded and folded ones; the parent of an unfolded node is unfolded. Its active
-// vertices are the proxies of the topmost folded nodes, and the leaves that no folded node supports: they form an
-// antichain that covers every leaf. A triangle is active iff the node at which it vanishes is unfolded.
+// nodes are the topmost folded ones, and the places that no folded node supports: they form an antichain that covers every
+// leaf, and their wedges are the vertices of the simplification. A triangle is active iff the node at which it vanishes is
+// unfolded.
 #pragma once
 
 #include <unseen/vdtree/criteria.h>
@@ -68,8 +69,9 @@ public:
 
     const VertexTree& tree() const noexcept { return *tree_; }
     bool is_unfolded(NodeId node) const noexcept;
-    bool is_active(NodeId node) const noexcept; // its proxy (or leaf) is a vertex of the simplification
-    NodeId proxy_of_leaf(Index leaf) const noexcept { return proxies_[leaf]; }
+    bool is_active(NodeId node) const noexcept; // its wedges are vertices of the simplification
+    NodeId proxy_of_leaf(Index leaf) const noexcept { return proxies_[leaf]; } // the active node above it
+    WedgeId wedge_of_leaf(Index leaf) const noexcept { return tree_->wedge_at(proxies_[leaf], leaf); }
 
     // Changes by hand; each returns whether anything changed.
     bool unfold(NodeId node);           // precondition: interior and active
@@ -100,10 +102,10 @@ public:
     // The changes of the last adjust() or follow(), in order: each node is active when its turn comes.
     std::span<const FoldChange> changes() const noexcept;
 
-    // The simplification: triangles over node numbers (positions()[index] is the vertex), oriented like the input, with
-    // three different indices. Valid until the cut changes. The order of the triangles depends on the cut's history.
+    // The simplification: triangles over wedges (positions()[index] is the vertex), oriented like the input, of three
+    // different nodes each. Valid until the cut changes. The order of the triangles depends on the cut's history.
     // Cost: what changed, or the active triangles if much did.
-    std::span<const NodeId> indices() const;
+    std::span<const WedgeId> indices() const;
     // Updates for copies of the index buffer: the writes of the last follow(), in order. A place may occur twice, or lie
     // beyond the new end. nullopt: copy the whole buffer.
     std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
@@ -152,7 +154,7 @@ Mesh extract_mesh(const Cut& cut);
 // The same, with the sources of vertices and triangles.
 struct ExtractedMesh {
     Mesh mesh;
-    std::vector<NodeId> nodes;           // by vertex: the tree's node
+    std::vector<WedgeId> wedges;         // by vertex: the tree's
     std::vector<Index> source_triangles; // by triangle: its number in the input, ascending; empty without ranges
 };
 ExtractedMesh extract_with_sources(const Cut& cut);

@@ -17,7 +17,7 @@ namespace unseen::vdtree {
 
 // A gliding vertex: values to draw in place of the tree's own.
 struct MovedVertex {
-    NodeId node = 0;
+    WedgeId wedge = 0;
     glm::vec3 position = glm::vec3(0); // relative to the tree's origin, mesh units
     float luminance = 0;               // relative, linear
     glm::vec4 colour = glm::vec4(0);   // linear; 0 where the tree has no colours

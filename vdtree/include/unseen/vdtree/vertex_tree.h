@@ -1,9 +1,16 @@
 // The vertex tree: a hierarchical clustering of a mesh's vertices, with bounds for every fold.
 //
 // Nodes. Interior nodes have the numbers 0 .. interior_count() - 1, in depth-first pre-order: a parent comes before its
-// children, a subtree is contiguous, and 0 is the root. Leaves follow: node interior_count() + k is leaf k. Leaves are
-// the mesh's vertices in depth-first order, so a node supports a contiguous range of leaves. Folding an interior node
-// replaces all leaves under it by its proxy vertex.
+// children, a subtree is contiguous, and 0 is the root. *Places*, the mesh's distinct positions, follow in depth-first
+// order. Folding an interior node moves all places under it to its position.
+//
+// Wedges. A vertex as it is drawn is a *wedge*: a position with one normal, colour and pair of texture coordinates
+// (Hoppe 1996). At a seam or a hard edge a node has several, all at one position, and they fold together. The *leaves* are
+// the wedges of the places: the distinct tuples of position, attributes and material that the mesh's corners use. A wedge
+// of a node is a connected piece of the leaves under it: two leaves belong to it if corners of one triangle join them. So
+// wedges form a forest beside the tree of the nodes, and sides of a seam stay apart however far the node is folded.
+// Wedges are numbered node by node; leaf k is wedge interior_wedge_count() + k. A node supports a contiguous range of
+// leaves. Where every node has one wedge, wedges and nodes have the same numbers.
 //
 // Triangles are sorted by the node at which they vanish: the deepest node that supports two of their corners. So the
 // triangles that one fold removes are contiguous, and so are those that a folded subtree removes. Corners are leaf
@@ -28,6 +35,7 @@ namespace unseen::vdtree {
 class NodeChecks;
 
 using NodeId = std::uint32_t;
+using WedgeId = std::uint32_t;
 inline constexpr NodeId no_node = 0xffffffffu;
 
 // ---- values that the tree stores
@@ -196,19 +204,61 @@ struct Attribute {
 
 // ---- the tree
 
+// How the wedges hang on the nodes. Empty where every node has one wedge, which then has the node's number.
+template <class Numbers>
+struct WedgeLinks {
+    Numbers first_wedge; // by node, one longer
+    Numbers leaf_places; // by leaf
+    // By wedge: the number of its first leaf in the depth-first order of the forest, in which each wedge holds a run of
+    // leaves. Those of a node ascend.
+    Numbers wedge_ranks;
+
+    Index leaf_count(std::size_t places) const noexcept {
+        return static_cast<Index>(leaf_places.empty() ? places : leaf_places.size());
+    }
+    WedgeId first_wedge_of(NodeId node) const noexcept { return first_wedge.empty() ? node : first_wedge[node]; }
+    NodeId place_of_leaf(NodeId interior_count, Index leaf) const noexcept {
+        return leaf_places.empty() ? interior_count + leaf : leaf_places[leaf];
+    }
+    WedgeId wedge_above(NodeId node, WedgeId below) const noexcept {
+        if (first_wedge.empty()) return node;
+        const WedgeId first = first_wedge[node];
+        WedgeId wedge = first_wedge[node + 1] - 1;
+        if (wedge == first) return wedge;
+        for (const Index rank = wedge_ranks[below]; wedge > first && wedge_ranks[wedge] > rank;) --wedge;
+        return wedge;
+    }
+};
+
 class VertexTree {
 public:
     VertexTree(VertexTree&&) noexcept;
     VertexTree& operator=(VertexTree&&) noexcept;
     ~VertexTree();
 
-    // A tree has at least three leaves and one triangle.
+    // A tree has at least three places and one triangle.
     NodeId node_count() const noexcept { return static_cast<NodeId>(links_.parents.size()); }
     NodeId interior_count() const noexcept { return static_cast<NodeId>(links_.first_leaf.size()); }
-    NodeId leaf_count() const noexcept { return node_count() - interior_count(); }
+    NodeId place_count() const noexcept { return node_count() - interior_count(); }
     Index triangle_count() const noexcept { return static_cast<Index>(links_.triangles.size()); }
-    bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
+    bool is_place(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
+
+    // Wedges, the vertices to draw; those of a node are [first_wedge(node), wedge_end(node)).
+    WedgeId wedge_count() const noexcept { return interior_wedge_count() + leaf_count(); }
+    WedgeId interior_wedge_count() const noexcept { return links_.first_wedge_of(interior_count()); }
+    Index leaf_count() const noexcept { return links_.leaves(); }
+    bool has_seams() const noexcept { return !links_.first_wedge.empty(); } // some node has more wedges than one
+    WedgeId first_wedge(NodeId node) const noexcept { return links_.first_wedge_of(node); }
+    WedgeId wedge_end(NodeId node) const noexcept { return links_.first_wedge_of(node + 1); }
+    WedgeId wedge_of_leaf(Index leaf) const noexcept { return links_.wedge_of_leaf(leaf); }
+    NodeId place_of_leaf(Index leaf) const noexcept { return links_.place_of_leaf(leaf); }
+    // The wedge of a node above a leaf, or of its place, that holds the leaf. Cost: most nodes have one wedge, few more
+    // than eight.
+    WedgeId wedge_at(NodeId node, Index leaf) const noexcept { return links_.wedge_at(node, leaf); }
+    // The wedge of a node that holds a wedge of a node below.
+    WedgeId wedge_above(NodeId node, WedgeId below) const noexcept { return links_.wedge_above(node, below); }
+    const glm::vec3& position(NodeId node) const noexcept { return positions()[first_wedge(node)]; }
 
     // Whether an interior node can be unfolded: its links, triangles, and children's positions and bounds are valid. Always
     // true except for trees from map_tree(), whose nodes are checked when first asked about, from the root down; until
@@ -224,7 +274,7 @@ public:
     template <class F>
     void for_each_child(NodeId node, F&& f) const;
 
-    // Proxy vertices, by node; a leaf's proxy is the input vertex. Attributes that the mesh did not have are empty.
+    // Vertices, by wedge: the input's for leaves, else proxies. Attributes that the mesh did not have are empty.
     glm::dvec3 origin() const noexcept;
     std::span<const glm::vec3> positions() const noexcept;
     std::span<const Unorm16> luminance() const noexcept;    // under light(); never empty
@@ -239,18 +289,19 @@ public:
     std::span<const NodeBounds> bounds() const noexcept;
     NormalMask mask(NodeId node) const noexcept;                     // of the same normals as the slabs; unpacks it
     std::span<const Sphere> support_spheres() const noexcept;        // leaves and proxies of the subtree
-    std::span<const PackedRange> support_luminance() const noexcept; // of vertices, without the texture
+    std::span<const PackedRange> support_luminance() const noexcept; // of all wedges, without the texture
     std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
     std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance; empty without one
     std::span<const Unorm16> adaptation_luminance() const noexcept;  // middle of ring_luminance, saturated up the tree
-    std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
+    std::span<const float> displacement() const noexcept; // largest distance of a supported place from the proxy
 
-    // The input: by leaf its vertex, by triangle its number, and its ranges (groups, materials). The last two are empty
-    // if the input had no ranges.
+    // The input: by leaf its first vertex, by triangle its number, and its ranges (groups, materials). The last two are
+    // empty if the input had no ranges.
     std::span<const Index> source_vertices() const noexcept;
+    Index source_vertex_count() const noexcept; // of the input's vertices, those without a triangle included
     std::span<const Index> source_triangles() const noexcept;
     std::span<const MeshRange> ranges() const noexcept;
-    std::uint64_t dropped_triangles() const noexcept;     // input triangles that used a vertex twice
+    std::uint64_t dropped_triangles() const noexcept;     // input triangles with two corners at one position
     std::span<const std::byte> document() const noexcept; // MeshView::document; unchecked if it comes from a file
     Closedness closedness() const noexcept;
     Sphere bounding_sphere() const noexcept;         // of the triangles' corners
@@ -264,9 +315,9 @@ public:
     // triangles and nodes.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same with the caller's own relative luminances of leaves and proxies, clamped to 0..1 (NaN: 0), times the texture
-    // if `keeps_texture`. The result is pre-lit. The callback is called from several threads.
-    Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance, bool keeps_texture = false) const;
+    // The same with the caller's own relative luminances of wedges, clamped to 0..1 (NaN: 0), times the texture if
+    // `keeps_texture`. The result is pre-lit. The callback is called from several threads.
+    Result<VertexTree> shaded(const FunctionRef<float(WedgeId)>& luminance, bool keeps_texture = false) const;
 
     // The same without the texture, under its own light. Vertices without colours get the default albedo, lit.
     Result<VertexTree> untextured() const;
@@ -313,12 +364,19 @@ private:
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
     // Views of data_, kept here because they are read node by node.
-    struct Links {
+    struct Links : WedgeLinks<std::span<const NodeId>> {
         std::span<const NodeId> parents, subtree_end;
         std::span<const Index> first_leaf, leaf_end, first_triangle;
         std::span<const Triangle> triangles;
 
+        NodeId interior() const noexcept { return static_cast<NodeId>(first_leaf.size()); }
+        Index leaves() const noexcept { return leaf_count(parents.size() - first_leaf.size()); }
         Index triangles_of(NodeId node) const noexcept { return first_triangle[node + 1] - first_triangle[node]; }
+        NodeId place_of_leaf(Index leaf) const noexcept { return WedgeLinks::place_of_leaf(interior(), leaf); }
+        WedgeId wedge_of_leaf(Index leaf) const noexcept { return first_wedge_of(interior()) + leaf; }
+        WedgeId wedge_at(NodeId node, Index leaf) const noexcept {
+            return first_wedge.empty() ? node : wedge_above(node, wedge_of_leaf(leaf));
+        }
     };
     Links links_;
 };
@@ -360,8 +418,9 @@ void VertexTree::for_each_child(NodeId node, F&& f) const {
             leaf = end[child];
             if (leaf < end[node]) child = skip[child];
         } else {
-            f(static_cast<NodeId>(interior_count() + leaf));
-            ++leaf;
+            const NodeId place = links_.place_of_leaf(leaf);
+            f(place);
+            leaf += wedge_end(place) - first_wedge(place);
         }
     }
 }

@@ -12,13 +12,12 @@ namespace unseen::vdtree {
 class FoldSequence {
 public:
     explicit FoldSequence(const SoundTree& tree)
-        : tree_(tree), positions_(tree.positions()), corners_(tree.triangles().begin(), tree.triangles().end()),
-          around_(tree.node_count()) {
+        : tree_(tree), corners_(tree.triangles().begin(), tree.triangles().end()), around_(tree.node_count()) {
         for (Index t = 0; t < corners_.size(); ++t)
-            for (NodeId& corner : corners_[t]) around_[corner += tree.interior_count()].push_back(t);
+            for (NodeId& corner : corners_[t]) around_[corner = tree.place_of_leaf(corner)].push_back(t);
     }
 
-    // Folds a node whose interior children have been folded. Calls leave(corners) for each triangle that is drawn
+    // Folds a node whose interior children have been folded. Calls leave(triangle) for each triangle that is drawn
     // around the children; what it becomes is in ring() afterwards. Cost: the triangles around the node.
     template <class F>
     void fold(NodeId node, F&& leave) {
@@ -27,7 +26,7 @@ public:
             for (const Index t : around_[child]) {
                 Triangle& at = corners_[t];
                 const bool is_new = at[0] != node && at[1] != node && at[2] != node; // else another child's, too
-                if (is_new && are_distinct(at)) leave(at);
+                if (is_new && are_distinct(at)) leave(t);
                 for (NodeId& corner : at)
                     if (corner == child) corner = node;
             }
@@ -39,19 +38,26 @@ public:
         std::erase_if(ring, [&](Index t) { return !are_distinct(corners_[t]); });
     }
 
-    // The triangles that are drawn around a node which has been folded, and the nodes at their corners.
+    // The triangles that are drawn around a node which has been folded; the nodes at their corners, and the wedges.
     std::span<const Index> ring(NodeId node) const { return around_[node]; }
     const Triangle& corners(Index triangle) const { return corners_[triangle]; }
+    std::array<WedgeId, 3> wedges(Index triangle) const {
+        std::array<WedgeId, 3> out;
+        for (std::size_t k = 0; k < 3; ++k)
+            out[k] = tree_.wedge_at(corners_[triangle][k], tree_.triangles()[triangle][k]);
+        return out;
+    }
 
-    glm::vec3 vector_area(const Triangle& t) const {
-        return 0.5f * glm::cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
+    glm::vec3 vector_area(Index triangle) const {
+        const Triangle& t = corners_[triangle];
+        const glm::vec3& a = tree_.position(t[0]);
+        return 0.5f * glm::cross(tree_.position(t[1]) - a, tree_.position(t[2]) - a);
     }
 
 private:
     static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
 
     const SoundTree& tree_;
-    std::span<const glm::vec3> positions_;
     std::vector<Triangle> corners_;          // nodes that are shown
     std::vector<std::vector<Index>> around_; // by node that is shown
 };

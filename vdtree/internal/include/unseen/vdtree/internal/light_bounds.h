@@ -21,8 +21,8 @@ inline double spot_share(const LightSource& spot, double cosine) {
 // Relative luminance of a vertex. `normal`: unit or zero.
 double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 normal, double albedo, glm::dvec3 eye);
 
-// The luminance of a node's colour under white light. Without colours: default_albedo, or 1 with a texture.
-float albedo_of(const VertexTree& tree, NodeId node);
+// The luminance of a wedge's colour under white light. Without colours: default_albedo, or 1 with a texture.
+float albedo_of(const VertexTree& tree, WedgeId wedge);
 
 // Normals and albedos of the vertices that a fold may show: those of the ring, and the proxies of the subtree.
 struct VertexCone {
@@ -49,10 +49,10 @@ public:
     // Fails if VertexTree::check() fails. Cost: about 1 us a triangle, in parallel.
     static Result<LightBounds> measure(const VertexTree& tree);
 
-    // Includes further vertices; no_node: anything may be here and at all nodes above. `vertices` calls its argument for each
+    // Includes further vertices (wedges); no_node: anything may be here and at all nodes above. `vertices` calls its argument for each
     // of them, from several threads, but not for one node at the same time. Spheres of the `radii` (mesh units, one an
     // interior node) around the rings' centres contain the rings and all further vertices.
-    using FurtherVertex = FunctionRef<void(NodeId node, NodeId vertex)>;
+    using FurtherVertex = FunctionRef<void(NodeId node, WedgeId vertex)>;
     static Result<LightBounds> measure(const VertexTree& tree, std::vector<float> radii,
                                        const FunctionRef<void(const FurtherVertex&)>& vertices);
 

@@ -1,5 +1,4 @@
-// What a node's ring shows of the texture, in any state of the ring, and where a fold that moves no vertex moves the
-// texture.
+// What a node's ring shows of the texture, in any state of the ring.
 #pragma once
 
 #include <unseen/vdtree/internal/texture_pyramid.h>
@@ -8,17 +7,13 @@
 
 namespace unseen::vdtree {
 
-// By interior node: the box of the texture coordinates of the ring's corners and of the subtree's proxies. All that
-// triangles around the node show, unfolded or folded, in whatever part, lies within it. Cost: one pass over triangles
-// and nodes; parallel. Likewise the next.
+// By wedge of an interior node: the box of the texture coordinates of all corners of the triangles around its leaves, and
+// of the proxies below. All that triangles around the node show there, unfolded or folded, in whatever part, lies within
+// it. Cost: one pass over triangles and nodes; parallel. Likewise the next.
 std::vector<UvBox> bound_footprints(const TreeGeometry& geometry, const TreeParts& parts);
 
-// By interior node: the texture's luminance over the footprint. Grows up the tree.
+// By interior node: the texture's luminance over the footprints of its wedges. Grows up the tree.
 std::vector<PackedRange> bound_ring_texture(const TreeGeometry& geometry, const TreeParts& parts);
-
-// By interior node: whether its leaves and the proxies of its subtree differ in texture coordinates: then folds move
-// the texture even where no vertex moves.
-std::vector<std::uint8_t> find_texture_moves(const TreeGeometry& geometry, const TreeParts& parts);
 
 // The range of luminances multiplied by a texture, rounded outward.
 PackedRange product(PackedRange luminance, PackedRange texture);

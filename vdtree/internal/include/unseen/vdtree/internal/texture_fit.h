@@ -1,5 +1,4 @@
-// Affine maps from a texture to the surface that it lies on, one a node, and how far the vertices around the node are
-// from them.
+// Affine maps from a texture to the surface that it lies on, one a wedge, and how far the vertices around are from them.
 #pragma once
 
 #include <cmath>
@@ -10,17 +9,18 @@
 
 namespace unseen::vdtree {
 
-// Fitted to the corners of the ring; where texture coordinates fit no map at all, to their positions' middle. Distances
-// hold whatever the map is: points interpolated between vertices are no farther from it than these.
+// By wedge of an interior node: fitted to the corners of the triangles around its leaves; where texture coordinates fit no
+// map at all, to their positions' middle. Distances hold whatever the map is: points interpolated between vertices are no
+// farther from it than these.
 class TextureFits {
 public:
     TextureFits() = default;
-    // The geometry must stay where it is. Cost: one pass over triangles and leaves.
+    // The geometry must stay where it is. Cost: one pass over triangles and wedges.
     TextureFits(const TreeGeometry& geometry, const TreeParts& parts);
 
-    // Mesh units: how far the map of an interior node sends a vertex (leaf or proxy) from where it is.
-    double residual(NodeId node, NodeId vertex) const {
-        const Map& map = maps_[node];
+    // Mesh units: how far the map of a wedge sends a vertex (any wedge) from where it is.
+    double residual(WedgeId map_of, WedgeId vertex) const {
+        const Map& map = maps_[map_of];
         const glm::vec2 uv = g_->uvs[vertex];
         const glm::dvec3 p(g_->positions[vertex]);
         const glm::dvec3 off =
@@ -29,16 +29,11 @@ public:
         return squared >= 0 ? std::sqrt(squared) : std::numeric_limits<double>::infinity(); // NaN: no map
     }
 
-    // The largest of the leaves and proxies under a node, itself included; where they are very many, what is known
-    // without looking.
+    // The largest of the leaves and proxies under a node, itself included, each by the wedge of the node that holds it;
+    // where they are very many, what is known without looking.
     double residual_of_subtree(NodeId node) const;
 
-    // Texture coordinates of all vertices, those of proxies where their maps have the place nearest to the proxy,
-    // within the footprints: so that a fold slides the texture over the surface as little as can be. Where a fold moves
-    // nothing, and without a map, they stay.
-    std::vector<glm::vec2> fitted_uvs(const std::vector<UvBox>& footprints) const;
-
-    // Whether leaves and proxies under a node differ in texture coordinates.
+    // Whether leaves and proxies under a node differ in texture coordinates from its wedges that hold them.
     bool moves(NodeId node) const { return moves_[node]; }
 
 private:

@@ -32,7 +32,7 @@ public:
         return is_top(part) ? is_top_[node] : node - part.begin < part.end - part.begin;
     }
     bool owns_leaf(const TreePart& part, Index leaf) const {
-        return is_top(part) ? is_top_[tree_.parents[tree_.node_of_leaf(leaf)]]
+        return is_top(part) ? is_top_[tree_.parents[tree_.place_of_leaf(leaf)]]
                             : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
     }
 

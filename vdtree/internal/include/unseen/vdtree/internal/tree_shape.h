@@ -5,19 +5,20 @@
 
 namespace unseen::vdtree {
 
-// How the nodes hang together; numbered as in <unseen/vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
+// How the nodes hang together; numbered as in <unseen/vdtree/vertex_tree.h>: interior nodes depth-first, then the places.
 template <class Numbers>
-struct LinksIn {
+struct LinksIn : WedgeLinks<Numbers> {
     Numbers parents;    // by node
     Numbers first_leaf; // by interior node, and so on
     Numbers leaf_end;
     Numbers subtree_end;
 
     NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
-    Index leaves() const { return static_cast<Index>(parents.size() - first_leaf.size()); }
-    NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }
+    Index leaves() const { return this->leaf_count(parents.size() - first_leaf.size()); }
+    NodeId place_of_leaf(Index leaf) const { return WedgeLinks<Numbers>::place_of_leaf(interior(), leaf); }
+    WedgeId wedge_of_leaf(Index leaf) const { return this->first_wedge_of(interior()) + leaf; }
 
-    // Calls on_child for each interior child, and on_leaf for each leaf that is a child itself, in depth-first order.
+    // Calls on_child for each interior child, and on_leaf for each leaf of a child that is a place, in depth-first order.
     template <class Child, class Leaf>
     void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
         NodeId child = node + 1;
@@ -39,7 +40,11 @@ struct LinksIn {
 using TreeLinks = LinksIn<std::span<const NodeId>>;
 template <class Arrays>
 TreeLinks links_of(const Arrays& tree) {
-    return {tree.parents, tree.first_leaf, tree.leaf_end, tree.subtree_end};
+    return {{tree.first_wedge, tree.leaf_places, tree.wedge_ranks},
+            tree.parents,
+            tree.first_leaf,
+            tree.leaf_end,
+            tree.subtree_end};
 }
 
 // The same while the tree is being built.

@@ -47,9 +47,10 @@ static_assert(sizeof(TextureFacts) == 16);
 
 // `Storage`: Vector while they are filled, Array when they are done.
 template <template <class> class Storage>
-struct GeometryArrays {
-    // By node: interior nodes, then leaves.
-    Storage<NodeId> parents;
+struct GeometryArrays : WedgeLinks<Storage<NodeId>> {
+    Storage<NodeId> parents; // by node: interior nodes, then places
+
+    // By wedge.
     Storage<glm::vec3> positions;
     Storage<PackedNormal> normals;
     Storage<glm::vec4> colours;
@@ -84,6 +85,7 @@ struct GeometryFacts {
     glm::dvec3 origin = glm::dvec3(0);
     Sphere bounding_sphere;
     std::uint64_t dropped_triangles = 0;
+    Index source_vertex_count = 0;
     Closedness closedness = Closedness::open;
 };
 
@@ -100,7 +102,7 @@ struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
 
 template <template <class> class Storage>
 struct LuminanceArrays {
-    Storage<Unorm16> luminance;         // by node
+    Storage<Unorm16> luminance;         // by wedge
     Storage<PackedRange> support_range; // by interior node, and so on
     Storage<PackedRange> ring_range;
     Storage<Unorm16> adaptation;
@@ -132,11 +134,11 @@ TreeLuminance copy_of(const TreeLuminance& light);
 
 class TreeParts;
 
-// Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles.
+// Luminance of every wedge and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles.
 // `given`: luminances in the light's place, of proxies, too; null: none.
 // Cost: one pass over triangles and nodes; parallel.
 TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit,
-                               bool textured, const FunctionRef<float(NodeId)>* given);
+                               bool textured, const FunctionRef<float(WedgeId)>* given);
 
 // Relative luminance of one vertex; a texture's is to be multiplied with it.
 float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit,

@@ -1,0 +1,54 @@
+// The mesh as it is clustered: its places, and the leaves that its corners use there.
+#pragma once
+
+#include <unseen/vdtree/builder.h>
+
+namespace unseen::vdtree {
+
+// Triangles with two corners at one position are left out, and so are vertices that no other triangle uses.
+class PlaceMesh {
+public:
+    // The source must be valid and outlive this. Cost: linear, but for sorting the corners at places with several leaves.
+    explicit PlaceMesh(const MeshView& source);
+
+    // ---- over places, which are numbered by their first vertices
+    const MeshView& mesh() const { return mesh_; } // positions and triangles alone
+    Index source_triangle(Index t) const { return kept_.empty() ? t : kept_[t]; }
+    std::uint64_t dropped() const { return dropped_; }
+
+    // ---- leaves, place by place. To be called once the places' own normals are known, which stand in for missing ones:
+    // `fallback`, by place; `sign`: -1 turns the mesh's own around.
+    void find_leaves(std::span<const glm::vec3> fallback, float sign);
+
+    Index leaf_count() const { return static_cast<Index>(sources_.size()); }
+    bool has_seams() const { return !first_leaf_.empty(); }
+    Index first_leaf(Index place) const { return has_seams() ? first_leaf_[place] : place; }
+    std::span<const Index> sources() const { return sources_; }     // by leaf: the first of its vertices
+    std::span<const glm::vec3> normals() const { return normals_; } // unit length or zero
+    std::span<const Index> materials() const { return materials_; } // empty: one for all
+    std::span<const Index> places() const { return places_; }
+    std::span<const Triangle> triangles() const { return has_seams() ? leaf_triangles_ : mesh_.triangles; }
+
+private:
+    void keep_triangles(std::span<const Index> coincident);
+    void number_places(std::span<const Index> coincident);
+    void find_materials();
+    const Triangle& source_corners(Index t) const { return source_.triangles[source_triangle(t)]; }
+    glm::vec3 own_normal(Index vertex, Index place, std::span<const glm::vec3> fallback, float sign) const;
+    void gather_leaves(std::span<const glm::vec3> fallback, float sign);
+
+    const MeshView& source_;
+    std::uint64_t dropped_ = 0;
+    std::vector<Index> kept_; // source triangles; empty: all
+    std::vector<glm::dvec3> positions_;
+    std::vector<Triangle> triangles_;
+    MeshView mesh_;
+    bool is_split_ = false; // several vertices at one place
+
+    std::vector<Index> first_leaf_, sources_, places_, materials_;
+    std::vector<Index> triangle_materials_; // empty: one for all
+    std::vector<glm::vec3> normals_;
+    std::vector<Triangle> leaf_triangles_;
+};
+
+} // namespace unseen::vdtree

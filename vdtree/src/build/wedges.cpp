@@ -1,0 +1,653 @@
+#include "build/wedges.h"
+
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <numeric>
+#include <tuple>
+
+#include <glm/geometric.hpp>
+
+#include "build/spatial_order.h"
+#include <unseen/vdtree/internal/parallel.h>
+
+namespace unseen::vdtree {
+
+namespace {
+
+// A normal that turns by one radian, a colour that goes from 0 to 1, and a texture that slides by a length on the surface
+// count as these shares of the extent, or of the length. They weigh triangles on which a value changes fast, and say which
+// wedges are alike.
+constexpr double normal_scale = 0.005;
+constexpr double colour_scale = 0.005;
+constexpr double texture_scale = 0.3;
+
+// Wedges whose triangles have all vanished by the time that their node was made are drawn in mixed cuts only. They are
+// united with the nearest wedge of their material if it is this near (shares of the extent, by the scales above), or
+// while a node has more wedges than this. At four, texture stretches in mixed cuts begin to show.
+constexpr double near_enough = 0.02;
+constexpr std::size_t most_wedges_with_dead = 8;
+// Above this many, neighbours in order stand in for the nearest: looking at all pairs takes the square of the time.
+constexpr std::size_t most_compared = 64;
+
+constexpr std::size_t most_classes = 3, most_channels_of_class = 4;
+enum class Kind { normal, uv, colour };
+
+// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g, w d, and of
+// the values at the corners themselves.
+struct Component {
+    double weight = 0, corner_weight = 0;
+    std::array<glm::dvec4, most_channels_of_class> linear{}; // w g and w d
+    glm::dvec4 corners{0};
+
+    void operator+=(const Component& other) {
+        weight += other.weight, corner_weight += other.corner_weight;
+        for (std::size_t c = 0; c < most_channels_of_class; ++c) linear[c] += other.linear[c];
+        corners += other.corners;
+    }
+    glm::dvec4 value_at(const glm::dvec3& p, std::size_t channels) const {
+        const glm::dvec4 mean = corners / corner_weight;
+        glm::dvec4 value = mean;
+        for (std::size_t c = 0; c < channels; ++c) {
+            const double s = (glm::dot(glm::dvec3(linear[c]), p) + linear[c].w) / weight;
+            if (std::isfinite(s)) value[static_cast<int>(c)] = s;
+        }
+        return value;
+    }
+};
+
+struct Class {
+    Kind kind;
+    std::size_t channels;
+    double scale; // to lengths in the unit box
+};
+
+// A wedge of the node at hand. Its leaves are known by one of them, the root of a union.
+struct WedgeState {
+    Index root = 0;
+    Index material = 0;
+    Index last = 0; // when the last of its triangles vanishes, in the order in which the clusterer made the nodes
+    std::array<Index, most_classes> component{};
+};
+
+struct NodeState {
+    std::vector<WedgeState> wedges;
+    std::vector<Component> components;
+
+    void clear() {
+        wedges.clear();
+        components.clear();
+    }
+};
+
+struct WedgeValues {
+    std::array<glm::dvec4, most_classes> of;
+};
+
+// States of nodes whose parents are still to come, and the values that have been found. One for each task; what a parent
+// has taken is used again.
+struct Workspace {
+    std::deque<NodeState> states;
+    std::vector<NodeState*> unused;
+    std::vector<WedgeValues> values;
+    std::vector<Index> into;             // by wedge of the children: the wedge that it became, by its first one
+    std::vector<Index> component_parent; // by component: itself, or one that it was united with
+
+    NodeState* take() {
+        if (unused.empty()) return &states.emplace_back();
+        NodeState* state = unused.back();
+        unused.pop_back();
+        state->clear();
+        return state;
+    }
+};
+
+constexpr bool same_value(const glm::dvec4& a, const glm::dvec4& b) { return a == b; }
+
+class WedgeFinder {
+public:
+    WedgeFinder(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
+                const LeafMesh& mesh, const Ancestors& ancestors)
+        : shape_(shape), parts_(parts), positions_(positions), mesh_(mesh), interior_(shape.interior()),
+          splits_(!mesh.first_leaf.empty() || !mesh.materials.empty()) {
+        measure();
+        list_triangles();
+        if (splits_) find_meetings(ancestors);
+        counts_.assign(interior_, 1);
+        values_at_.resize(interior_);
+        states_.assign(interior_, nullptr);
+        spaces_.resize(parts.count());
+    }
+
+    WedgeArrays run() {
+        parts_.bottom_up([&] {
+            const std::uint16_t number = make_workspace();
+            return [this, &space = *spaces_[number], number](NodeId node) { visit(node, space, number); };
+        });
+        number_wedges();
+        fill();
+        return std::move(out_);
+    }
+
+private:
+    // ---- what is measured of the mesh
+
+    void measure() {
+        const Box box = box_around(positions_.subspan(interior_), [](const glm::vec3& p) { return glm::dvec3(p); });
+        const double extent = box.extent();
+        centre_ = box.low + box.size() * 0.5;
+        scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
+        classes_.push_back({Kind::normal, 3, normal_scale});
+        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, 2, texture_scale * texture_density()});
+        if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, 4, colour_scale});
+    }
+
+    // The length in the unit box that one unit of texture coordinates covers, on average; 0 where they cover nothing.
+    double texture_density() const {
+        double surface = 0, texture = 0;
+        for (const Triangle& t : mesh_.triangles) {
+            const glm::dvec3 a = place_of(t[0]), cross = glm::cross(place_of(t[1]) - a, place_of(t[2]) - a);
+            const glm::dvec2 uv(mesh_.uvs[t[0]]), e = glm::dvec2(mesh_.uvs[t[1]]) - uv,
+                                                  f = glm::dvec2(mesh_.uvs[t[2]]) - uv;
+            surface += glm::length(cross);
+            texture += std::abs(e.x * f.y - e.y * f.x);
+        }
+        const double density = std::sqrt(surface / texture);
+        return density > 0 && std::isfinite(density) ? density : 0;
+    }
+
+    Index first_leaf(Index place) const { return mesh_.first_leaf.empty() ? place : mesh_.first_leaf[place]; }
+    Index leaf_count() const { return first_leaf(shape_.leaves()); }
+    glm::dvec3 unit_position(NodeId node) const { return (glm::dvec3(positions_[node]) - centre_) * scale_; }
+    glm::dvec3 place_of(Index leaf) const { return unit_position(place_node(leaf)); }
+    NodeId place_node(Index leaf) const { return interior_ + (places_.empty() ? leaf : places_[leaf]); }
+
+    glm::dvec4 value_of(const Class& c, Index leaf) const {
+        switch (c.kind) {
+        case Kind::normal: return {glm::dvec3(mesh_.normals[leaf]), 0};
+        case Kind::uv: return {glm::dvec2(mesh_.uvs[leaf]), 0, 0};
+        case Kind::colour: break;
+        }
+        return glm::dvec4(mesh_.colours[leaf]);
+    }
+
+    // The triangles at each leaf.
+    void list_triangles() {
+        if (!mesh_.first_leaf.empty()) {
+            places_.resize(leaf_count());
+            for (Index place = 0; place < shape_.leaves(); ++place)
+                for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf) places_[leaf] = place;
+        }
+        start_.assign(std::size_t{leaf_count()} + 1, 0);
+        for (const Triangle& t : mesh_.triangles)
+            for (const Index leaf : t) ++start_[leaf + 1];
+        std::partial_sum(start_.begin(), start_.end(), start_.begin());
+        around_.resize(start_.back());
+        std::vector<Index> next(start_.begin(), start_.end() - 1);
+        for (Index t = 0; t < mesh_.triangles.size(); ++t)
+            for (const Index leaf : mesh_.triangles[t]) around_[next[leaf]++] = t;
+    }
+
+    // Where triangles vanish with two corners, and where the third one joins these.
+    void find_meetings(const Ancestors& ancestors) {
+        const std::size_t triangles = mesh_.triangles.size();
+        root_.resize(leaf_count());
+        std::iota(root_.begin(), root_.end(), Index{0});
+        local_.assign(leaf_count(), 0);
+        last_.assign(leaf_count(), 0);
+        std::vector<NodeId> vanishing(triangles), joins(triangles);
+        for (NodeId node = 0; node < interior_; ++node)
+            for (Index t = mesh_.first_triangle[node]; t < mesh_.first_triangle[node + 1]; ++t) vanishing[t] = node;
+        parallel_loop(std::size_t{0}, triangles, [&](std::size_t t) {
+            const auto place = [&](std::size_t k) { return place_node(mesh_.triangles[t][k]) - interior_; };
+            const Index low = std::min({place(0), place(1), place(2)}), high = std::max({place(0), place(1), place(2)});
+            joins[t] = ancestors.lowest(vanishing[t], [&](NodeId node) {
+                return shape_.first_leaf[node] <= low && high < shape_.leaf_end[node];
+            });
+        });
+        first_join_.assign(std::size_t{interior_} + 1, 0);
+        for (Index t = 0; t < triangles; ++t) first_join_[joins[t] + 1] += joins[t] != vanishing[t];
+        std::partial_sum(first_join_.begin(), first_join_.end(), first_join_.begin());
+        joining_.resize(first_join_.back());
+        std::vector<Index> next(first_join_.begin(), first_join_.end() - 1);
+        for (Index t = 0; t < triangles; ++t) {
+            if (joins[t] != vanishing[t]) joining_[next[joins[t]]++] = t;
+            for (const Index leaf : mesh_.triangles[t]) last_[leaf] = std::max(last_[leaf], shape_.made[vanishing[t]]);
+        }
+        parents_below_.resize(interior_);
+    }
+
+    // ---- node by node, children first
+
+    std::uint16_t make_workspace() {
+        const auto number = static_cast<std::uint16_t>(used_spaces_++);
+        spaces_[number] = std::make_unique<Workspace>();
+        return number;
+    }
+
+    void visit(NodeId node, Workspace& space, std::uint16_t number) {
+        NodeState& state = *space.take();
+        shape_.for_each_child(
+            node,
+            [&](NodeId child) {
+                append(*states_[child], state);
+                space.unused.push_back(std::exchange(states_[child], nullptr));
+            },
+            [&](Index place) { add_place(place, state); });
+        unite_wedges(node, state, space);
+        values_at_[node] = {static_cast<Index>(space.values.size()), number};
+        for (const WedgeState& wedge : state.wedges)
+            space.values.push_back(values_of(wedge, state, unit_position(node)));
+        counts_[node] = static_cast<Index>(state.wedges.size());
+        states_[node] = &state;
+    }
+
+    void append(const NodeState& child, NodeState& to) const {
+        const Index before = static_cast<Index>(to.components.size());
+        to.components.insert(to.components.end(), child.components.begin(), child.components.end());
+        for (WedgeState wedge : child.wedges) {
+            for (Index& component : wedge.component) component += before;
+            to.wedges.push_back(wedge);
+        }
+    }
+
+    void add_place(Index place, NodeState& to) const {
+        const std::size_t first_wedge = to.wedges.size();
+        for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf) {
+            WedgeState wedge;
+            wedge.root = leaf;
+            if (!mesh_.materials.empty()) wedge.material = mesh_.materials[leaf];
+            if (splits_) wedge.last = last_[leaf];
+            for (std::size_t c = 0; c < classes_.size(); ++c) {
+                const Component own = component_of(classes_[c], leaf);
+                Index& component = wedge.component[c];
+                component = shared_component(classes_[c], c, wedge, std::span(to.wedges).subspan(first_wedge));
+                if (component == none) {
+                    component = static_cast<Index>(to.components.size());
+                    to.components.push_back(own);
+                } else {
+                    to.components[component] += own;
+                }
+            }
+            to.wedges.push_back(wedge);
+        }
+    }
+
+    // That of another leaf at the place with the same value. Textures are shared within a material only.
+    Index shared_component(const Class& of, std::size_t c, const WedgeState& wedge,
+                           std::span<const WedgeState> others) const {
+        // Looking at all pairs would take the square of the time where thousands of leaves meet.
+        const std::size_t looked_at = std::min(others.size(), most_compared);
+        for (const WedgeState& other : others.last(looked_at))
+            if (same_value(value_of(of, other.root), value_of(of, wedge.root)) &&
+                (of.kind != Kind::uv || other.material == wedge.material))
+                return other.component[c];
+        return none;
+    }
+
+    // What a class has on the triangles at a leaf.
+    Component component_of(const Class& c, Index leaf) const {
+        Component sum;
+        constexpr double least_area = 1e-12; // of the unit box: leaves on slivers have a mean, too
+        for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) {
+            const Triangle& t = mesh_.triangles[around_[i]];
+            const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p,
+                             cross = glm::cross(e, f);
+            const double squared = glm::dot(cross, cross), area = std::sqrt(squared) / 6;
+            const glm::dvec4 own = value_of(c, leaf);
+            sum.corner_weight += area + least_area;
+            sum.corners += (area + least_area) * own;
+            const glm::dvec3 by_e = glm::cross(f, cross) / squared, by_f = glm::cross(cross, e) / squared;
+            const glm::dvec4 s = value_of(c, t[0]), along_e = value_of(c, t[1]) - s, along_f = value_of(c, t[2]) - s;
+            std::array<glm::dvec3, most_channels_of_class> gradients{};
+            double steepest = 0;
+            for (std::size_t k = 0; k < c.channels; ++k) {
+                const int i_k = static_cast<int>(k);
+                gradients[k] = along_e[i_k] * by_e + along_f[i_k] * by_f;
+                steepest = std::max(steepest, glm::dot(gradients[k], gradients[k]));
+            }
+            const double weight = area / (1 + steepest * c.scale * c.scale);
+            if (!(weight > 0)) continue;
+            sum.weight += weight;
+            for (std::size_t k = 0; k < c.channels; ++k) {
+                const double d = s[static_cast<int>(k)] - glm::dot(gradients[k], p);
+                sum.linear[k] += weight * glm::dvec4(gradients[k], d);
+            }
+        }
+        return sum;
+    }
+
+    // Unions of leaves; parts do not touch each other's.
+    Index find(Index leaf) {
+        while (root_[leaf] != leaf) leaf = root_[leaf] = root_[root_[leaf]];
+        return leaf;
+    }
+
+    void unite_wedges(NodeId node, NodeState& state, Workspace& space) {
+        if (!splits_) return unite_all(state);
+        auto& wedges = state.wedges;
+        space.into.resize(wedges.size());
+        std::iota(space.into.begin(), space.into.end(), Index{0});
+        space.component_parent.resize(state.components.size());
+        std::iota(space.component_parent.begin(), space.component_parent.end(), Index{0});
+        for (Index w = 0; w < wedges.size(); ++w) local_[wedges[w].root] = w;
+        const Index begin = first_leaf(shape_.first_leaf[node]), size = first_leaf(shape_.leaf_end[node]) - begin;
+        const auto join_corners = [&](const Triangle& t) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                const Index a = t[k], b = t[(k + 1) % 3];
+                if (a - begin < size && b - begin < size) join(local_[find(a)], local_[find(b)], state, space);
+            }
+        };
+        for (Index t = mesh_.first_triangle[node]; t < mesh_.first_triangle[node + 1]; ++t)
+            join_corners(mesh_.triangles[t]);
+        for (Index i = first_join_[node]; i < first_join_[node + 1]; ++i) join_corners(mesh_.triangles[joining_[i]]);
+        if (std::ranges::count_if(wedges, [&](const WedgeState& w) { return find(w.root) == w.root; }) > 1) {
+            join_equal(state, space);
+            join_dead(node, state, space);
+        }
+        compact(node, state, space);
+    }
+
+    void unite_all(NodeState& state) const {
+        for (std::size_t w = 1; w < state.wedges.size(); ++w)
+            for (std::size_t c = 0; c < classes_.size(); ++c)
+                state.components[state.wedges[0].component[c]] += state.components[state.wedges[w].component[c]];
+        state.wedges.resize(1);
+        state.components.resize(classes_.size()); // the first wedge's came first
+    }
+
+    static Index top(std::vector<Index>& parents, Index i) {
+        while (parents[i] != i) i = parents[i] = parents[parents[i]];
+        return i;
+    }
+
+    // The earlier of two stands for both.
+    void join(Index a, Index b, NodeState& state, Workspace& space) {
+        a = top(space.into, a), b = top(space.into, b);
+        if (a == b) return;
+        if (b < a) std::swap(a, b);
+        WedgeState &to = state.wedges[a], &from = state.wedges[b];
+        space.into[b] = a;
+        root_[from.root] = to.root;
+        to.last = std::max(to.last, from.last);
+        for (std::size_t c = 0; c < classes_.size(); ++c) {
+            const Index x = top(space.component_parent, to.component[c]),
+                        y = top(space.component_parent, from.component[c]);
+            if (x == y) continue;
+            state.components[std::min(x, y)] += state.components[std::max(x, y)];
+            space.component_parent[std::max(x, y)] = std::min(x, y);
+        }
+    }
+
+    template <class F>
+    void for_each_wedge(const NodeState& state, const Workspace& space, F&& f) const {
+        for (Index w = 0; w < state.wedges.size(); ++w)
+            if (space.into[w] == w) f(w);
+    }
+
+    // Those of one material that share the values of all classes.
+    void join_equal(NodeState& state, Workspace& space) {
+        std::vector<std::tuple<Index, std::array<Index, most_classes>, Index>> order;
+        for_each_wedge(state, space, [&](Index w) {
+            auto components = state.wedges[w].component;
+            for (std::size_t c = 0; c < classes_.size(); ++c)
+                components[c] = top(space.component_parent, components[c]);
+            order.emplace_back(state.wedges[w].material, components, w);
+        });
+        if (order.size() < 2) return;
+        std::ranges::sort(order);
+        for (std::size_t i = 1; i < order.size(); ++i) {
+            const auto& [material, components, w] = order[i];
+            const auto& [material_before, components_before, before] = order[i - 1];
+            if (material == material_before && components == components_before) join(before, w, state, space);
+        }
+    }
+
+    void join_dead(NodeId node, NodeState& state, Workspace& space) {
+        std::vector<Index> left;
+        const auto list = [&] {
+            left.clear();
+            for_each_wedge(state, space, [&](Index w) { left.push_back(w); });
+        };
+        list();
+        const auto is_dead = [&](Index w) { return state.wedges[w].last <= shape_.made[node]; };
+        if (std::ranges::none_of(left, is_dead)) return;
+        const glm::dvec3 at = unit_position(node);
+        if (left.size() > most_compared) {
+            thin_out(left, at, is_dead, state, space);
+            list();
+        }
+        std::vector<WedgeValues> values;
+        for (const Index w : left) values.push_back(values_of(state.wedges[w], state, at, space));
+        for (bool again = true; again && left.size() > 1;) {
+            again = false;
+            Nearest nearest;
+            for (std::size_t i = 0; i < left.size(); ++i)
+                for (std::size_t j = 0; j < left.size(); ++j)
+                    if (i != j && is_dead(left[i])) nearest.propose(i, j, apart(state, left, values, i, j));
+            if (!(nearest.distance < near_enough) &&
+                (left.size() <= most_wedges_with_dead || !std::isfinite(nearest.distance)))
+                return;
+            const std::size_t keep = std::min(nearest.i, nearest.j), go = std::max(nearest.i, nearest.j);
+            join(left[keep], left[go], state, space);
+            left.erase(left.begin() + static_cast<std::ptrdiff_t>(go));
+            values.erase(values.begin() + static_cast<std::ptrdiff_t>(go));
+            values[keep] = values_of(state.wedges[left[keep]], state, at, space);
+            again = true;
+        }
+    }
+
+    struct Nearest {
+        std::size_t i = 0, j = 0;
+        double distance = std::numeric_limits<double>::infinity();
+        void propose(std::size_t a, std::size_t b, double d) {
+            if (d < distance) *this = {a, b, d};
+        }
+    };
+
+    double apart(const NodeState& state, std::span<const Index> which, std::span<const WedgeValues> values,
+                 std::size_t i, std::size_t j) const {
+        if (state.wedges[which[i]].material != state.wedges[which[j]].material)
+            return std::numeric_limits<double>::infinity();
+        double squared = 0;
+        for (std::size_t c = 0; c < classes_.size(); ++c) {
+            const glm::dvec4 difference = (values[i].of[c] - values[j].of[c]) * classes_[c].scale;
+            squared += glm::dot(difference, difference);
+        }
+        return std::sqrt(squared);
+    }
+
+    // Unites dead wedges with their neighbours in the order of their values.
+    template <class IsDead>
+    void thin_out(std::span<const Index> wedges, const glm::dvec3& at, IsDead&& is_dead, NodeState& state,
+                  Workspace& space) {
+        std::vector<std::tuple<Index, double, double, Index>> order; // material, two of the values, wedge
+        const std::size_t c = classes_.size() > 1 ? 1 : 0;
+        for (const Index w : wedges) {
+            const glm::dvec4 value = values_of(state.wedges[w], state, at, space).of[c];
+            order.emplace_back(state.wedges[w].material, value.x, value.y, w);
+        }
+        std::ranges::sort(order);
+        std::size_t left = order.size();
+        for (std::size_t i = 1; i < order.size() && left > most_compared; ++i) {
+            const Index before = std::get<3>(order[i - 1]), w = std::get<3>(order[i]);
+            if (std::get<0>(order[i]) != std::get<0>(order[i - 1]) || (!is_dead(w) && !is_dead(before))) continue;
+            join(before, w, state, space);
+            --left;
+        }
+    }
+
+    // Numbers what is left, and notes which wedge each child's has become.
+    void compact(NodeId node, NodeState& state, Workspace& space) {
+        std::vector<Index> number(state.wedges.size());
+        Index kept = 0;
+        for_each_wedge(state, space, [&](Index w) { number[w] = kept++; });
+        if (kept > 1) {
+            auto below = std::make_unique<Index[]>(state.wedges.size());
+            for (Index w = 0; w < state.wedges.size(); ++w) below[w] = number[top(space.into, w)];
+            parents_below_[node] = std::move(below);
+        }
+        std::vector<Index> component_number(state.components.size(), none);
+        std::vector<Component> components;
+        std::vector<WedgeState> wedges;
+        for_each_wedge(state, space, [&](Index w) {
+            WedgeState wedge = state.wedges[w];
+            for (std::size_t c = 0; c < classes_.size(); ++c) {
+                const Index from = top(space.component_parent, wedge.component[c]);
+                if (component_number[from] == none) {
+                    component_number[from] = static_cast<Index>(components.size());
+                    components.push_back(state.components[from]);
+                }
+                wedge.component[c] = component_number[from];
+            }
+            wedges.push_back(wedge);
+        });
+        state.wedges.swap(wedges);
+        state.components.swap(components);
+    }
+
+    WedgeValues values_of(const WedgeState& wedge, const NodeState& state, const glm::dvec3& at) const {
+        WedgeValues values{};
+        for (std::size_t c = 0; c < classes_.size(); ++c)
+            values.of[c] = state.components[wedge.component[c]].value_at(at, classes_[c].channels);
+        return values;
+    }
+    WedgeValues values_of(WedgeState wedge, const NodeState& state, const glm::dvec3& at, Workspace& space) const {
+        for (std::size_t c = 0; c < classes_.size(); ++c)
+            wedge.component[c] = top(space.component_parent, wedge.component[c]);
+        return values_of(wedge, state, at);
+    }
+
+    // ---- numbers
+
+    bool has_seams() const {
+        return !mesh_.first_leaf.empty() || std::ranges::any_of(counts_, [](Index count) { return count > 1; });
+    }
+
+    // Calls f(wedge of a child, wedge of the node) by the numbers before sorting, children in depth-first order.
+    template <class F>
+    void for_each_link(NodeId node, std::span<const WedgeId> first, F&& f) const {
+        const Index* below = counts_[node] > 1 ? parents_below_[node].get() : nullptr;
+        std::size_t i = 0;
+        const auto link = [&](NodeId child) {
+            for (WedgeId w = first[child]; w < first[child + 1]; ++w, ++i) f(w, first[node] + (below ? below[i] : 0));
+        };
+        shape_.for_each_child(node, link, [&](Index place) { link(interior_ + place); });
+    }
+
+    // Ranks follow the forest depth-first; then each node's wedges are put in the order of their ranks.
+    void number_wedges() {
+        if (!has_seams()) return;
+        const NodeId nodes = interior_ + shape_.leaves();
+        auto& first = out_.links.first_wedge;
+        first.assign(std::size_t{nodes} + 1, 0);
+        for (NodeId node = 0; node < interior_; ++node) first[node + 1] = first[node] + counts_[node];
+        for (Index place = 0; place < shape_.leaves(); ++place)
+            first[interior_ + place + 1] = first[interior_] + first_leaf(place + 1);
+        const WedgeId wedges = first[nodes];
+        std::vector<Index> sizes(wedges, 0), next(wedges, 0), ranks(wedges, 0);
+        std::fill(sizes.begin() + first[interior_], sizes.end(), Index{1});
+        for (NodeId node = interior_; node-- > 0;)
+            for_each_link(node, first, [&](WedgeId below, WedgeId above) { sizes[above] += sizes[below]; });
+        for (WedgeId w = first[0] + 1; w < first[1]; ++w) ranks[w] = ranks[w - 1] + sizes[w - 1];
+        for (NodeId node = 0; node < interior_; ++node) {
+            for (WedgeId w = first[node]; w < first[node + 1]; ++w) next[w] = ranks[w];
+            for_each_link(node, first, [&](WedgeId below, WedgeId above) {
+                ranks[below] = next[above];
+                next[above] += sizes[below];
+            });
+        }
+        by_rank_.resize(wedges);
+        std::iota(by_rank_.begin(), by_rank_.end(), WedgeId{0});
+        for (NodeId node = 0; node < nodes; ++node)
+            std::sort(by_rank_.begin() + first[node], by_rank_.begin() + first[node + 1],
+                      [&](WedgeId a, WedgeId b) { return ranks[a] < ranks[b]; });
+        out_.links.wedge_ranks.resize(wedges);
+        for (WedgeId w = 0; w < wedges; ++w) out_.links.wedge_ranks[w] = ranks[by_rank_[w]];
+        out_.leaf_numbers.resize(leaf_count());
+        out_.links.leaf_places.resize(leaf_count());
+        for (Index leaf = 0; leaf < leaf_count(); ++leaf)
+            out_.leaf_numbers[by_rank_[first[interior_] + leaf] - first[interior_]] = leaf;
+        for (Index place = 0; place < shape_.leaves(); ++place)
+            for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf)
+                out_.links.leaf_places[leaf] = interior_ + place;
+    }
+
+    // ---- values
+
+    void fill() {
+        const auto& links = out_.links;
+        const NodeId nodes = interior_ + shape_.leaves();
+        const WedgeId wedges = links.first_wedge_of(nodes), leaves_begin = links.first_wedge_of(interior_);
+        out_.positions.resize(wedges);
+        out_.normals.resize(wedges);
+        if (!mesh_.uvs.empty()) out_.uvs.resize(wedges);
+        if (!mesh_.colours.empty()) out_.colours.resize(wedges);
+        parallel_loop(NodeId{0}, nodes, [&](NodeId node) {
+            const WedgeId begin = links.first_wedge_of(node), end = links.first_wedge_of(node + 1);
+            for (WedgeId w = begin; w < end; ++w) {
+                out_.positions[w] = positions_[node];
+                const WedgeId given = by_rank_.empty() ? w : by_rank_[w];
+                if (node < interior_) {
+                    const auto& [at, space] = values_at_[node];
+                    put(w, spaces_[space]->values[at + given - begin]);
+                } else {
+                    put_leaf(w, given - leaves_begin);
+                }
+            }
+        });
+    }
+
+    void put(WedgeId w, const WedgeValues& values) {
+        for (std::size_t c = 0; c < classes_.size(); ++c) {
+            const glm::dvec4& value = values.of[c];
+            switch (classes_[c].kind) {
+            case Kind::normal: out_.normals[w] = PackedNormal::nearest(glm::vec3(value)); break;
+            case Kind::uv: out_.uvs[w] = glm::vec2(value); break;
+            case Kind::colour: out_.colours[w] = glm::vec4(glm::clamp(value, 0.0, 1.0)); break;
+            }
+        }
+    }
+
+    void put_leaf(WedgeId w, Index leaf) {
+        out_.normals[w] = PackedNormal::nearest(mesh_.normals[leaf]);
+        if (!mesh_.uvs.empty()) out_.uvs[w] = mesh_.uvs[leaf];
+        if (!mesh_.colours.empty()) out_.colours[w] = mesh_.colours[leaf];
+    }
+
+    static constexpr Index none = 0xffffffffu;
+
+    const TreeShape& shape_;
+    const TreeParts& parts_;
+    std::span<const glm::vec3> positions_;
+    const LeafMesh& mesh_;
+    NodeId interior_;
+    bool splits_; // nodes may have several wedges
+    glm::dvec3 centre_{0};
+    double scale_ = 1; // mesh units to the unit box
+    std::vector<Class> classes_;
+
+    std::vector<Index> places_;               // by leaf; empty: the same
+    std::vector<Index> start_, around_;       // triangles by leaf
+    std::vector<Index> first_join_, joining_; // triangles by the node at which their third corner joins the others
+    std::vector<Index> root_, local_, last_;  // by leaf
+
+    std::atomic<std::size_t> used_spaces_ = 0;
+    std::vector<std::unique_ptr<Workspace>> spaces_; // a part each
+    std::vector<NodeState*> states_; // by interior node, and so on; of those whose parents are still to come
+    std::vector<Index> counts_;
+    std::vector<std::pair<Index, std::uint16_t>> values_at_; // where the values of its wedges begin, and in which space
+    std::vector<std::unique_ptr<Index[]>> parents_below_;    // of several wedges: which of them each child's has become
+
+    std::vector<WedgeId> by_rank_; // by wedge: its number before sorting; empty: the same
+    WedgeArrays out_;
+};
+
+} // namespace
+
+WedgeArrays find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
+                        const LeafMesh& mesh, const Ancestors& ancestors) {
+    return WedgeFinder(shape, parts, positions, mesh, ancestors).run();
+}
+
+} // namespace unseen::vdtree
