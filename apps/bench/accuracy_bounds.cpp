@@ -96,7 +96,7 @@ public:
         ring.sphere = tree_.bounds()[node].ring;
         for (const Index t : triangles) {
             const auto corner = [&](std::size_t k) {
-                return glm::dvec3(tree_.positions()[tree_.interior_count() + tree_.triangles()[t][k]]);
+                return glm::dvec3(tree_.positions()[tree_.wedge_of_leaf(tree_.triangles()[t][k])]);
             };
             const glm::dvec3 n = glm::cross(corner(1) - corner(0), corner(2) - corner(0));
             const double length = glm::length(n);
@@ -262,7 +262,8 @@ public:
         for (const NodeId node : nodes_) {
             std::vector<glm::dvec3>& set = sets_.emplace_back();
             for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf)
-                set.emplace_back(tree.positions()[tree.interior_count() + leaf]);
+                if (const NodeId place = tree.place_of_leaf(leaf); tree.wedge_of_leaf(leaf) == tree.first_wedge(place))
+                    set.emplace_back(tree.position(place));
             points_in_all_ += set.size();
         }
     }
@@ -295,9 +296,9 @@ public:
         for (std::size_t i = 0; i < nodes_.size(); i += lanes) {
             const std::size_t used = std::min(lanes, nodes_.size() - i);
             for (std::size_t lane = 0; lane < used; ++lane) {
-                balls.begin(lane, tree_.positions()[nodes_[i + lane]]);
+                balls.begin(lane, tree_.position(nodes_[i + lane]));
                 tree_.for_each_child(nodes_[i + lane], [&](NodeId child) {
-                    if (tree_.is_leaf(child)) balls.add(lane, tree_.positions()[child]);
+                    if (tree_.is_place(child)) balls.add(lane, tree_.position(child));
                     else balls.add(lane, tree_.support_spheres()[child]);
                 });
             }

@@ -15,7 +15,7 @@ namespace unseen::app {
 namespace {
 
 using perception::FoldModel;
-using vdtree::NodeId;
+using vdtree::WedgeId;
 
 // Where the viewer looks, from the window's centre; 0: at everything.
 constexpr auto aside_degrees = FoldModel::needed_at_degrees;
@@ -75,11 +75,11 @@ void judge_all(JudgedModel& model, const std::vector<vdtree::DistanceCriterion>&
     session::Session& session = model.session(FoldTest::error);
     const session::CutRecipe recipe = require(session.recipe(
         model.view(), {.fold_test = FoldTest::error, .purpose = session::Purpose::picture})); // but for its criterion
-    std::vector<std::pair<std::vector<NodeId>, session::PictureVerdict>> known;
+    std::vector<std::pair<std::vector<WedgeId>, session::PictureVerdict>> known;
     for (std::size_t i = 0; i < settings.size(); ++i) {
         vdtree::Cut cut(session.tree());
         require(cut.follow(criteria[i], recipe.viewpoint, recipe.options));
-        const std::span<const NodeId> indices = cut.indices();
+        const std::span<const WedgeId> indices = cut.indices();
         auto shown =
             std::ranges::find_if(known, [&](const auto& one) { return std::ranges::equal(one.first, indices); });
         if (shown == known.end())

@@ -20,7 +20,7 @@ public:
     explicit PlainCut(const unseen::vdtree::VertexTree& tree) {
         glCreateVertexArrays(1, &array_);
         glCreateBuffers(3, buffers_);
-        // By node: a triangle's numbers lead into these, whatever the cut. Positions are relative to tree.origin().
+        // By wedge: a triangle's numbers lead into these, whatever the cut. Positions are relative to tree.origin().
         const auto positions = tree.positions();
         glNamedBufferStorage(positions_, static_cast<GLsizeiptr>(positions.size_bytes()), positions.data(), 0);
         const auto luminance = tree.luminance(); // 16 bits, 0 to 1, lit by the tree's light
@@ -79,7 +79,7 @@ public:
     }
 
 private:
-    std::size_t send(std::span<const unseen::vdtree::NodeId> indices, std::size_t first, std::size_t end) {
+    std::size_t send(std::span<const unseen::vdtree::WedgeId> indices, std::size_t first, std::size_t end) {
         const std::size_t size = sizeof(GLuint), bytes = (end - first) * size;
         if (bytes > 0)
             glNamedBufferSubData(indices_, static_cast<GLintptr>(first * size), static_cast<GLsizeiptr>(bytes),

@@ -155,7 +155,7 @@ constexpr glm::vec3 too_much{0.9f, 0.15f, 0.1f}, unfolded{0.45f}, background{0};
 
 struct Corner {
     glm::dvec3 place; // right, up, depth from the eye
-    NodeId node;
+    NodeId node;      // whose vertex it is
 };
 
 // What lies beyond a plane close before the eye: a polygon of up to four corners. New corners are those of the nearer
@@ -183,6 +183,7 @@ public:
           nearness_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0),
           nodes_(nearness_.size(), vdtree::no_node) {
         nearest_ = 1e-6 * std::max(session.bounding_sphere().radius, std::numeric_limits<double>::min());
+        for (NodeId node = 0; node < tree_.node_count(); ++node) node_of_wedge_.resize(tree_.wedge_end(node), node);
     }
 
     void draw(const vdtree::Cut& cut) {
@@ -201,10 +202,10 @@ private:
         return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
     }
 
-    Corner corner(NodeId node) const {
-        const glm::dvec3 from_eye = placement_.to_world(tree_.origin() + glm::dvec3(tree_.positions()[node])) - eye_;
+    Corner corner(vdtree::WedgeId wedge) const {
+        const glm::dvec3 from_eye = placement_.to_world(tree_.origin() + glm::dvec3(tree_.positions()[wedge])) - eye_;
         return {{glm::dot(from_eye, frame_.right), glm::dot(from_eye, frame_.up), -glm::dot(from_eye, frame_.back)},
-                node};
+                node_of_wedge_[wedge]};
     }
 
     void draw(const std::array<Corner, 3>& corners) {
@@ -244,7 +245,8 @@ private:
     const vdtree::Similarity& placement_;
     double focal_px_, nearest_ = 0;
     std::vector<double> nearness_;
-    std::vector<NodeId> nodes_;
+    std::vector<NodeId> nodes_; // by pixel
+    std::vector<NodeId> node_of_wedge_;
 };
 
 // ---- the scale below

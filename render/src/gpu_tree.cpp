@@ -135,9 +135,9 @@ Result<void> GpuTree::Impl::need_mover() {
 Result<void> GpuTree::Impl::need_lit_vertices() {
     if (lit_vertices) return {};
     std::vector<LitVertex> made;
-    made.reserve(tree.node_count());
-    for (vdtree::NodeId node = 0; node < tree.node_count(); ++node)
-        made.push_back({tree.normals()[node], vdtree::albedo_of(tree, node)});
+    made.reserve(tree.wedge_count());
+    for (vdtree::WedgeId wedge = 0; wedge < tree.wedge_count(); ++wedge)
+        made.push_back({tree.normals()[wedge], vdtree::albedo_of(tree, wedge)});
     Buffer buffer = Buffer::create("vertices under lights");
     glNamedBufferStorage(buffer.id(),
                          static_cast<GLsizeiptr>(std::max<std::size_t>(made.size(), 1) * sizeof(LitVertex)),
@@ -193,7 +193,7 @@ Result<void> GpuCut::Impl::follow(const vdtree::Cut& cut, std::span<const vdtree
     glides.version = moved.empty() ? 0 : ++of.last_version;
     for (const vdtree::MovedVertex& vertex : moved) {
         const glm::vec4* const colour = of.tree.colours().empty() ? nullptr : &vertex.colour;
-        glides.moves.push_back({vertex.node, vertex_of(of.frame, vertex.position, vertex.luminance, colour)});
+        glides.moves.push_back({vertex.wedge, vertex_of(of.frame, vertex.position, vertex.luminance, colour)});
         box.include(glides.moves.back().to.position);
     }
     return updated;

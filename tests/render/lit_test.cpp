@@ -78,8 +78,8 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
     const Lighting lighting = lights().lighting;
     int compared = 0;
     for (vdtree::Index leaf = 0; leaf < tree.leaf_count(); leaf += 5) {
-        const vdtree::NodeId node = tree.interior_count() + leaf;
-        const glm::dvec3 position(tree.positions()[node]), normal(glm::vec3(tree.normals()[node]));
+        const vdtree::WedgeId wedge = tree.wedge_of_leaf(leaf);
+        const glm::dvec3 position(tree.positions()[wedge]), normal(glm::vec3(tree.normals()[wedge]));
         View view;
         view.width = view.height = 1;
         view.fov_y_degrees = 1e-4; // a hair around the vertex
@@ -91,7 +91,7 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
         options.lighting = lighting;
         const auto frame = require(renderer->draw(cut, view, options));
         const double expected = vdtree::lit_luminance(
-            lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, node)), view.eye - tree.origin());
+            lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, wedge)), view.eye - tree.origin());
         EXPECT_NEAR(frame->luminance[0], expected, 1e-4) << lights().name << ", leaf " << leaf;
         const glm::dvec3 rgb(frame->colour[0], frame->colour[1], frame->colour[2]);
         EXPECT_NEAR(glm::dot(rgb, glm::dvec3(0.2126, 0.7152, 0.0722)), expected, 1e-4)

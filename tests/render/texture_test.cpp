@@ -229,7 +229,7 @@ TEST_F(Textured, AreBoundedUnderLights) {
             vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
         for (vdtree::Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node];
              ++leaf) {
-            const vdtree::NodeId vertex = tree.interior_count() + leaf;
+            const vdtree::WedgeId vertex = tree.wedge_of_leaf(leaf);
             const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])),
                 rgb(tree.colours()[vertex]);
             const double light = vdtree::lit_luminance(dull, p, n, 1, eye),
