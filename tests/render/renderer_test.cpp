@@ -540,6 +540,74 @@ TEST_F(RendererTest, FollowsTheCutAsItChanges) {
     EXPECT_EQ(require(renderer->draw(scene.cut, view))->luminance, full->luminance);
 }
 
+// Where a picture of faces of one luminance each is the same for five pixels all around, another one must be so, too:
+// nothing is torn open, and no face has anything of another one.
+void expect_the_same_away_from_edges(const Frame& full, const Frame& other, const std::string& what) {
+    constexpr int around = 5;
+    int compared = 0, differing = 0;
+    for (int row = around; row + around < full.height; ++row)
+        for (int column = around; column + around < full.width; ++column) {
+            const float expected = at(full, column, row);
+            bool is_inside = true;
+            for (int y = row - around; y <= row + around; ++y)
+                for (int x = column - around; x <= column + around; ++x) is_inside &= at(full, x, y) == expected;
+            if (!is_inside) continue;
+            ++compared;
+            differing += !(std::abs(at(other, column, row) - expected) <= 1e-3f);
+        }
+    EXPECT_GT(compared, full.width * full.height / 2) << what;
+    EXPECT_EQ(differing, 0) << what << ": of " << compared << " pixels";
+}
+
+// Half of the cube, a tenth of it, and cuts that are fine on one side and coarse on the other; as they are, gliding, and
+// under lights.
+TEST_F(RendererTest, SidesOfSeamsStayApart) {
+    Mesh mesh = cube(true, 24);
+    for (std::size_t v = 0; v < mesh.positions.size(); v += 4) {
+        const auto p = [&](std::size_t i) { return mesh.positions[v + i]; };
+        mesh.normals.insert(mesh.normals.end(), 4, glm::normalize(glm::cross(p(1) - p(0), p(2) - p(0))));
+    }
+    unseen::vdtree::BuildOptions how;
+    how.prelit = true;
+    const auto tree = std::move(*require(unseen::vdtree::build_tree(mesh.view(), how)));
+    ASSERT_TRUE(tree.has_seams());
+    ASSERT_EQ(tree.place_count(), 24u * 24 * 6 + 2);
+    View view = frontal_view(160, 160);
+    view.eye = {2.2, 2.6, 3};
+    unseen::vdtree::Lighting lighting;
+    lighting.ambient = 0.1;
+    lighting.lights.resize(1);
+    lighting.lights[0].direction = glm::normalize(glm::dvec3(0.3, 0.7, 0.6));
+    lighting.lights[0].intensity = 0.8;
+    DrawOptions options[2];
+    options[0].samples = options[1].samples = 1;
+    options[1].lighting = lighting;
+    auto renderer = require(Renderer::create(context(), tree));
+    Cut cut(tree);
+    cut.unfold_all();
+    const Frame full[] = {std::move(*require(renderer->draw(cut, view, options[0]))),
+                          std::move(*require(renderer->draw(cut, view, options[1])))};
+    auto gliding = require(unseen::vdtree::Geomorph::create(tree, 1, 1));
+    ASSERT_TRUE(gliding->step(cut, 0));
+    const unseen::vdtree::Index all = tree.triangle_count();
+    for (const bool is_uneven : {false, true})
+        for (const unseen::vdtree::Index budget : {all / 2, all / 10}) {
+            const auto wanted = require(unseen::vdtree::extent_criterion(tree, view, 1));
+            const glm::dvec3 eye = is_uneven ? glm::dvec3(1.2, 0.9, 0.8) : view.eye * 50.0;
+            ASSERT_TRUE(cut.follow(*wanted, {.eye = eye - tree.origin()}, {.triangle_budget = budget}));
+            const std::string what = std::to_string(cut.triangle_count()) + (is_uneven ? " unevenly" : "");
+            for (int lit = 0; lit < 2; ++lit)
+                expect_the_same_away_from_edges(full[lit], *require(renderer->draw(cut, view, options[lit])),
+                                                what + (lit ? ", lit" : ""));
+            for (int step = 0; step < 3; ++step) {
+                ASSERT_TRUE(gliding->step(cut, step * 0.5));
+                EXPECT_EQ(gliding->is_gliding(), step < 2);
+                expect_the_same_away_from_edges(full[0], *require(renderer->draw(*gliding, view, options[0])),
+                                                what + ", gliding");
+            }
+        }
+}
+
 TEST_F(RendererTest, MeasuresTheTimeOfDrawing) {
     const Scene scene(bumpy_sphere(30));
     View view = frontal_view(64, 64);

@@ -48,22 +48,25 @@ inline Mesh triangle(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c, float at_a, float
     return mesh;
 }
 
-// The closed cube [-1, 1]^3, each face in a luminance of its own, 0.2 to 0.7; `outward`: oriented to the outside.
-inline Mesh cube(bool outward = true) {
+// The closed cube [-1, 1]^3, each face in a luminance of its own, 0.2 to 0.7, of n x n rectangles; `outward`: oriented to
+// the outside.
+inline Mesh cube(bool outward = true, int n = 1) {
     Mesh mesh;
     for (int axis = 0; axis < 3; ++axis)
         for (double side : {-1.0, 1.0}) {
-            std::array<glm::dvec3, 4> corners;
-            const std::array<glm::dvec2, 4> square = {glm::dvec2(-1, -1), glm::dvec2(1, -1), glm::dvec2(1, 1),
-                                                      glm::dvec2(-1, 1)};
-            for (std::size_t i = 0; i < 4; ++i) {
-                corners[i][axis] = side;
-                corners[i][(axis + 1) % 3] = square[i].x;
-                corners[i][(axis + 2) % 3] = square[i].y;
+            const glm::vec4 colour = grey(0.2f + 0.1f * static_cast<float>(2 * axis + (side > 0 ? 1 : 0)));
+            for (int cell = 0; cell < n * n; ++cell) {
+                const glm::dvec2 low(cell % n, cell / n);
+                std::array<glm::dvec2, 4> square = {low, low + glm::dvec2(1, 0), low + 1.0, low + glm::dvec2(0, 1)};
+                if ((side < 0) == outward) std::swap(square[1], square[3]);
+                std::array<glm::dvec3, 4> corners;
+                for (std::size_t i = 0; i < 4; ++i) {
+                    corners[i][axis] = side;
+                    corners[i][(axis + 1) % 3] = 2 * square[i].x / n - 1;
+                    corners[i][(axis + 2) % 3] = 2 * square[i].y / n - 1;
+                }
+                add_quad(mesh, corners, {colour, colour, colour, colour});
             }
-            if ((side < 0) == outward) std::swap(corners[1], corners[3]);
-            const float luminance = 0.2f + 0.1f * static_cast<float>(2 * axis + (side > 0 ? 1 : 0));
-            add_quad(mesh, corners, {grey(luminance), grey(luminance), grey(luminance), grey(luminance)});
         }
     return mesh;
 }
