@@ -6,30 +6,46 @@
 
 #include <unseen/vdtree/builder.h>
 
+#include "build/leaves.h"
 #include "build/surface.h"
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::support {
 
-// What build_tree() would hand to a clusterer. The mesh must stay; it has no degenerate triangles or unused vertices.
+// What build_tree() would hand to a clusterer. The mesh must stay.
 struct ClusteringTask {
     explicit ClusteringTask(const vdtree::Mesh& mesh)
-        : view(mesh.view()), coincident(vdtree::find_coincident(view.positions)),
-          surface(vdtree::analyse_surface(view, coincident)) {
-        for (std::size_t v = 0; v < view.positions.size(); ++v)
-            luminance.push_back(vdtree::vertex_luminance(surface.normals[v],
-                                                         view.colours.empty() ? nullptr : &view.colours[v], {}, false));
+        : view(mesh.view()), places(view), surface(vdtree::analyse_surface(places.mesh())) {
+        places.find_leaves(surface.normals, 1);
+        for (vdtree::Index leaf = 0; leaf < places.leaf_count(); ++leaf) {
+            const vdtree::Index v = places.sources()[leaf];
+            if (!view.colours.empty()) colours.push_back(view.colours[v]);
+            if (!view.uvs.empty()) uvs.push_back(view.uvs[v]);
+            luminance.push_back(vdtree::vertex_luminance(places.normals()[leaf],
+                                                         colours.empty() ? nullptr : &colours.back(), {}, false));
+        }
+        for (vdtree::Index place = 0; place < places.mesh().positions.size(); ++place)
+            place_luminance.push_back(luminance[places.first_leaf(place)]);
     }
-    vdtree::ClusterInput input() const { return {view, luminance, surface.normals, surface.areas, coincident}; }
+    vdtree::ClusterInput input() const {
+        return {places.mesh(),
+                place_luminance,
+                surface.normals,
+                surface.areas,
+                {places.triangles(), places.places(), luminance, places.normals(), colours, uvs, places.materials(),
+                 !view.normals.empty()}};
+    }
 
     vdtree::MeshView view;
-    std::vector<vdtree::Index> coincident;
+    vdtree::PlaceMesh places;
     vdtree::Surface surface;
-    std::vector<float> luminance;
+    std::vector<float> luminance, place_luminance;
+    std::vector<glm::vec4> colours;
+    std::vector<glm::vec2> uvs;
 };
 
 // The mesh with every cluster that deviates by at most `deviation` folded.
-inline vdtree::Mesh folded(const vdtree::Mesh& mesh, const vdtree::Clustering& clustering, float deviation) {
+inline vdtree::Mesh folded(const vdtree::MeshView& mesh, const vdtree::Clustering& clustering, float deviation) {
     using vdtree::Index;
     const std::size_t vertices = mesh.positions.size(), clusters = clustering.parents.size();
     std::vector<Index> stands_for(clusters);
@@ -39,7 +55,7 @@ inline vdtree::Mesh folded(const vdtree::Mesh& mesh, const vdtree::Clustering& c
         stands_for[c] = folds ? stands_for[parent] : static_cast<Index>(c);
     }
     vdtree::Mesh out;
-    out.positions = mesh.positions;
+    out.positions.assign(mesh.positions.begin(), mesh.positions.end());
     out.positions.insert(out.positions.end(), clustering.positions.begin(), clustering.positions.end());
     for (const vdtree::Triangle& t : mesh.triangles) {
         const vdtree::Triangle now = {stands_for[t[0]], stands_for[t[1]], stands_for[t[2]]};
@@ -49,7 +65,7 @@ inline vdtree::Mesh folded(const vdtree::Mesh& mesh, const vdtree::Clustering& c
 }
 
 // The mesh of the least deviation with at most so many triangles.
-inline vdtree::Mesh simplified_by_deviation(const vdtree::Mesh& mesh, const vdtree::Clustering& clustering,
+inline vdtree::Mesh simplified_by_deviation(const vdtree::MeshView& mesh, const vdtree::Clustering& clustering,
                                             std::size_t triangles) {
     std::vector<float> levels = clustering.deviations;
     std::sort(levels.begin(), levels.end());

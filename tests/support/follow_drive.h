@@ -184,7 +184,7 @@ private:
             viewpoint_.eye = glm::dvec3(sphere.centre) + radius * std::pow(10.0, in_.between(-2, 6)) * in_.direction();
             break;
         case 1:
-            viewpoint_.eye = glm::dvec3(tree_->positions()[in_.below(tree_->node_count())]);
+            viewpoint_.eye = glm::dvec3(tree_->position(in_.below(tree_->node_count())));
             break; // where a vertex is
         case 2: viewpoint_.eye = {1e18 * in_.share() * 0.5, 0, 0}; break;
         case 3: break; // stands still

@@ -375,7 +375,6 @@ inline std::vector<Named> all() {
         {"two_parts", two_parts()},
         {"seam", seam(false)},
         {"coloured_seam", seam(true)},
-        {"all_coincident", all_coincident(6)},
         {"zero_areas", with_zero_areas()},
         {"unreferenced", with_unreferenced(icosphere(1))},
         {"one_unreferenced", with_unreferenced(single_triangle(), 1)},

@@ -7,12 +7,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/normal_mask.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "shapes.h"
@@ -42,6 +44,14 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
     if (!same_bytes(support::sound(a).first_triangle(), support::sound(b).first_triangle())) return "first_triangle";
     if (!same_bytes(support::sound(a).triangles(), support::sound(b).triangles())) return "triangles";
     if (a.origin() != b.origin()) return "origin";
+    const auto differs = [&](auto array) {
+        const auto &of_a = *a.data().geometry.*array, &of_b = *b.data().geometry.*array;
+        return !std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
+    };
+    using vdtree::TreeGeometry;
+    if (differs(&TreeGeometry::first_wedge)) return "first_wedge";
+    if (differs(&TreeGeometry::leaf_places)) return "leaf_places";
+    if (differs(&TreeGeometry::wedge_ranks)) return "wedge_ranks";
     if (!same_bytes(a.positions(), b.positions())) return "positions";
     if (!same_bytes(a.luminance(), b.luminance())) return "luminance";
     if (!same_bytes(a.normals(), b.normals())) return "normals";
@@ -74,10 +84,43 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
     return {};
 }
 
+// The leaves under any node, places included.
+inline Index first_leaf_of(const VertexTree& tree, NodeId node) {
+    if (tree.is_place(node)) return tree.first_wedge(node) - tree.interior_wedge_count();
+    return sound(tree).first_leaf()[node];
+}
+inline Index leaf_end_of(const VertexTree& tree, NodeId node) {
+    if (tree.is_place(node)) return tree.wedge_end(node) - tree.interior_wedge_count();
+    return sound(tree).leaf_end()[node];
+}
+
+// By vertex: the first one with the same position and attributes.
+inline std::vector<Index> first_equal_vertices(const MeshView& mesh) {
+    std::map<std::vector<double>, Index> first;
+    std::vector<Index> equal;
+    for (Index v = 0; v < mesh.positions.size(); ++v) {
+        std::vector<double> key;
+        const auto add = [&](const auto& value) {
+            for (int k = 0; k < value.length(); ++k) key.push_back(static_cast<double>(value[k]) + 0.0);
+        };
+        add(mesh.positions[v]);
+        if (!mesh.normals.empty()) add(mesh.normals[v]);
+        if (!mesh.uvs.empty()) add(mesh.uvs[v]);
+        if (!mesh.colours.empty()) add(mesh.colours[v]);
+        equal.push_back(first.try_emplace(key, v).first->second);
+    }
+    return equal;
+}
+
+inline bool has_three_places(const MeshView& mesh, const Triangle& t) {
+    const auto &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    return a != b && b != c && c != a;
+}
+
 // Pre-order numbers, contiguous leaves and subtrees, children that tile their parent.
 inline std::string fault_in_structure(const VertexTree& tree) {
     const NodeId interior = tree.interior_count();
-    if (tree.node_count() != interior + tree.leaf_count()) return "node_count";
+    if (tree.node_count() != interior + tree.place_count()) return "node_count";
     if (support::sound(tree).parents().size() != tree.node_count()) return "parents has another length";
     if (support::sound(tree).parents()[0] != no_node) return "the root has a parent";
     if (support::sound(tree).first_leaf()[0] != 0 || support::sound(tree).leaf_end()[0] != tree.leaf_count())
@@ -88,10 +131,12 @@ inline std::string fault_in_structure(const VertexTree& tree) {
         const NodeId parent = support::sound(tree).parents()[node];
         if (parent >= interior) return "node " + std::to_string(node) + " has no interior parent";
         ++children[parent];
-        if (tree.is_leaf(node)) {
-            const Index leaf = node - interior;
-            if (leaf < support::sound(tree).first_leaf()[parent] || leaf >= support::sound(tree).leaf_end()[parent])
-                return "leaf " + std::to_string(leaf) + " is outside of its parent's leaves";
+        if (tree.is_place(node)) {
+            if (tree.wedge_end(node) <= tree.first_wedge(node)) return "place " + std::to_string(node) + " has no leaf";
+            for (Index leaf = first_leaf_of(tree, node); leaf < leaf_end_of(tree, node); ++leaf)
+                if (leaf < support::sound(tree).first_leaf()[parent] ||
+                    leaf >= support::sound(tree).leaf_end()[parent] || tree.place_of_leaf(leaf) != node)
+                    return "leaf " + std::to_string(leaf) + " is outside of its parent's leaves";
             continue;
         }
         if (parent >= node) return "node " + std::to_string(node) + " comes before its parent";
@@ -109,10 +154,9 @@ inline std::string fault_in_structure(const VertexTree& tree) {
         bool ordered = true;
         tree.for_each_child(node, [&](NodeId child) {
             ++visited;
-            const bool leaf = tree.is_leaf(child);
             ordered &= support::sound(tree).parents()[child] == node;
-            ordered &= (leaf ? child - interior : support::sound(tree).first_leaf()[child]) == next_leaf;
-            next_leaf = leaf ? next_leaf + 1 : support::sound(tree).leaf_end()[child];
+            ordered &= first_leaf_of(tree, child) == next_leaf;
+            next_leaf = leaf_end_of(tree, child);
         });
         if (!ordered || visited != children[node] || next_leaf != support::sound(tree).leaf_end()[node])
             return "the children of node " + std::to_string(node) + " do not tile its leaves";
@@ -134,23 +178,20 @@ inline double position_tolerance(const MeshView& mesh, glm::dvec3 origin, int ax
            (static_cast<double>(std::nextafter(f, std::numeric_limits<float>::infinity())) - static_cast<double>(f));
 }
 
-// That a fully unfolded cut is the input: the same triangles over the same vertices in the same orientation, each
-// once, but for those that use a vertex twice; and the same positions, exactly where the input is in floats.
+// That a fully unfolded cut is the input: the same triangles over equal vertices in the same orientation, each once, but
+// for those with two corners at one position; and the same positions, exactly where the input is in floats.
 inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& mesh) {
-    const NodeId interior = tree.interior_count();
-    if (tree.leaf_count() != mesh.positions.size()) return "not every vertex is a leaf";
-    std::vector<std::uint8_t> seen(mesh.positions.size(), 0);
-    for (const Index v : tree.source_vertices()) {
-        if (v >= seen.size() || seen[v]) return "source_vertices is no permutation";
-        seen[v] = 1;
-    }
+    if (tree.source_vertex_count() != mesh.positions.size()) return "not every vertex is counted";
+    const std::vector<Index> equal = first_equal_vertices(mesh);
+    for (const Index v : tree.source_vertices())
+        if (v >= equal.size()) return "a source vertex is out of range";
     bool floats = true;
     for (const glm::dvec3& p : mesh.positions) floats &= shapes::rounded_to_float(p) == p;
     glm::dvec3 tolerance(0);
     for (int axis = 0; axis < 3 && !floats; ++axis) tolerance[axis] = position_tolerance(mesh, tree.origin(), axis);
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const glm::dvec3 p = mesh.positions[tree.source_vertices()[leaf]];
-        const glm::dvec3 q = tree.origin() + glm::dvec3(tree.positions()[interior + leaf]);
+        const glm::dvec3 q = tree.origin() + glm::dvec3(tree.positions()[tree.wedge_of_leaf(leaf)]);
         for (int axis = 0; axis < 3; ++axis) {
             // The sum of origin and position is rounded to a double.
             const double rounding = floats ? 0 : std::abs(p[axis]) * std::numeric_limits<double>::epsilon();
@@ -162,25 +203,27 @@ inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& m
     Cut cut(tree);
     cut.unfold_all();
     std::uint64_t dropped = 0;
-    for (const Triangle& t : mesh.triangles) dropped += t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    for (const Triangle& t : mesh.triangles) dropped += !has_three_places(mesh, t);
     if (tree.dropped_triangles() != dropped) return "the dropped triangles are miscounted";
     if (cut.triangle_count() + dropped != mesh.triangles.size()) return "triangles are missing";
     const auto indices = cut.indices();
     if (indices.size() != std::size_t{3} * cut.triangle_count()) return "the index buffer has another length";
     std::vector<Triangle> drawn, expected;
     for (std::size_t i = 0; i < indices.size(); ++i) {
-        if (!tree.is_leaf(indices[i])) return "a proxy is left";
+        if (indices[i] < tree.interior_wedge_count()) return "a proxy is left";
         if (i % 3 == 0) drawn.emplace_back();
-        drawn.back()[i % 3] = tree.source_vertices()[indices[i] - interior];
+        drawn.back()[i % 3] = equal[tree.source_vertices()[indices[i] - tree.interior_wedge_count()]];
     }
     if (mesh.ranges.empty() != tree.source_triangles().empty()) return "source_triangles goes with the ranges";
     for (std::size_t t = 0; t < tree.source_triangles().size(); ++t) {
         const Index source = tree.source_triangles()[t];
         if (source >= mesh.triangles.size()) return "a source triangle is out of range";
-        if (drawn[t] != mesh.triangles[source]) return "triangle " + std::to_string(source) + " has other corners";
+        const Triangle& given = mesh.triangles[source];
+        if (drawn[t] != Triangle{equal[given[0]], equal[given[1]], equal[given[2]]})
+            return "triangle " + std::to_string(source) + " has other corners";
     }
     for (const Triangle& t : mesh.triangles)
-        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) expected.push_back(t);
+        if (has_three_places(mesh, t)) expected.push_back({equal[t[0]], equal[t[1]], equal[t[2]]});
     std::sort(drawn.begin(), drawn.end());
     std::sort(expected.begin(), expected.end());
     return drawn == expected ? "" : "other triangles are drawn";
@@ -197,16 +240,15 @@ inline std::vector<Triangle> sorted_triangles(const Cut& cut) {
 }
 
 // The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf;
-// a triangle is drawn iff its corners stand for three different active nodes; nothing is missed and nothing drawn
-// twice.
+// a triangle is drawn iff its corners stand for three different active nodes, by the wedges of these that hold its leaves;
+// nothing is missed and nothing drawn twice.
 inline std::string fault_in_cut(const Cut& cut) {
     const VertexTree& tree = cut.tree();
-    const NodeId interior = tree.interior_count();
     std::vector<NodeId> active_above(tree.node_count(), no_node); // the active node at or above
     for (NodeId node = 0; node < tree.node_count(); ++node) {
         const NodeId parent = support::sound(tree).parents()[node];
         const bool unfolded = cut.is_unfolded(node);
-        if (tree.is_leaf(node) && unfolded) return "a leaf is unfolded";
+        if (tree.is_place(node) && unfolded) return "a place is unfolded";
         if (unfolded && parent != no_node && !cut.is_unfolded(parent))
             return "node " + std::to_string(node) + " is unfolded under a folded one";
         const NodeId above = parent == no_node ? no_node : active_above[parent];
@@ -215,15 +257,18 @@ inline std::string fault_in_cut(const Cut& cut) {
             return "node " + std::to_string(node) + " is wrongly active or inactive";
     }
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-        if (active_above[interior + leaf] == no_node) return "leaf " + std::to_string(leaf) + " is not covered";
-        if (cut.proxy_of_leaf(leaf) != active_above[interior + leaf])
-            return "leaf " + std::to_string(leaf) + " has another proxy";
+        const NodeId active = active_above[tree.place_of_leaf(leaf)];
+        if (active == no_node) return "leaf " + std::to_string(leaf) + " is not covered";
+        if (cut.proxy_of_leaf(leaf) != active) return "leaf " + std::to_string(leaf) + " has another proxy";
     }
     std::vector<Triangle> expected;
     for (const Triangle& t : support::sound(tree).triangles()) {
-        const Triangle now = {active_above[interior + t[0]], active_above[interior + t[1]],
-                              active_above[interior + t[2]]};
-        if (now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) expected.push_back(now);
+        Triangle now, drawn;
+        for (std::size_t k = 0; k < 3; ++k) {
+            now[k] = active_above[tree.place_of_leaf(t[k])];
+            drawn[k] = tree.wedge_at(now[k], t[k]);
+        }
+        if (!vdtree::uses_a_vertex_twice(now)) expected.push_back(drawn);
     }
     if (cut.indices().size() != std::size_t{3} * cut.triangle_count()) return "the index buffer has another length";
     std::sort(expected.begin(), expected.end());

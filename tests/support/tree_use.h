@@ -38,7 +38,7 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     for (NodeId node = 0; node < tree.node_count(); node += 1 + tree.node_count() / 16) {
         cut.unfold_ancestors(node);
         (void)cut.is_active(node);
-        if (!tree.is_leaf(node)) (void)tree.mask(node);
+        if (!tree.is_place(node)) (void)tree.mask(node);
     }
     extract();
     const View view{.eye = {1, 2, 3}};
@@ -52,7 +52,7 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
             .has_value();
     extract();
     const auto bright_ones = [](const VertexTree& of, std::span<const NodeId> nodes, std::span<float> costs) {
-        for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = 4 * of.luminance()[nodes[i]];
+        for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = 4 * of.luminance()[of.first_wedge(nodes[i])];
     };
     cut.adjust(bright_ones);
     extract();

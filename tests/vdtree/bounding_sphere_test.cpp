@@ -256,16 +256,16 @@ Tightness measure(const VertexTree& tree) {
         result.worst = std::max(result.worst, sphere.radius / smallest);
         ++count;
     };
-    const auto add = [&](NodeId node) { region.emplace_back(tree.positions()[node]); };
+    const auto add = [&](NodeId node) { region.emplace_back(tree.position(node)); };
     for (NodeId node = 0; node < interior; ++node) {
         region.clear();
         for (NodeId below = node; below < support::sound(tree).subtree_end()[node]; ++below) add(below);
         for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node]; ++leaf)
-            add(interior + leaf);
+            add(tree.place_of_leaf(leaf));
         ratio(tree.support_spheres()[node], result.support, supports);
         for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node]; ++leaf)
             for (const Index t : around[leaf])
-                for (const Index corner : support::sound(tree).triangles()[t]) add(interior + corner);
+                for (const Index corner : support::sound(tree).triangles()[t]) add(tree.place_of_leaf(corner));
         ratio(tree.bounds()[node].ring, result.ring, rings);
     }
     result.support /= supports;

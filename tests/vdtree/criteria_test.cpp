@@ -191,12 +191,12 @@ TEST(Displacement, IsNotExceededByAnyVertex) {
             const auto costs = costs_of(displacement_criterion, tree, view, tolerance);
             const glm::dvec3 eye = eye_in_tree(tree, view, {});
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
-                const glm::dvec3 to = glm::normalize(glm::dvec3(tree.positions()[node]) - eye);
+                const glm::dvec3 to = glm::normalize(glm::dvec3(tree.position(node)) - eye);
                 double widest = 0;
                 for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node];
                      ++leaf) {
                     const glm::dvec3 from =
-                        glm::normalize(glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - eye);
+                        glm::normalize(glm::dvec3(tree.positions()[tree.wedge_of_leaf(leaf)]) - eye);
                     widest = std::max(widest, 2 * std::asin(std::min(1.0, glm::distance(from, to) / 2)));
                 }
                 const double pixels = widest * pixels_per_radian(view);
@@ -606,7 +606,7 @@ TEST(FrustumOf, HoldsAllThatShowsOffCentreAndInParallel) {
         const View view = i % 2 == 0 ? shifted(centred, random) : parallel(centred, random, radius);
         const Frustum frustum = frustum_of(tree, view);
         for (int k = 0; k < 40; ++k) {
-            const glm::dvec3 point = tree.origin() + glm::dvec3(tree.positions()[random() % tree.node_count()]);
+            const glm::dvec3 point = tree.origin() + glm::dvec3(tree.position(static_cast<NodeId>(random() % tree.node_count())));
             double lowest = 1e300;
             for (const Plane& plane : frustum)
                 lowest = std::min(lowest, glm::dot(plane.normal, point - tree.origin()) + plane.offset);
@@ -675,7 +675,7 @@ TEST(Orthographic, TakesAllOutlinesForOutlines) {
             glm::dvec3 corner[3];
             for (int k = 0; k < 3; ++k)
                 corner[k] =
-                    glm::dvec3(tree.positions()[support::sound(tree).triangles()[t][k] + tree.interior_count()]);
+                    glm::dvec3(tree.positions()[tree.wedge_of_leaf(support::sound(tree).triangles()[t][k])]);
             const double facing = glm::dot(glm::cross(corner[1] - corner[0], corner[2] - corner[0]), back);
             for (int k = 0; k < 3; ++k)
                 for (NodeId node =

@@ -125,8 +125,8 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     EXPECT_LT(half.triangle_count(), 0.65 * whole.triangle_count());
     EXPECT_GT(half.triangle_count(), 0.45 * whole.triangle_count());
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-        const NodeId vertex = tree.interior_count() + leaf;
-        if (tree.positions()[vertex].x + tree.origin().x > 0.05) ASSERT_TRUE(half.is_active(vertex)) << leaf;
+        const NodeId place = tree.place_of_leaf(leaf);
+        if (tree.position(place).x + tree.origin().x > 0.05) ASSERT_TRUE(half.is_active(place)) << leaf;
     }
 }
 

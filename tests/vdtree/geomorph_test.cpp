@@ -67,18 +67,21 @@ private:
 // What stands for each leaf, as it is drawn.
 std::vector<MovedVertex> drawn_by_leaf(const Geomorph& geomorph) {
     const VertexTree& tree = geomorph.drawn().tree();
-    std::map<NodeId, MovedVertex> moved;
-    for (const MovedVertex& vertex : geomorph.moved()) moved[vertex.node] = vertex;
+    std::map<WedgeId, MovedVertex> moved;
+    for (const MovedVertex& vertex : geomorph.moved()) moved[vertex.wedge] = vertex;
     EXPECT_EQ(moved.size(), geomorph.moved().size()) << "each once";
     std::vector<MovedVertex> out;
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-        const NodeId node = geomorph.drawn().proxy_of_leaf(leaf);
-        const auto found = moved.find(node);
-        out.push_back(found != moved.end()
-                          ? found->second
-                          : MovedVertex{node, tree.positions()[node], tree.luminance()[node], tree.colours()[node]});
+        const WedgeId w = geomorph.drawn().wedge_of_leaf(leaf);
+        const auto found = moved.find(w);
+        if (found == moved.end())
+            out.push_back({w, tree.positions()[w], tree.luminance()[w], tree.colours()[w]});
+        else out.push_back(found->second);
     }
-    for (const auto& [node, vertex] : moved) EXPECT_TRUE(geomorph.drawn().is_active(node));
+    const auto is_drawn = [&](WedgeId w) {
+        return std::ranges::any_of(out, [&](const MovedVertex& vertex) { return vertex.wedge == w; });
+    };
+    for (const auto& [w, vertex] : moved) EXPECT_TRUE(is_drawn(w));
     return out;
 }
 
@@ -89,12 +92,12 @@ struct Longest {
 std::vector<Longest> longest_glides(const VertexTree& tree) {
     std::vector<Longest> out;
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-        std::vector<NodeId> chain;
-        for (NodeId node = tree.interior_count() + leaf; node != no_node; node = support::sound(tree).parents()[node])
-            chain.push_back(node);
+        std::vector<WedgeId> chain;
+        for (NodeId node = tree.place_of_leaf(leaf); node != no_node; node = support::sound(tree).parents()[node])
+            chain.push_back(tree.wedge_at(node, leaf));
         Longest longest;
-        for (const NodeId a : chain)
-            for (const NodeId b : chain) {
+        for (const WedgeId a : chain)
+            for (const WedgeId b : chain) {
                 longest.position = std::max(longest.position, glm::distance(tree.positions()[a], tree.positions()[b]));
                 longest.luminance = std::max(longest.luminance, std::abs(tree.luminance()[a] - tree.luminance()[b]));
             }
@@ -116,7 +119,7 @@ public:
     // Above a leaf.
     int count(const VertexTree& tree, Index leaf, double now) const {
         int nodes = 0;
-        for (NodeId node = support::sound(tree).parents()[tree.interior_count() + leaf]; node != no_node;
+        for (NodeId node = support::sound(tree).parents()[tree.place_of_leaf(leaf)]; node != no_node;
              node = support::sound(tree).parents()[node])
             nodes += now - when_[node] <= glide_seconds + 1e-6;
         return nodes;
@@ -280,7 +283,7 @@ protected:
     }
     MovedVertex drawn(NodeId vertex) const {
         for (const MovedVertex& moved : geomorph_.moved())
-            if (moved.node == vertex) return moved;
+            if (moved.wedge == vertex) return moved;
         return {vertex, tree_.positions()[vertex], tree_.luminance()[vertex], tree_.colours()[vertex]};
     }
     void pass(double seconds) { ASSERT_TRUE(geomorph_.step(cut_, seconds)); }

@@ -153,7 +153,7 @@ TEST(Lights, AtTheEndsOfWhatIsTakenMakeNumbers) {
 
 TEST(Lights, AtAVertexOrInsideAreRefused) {
     const VertexTree tree = std::move(*build_tree(shapes::torus(24, 12).view(), {.threads = 1}));
-    const glm::dvec3 vertex(tree.positions()[tree.interior_count()]);
+    const glm::dvec3 vertex(tree.positions()[tree.wedge_of_leaf(0)]);
     const auto complaint = [&](glm::dvec3 at) {
         const auto checked = check_lights(tree, lit_by(point(at, 1, 1)));
         return checked ? "" : checked.error().message;
@@ -209,7 +209,7 @@ struct Subject {
     std::string name;
     VertexTree tree;
     LightBounds bounds;
-    std::vector<std::vector<NodeId>> neighbours; // by leaf: nodes of leaves that it shares triangles with
+    std::vector<std::vector<WedgeId>> neighbours; // by leaf: nodes of leaves that it shares triangles with
 };
 
 const std::vector<Subject>& subjects() {
@@ -218,10 +218,10 @@ const std::vector<Subject>& subjects() {
         const auto add = [&](const char* name, const Mesh& mesh, ClustererKind kind) {
             VertexTree tree = std::move(*build_tree(mesh.view(), {.clusterer = kind, .threads = 1}));
             LightBounds bounds = std::move(*LightBounds::measure(tree));
-            std::vector<std::vector<NodeId>> neighbours(tree.leaf_count());
+            std::vector<std::vector<WedgeId>> neighbours(tree.leaf_count());
             for (const Triangle& t : support::sound(tree).triangles())
                 for (const Index a : t)
-                    for (const Index b : t) neighbours[a].push_back(tree.interior_count() + b);
+                    for (const Index b : t) neighbours[a].push_back(tree.wedge_of_leaf(b));
             made.push_back({name, std::move(tree), std::move(bounds), std::move(neighbours)});
         };
         add("bumpy sphere", shapes::bumpy_sphere(3, 0.03), ClustererKind::quadric);
@@ -249,12 +249,13 @@ Lighting hiding(Lighting lighting, std::uint64_t hidden) {
 }
 
 // All vertices that a fold of the node may show.
-std::vector<NodeId> vertices_of(const Subject& s, NodeId node) {
-    std::vector<NodeId> vertices;
-    for (NodeId below = node; below < support::sound(s.tree).subtree_end()[node]; ++below) vertices.push_back(below);
+std::vector<WedgeId> vertices_of(const Subject& s, NodeId node) {
+    std::vector<WedgeId> vertices;
+    for (NodeId below = node; below < support::sound(s.tree).subtree_end()[node]; ++below)
+        for (WedgeId w = s.tree.first_wedge(below); w < s.tree.wedge_end(below); ++w) vertices.push_back(w);
     for (Index leaf = support::sound(s.tree).first_leaf()[node]; leaf < support::sound(s.tree).leaf_end()[node];
          ++leaf) {
-        vertices.push_back(s.tree.interior_count() + leaf);
+        vertices.push_back(s.tree.wedge_of_leaf(leaf));
         vertices.insert(vertices.end(), s.neighbours[leaf].begin(), s.neighbours[leaf].end());
     }
     return vertices;
@@ -269,9 +270,7 @@ TEST(LightBounds, HoldEveryVertexOfRandomNodes) {
             const glm::dvec3 eye = random_eye(random, s.tree);
             const NodeId node = static_cast<NodeId>(random() % s.tree.interior_count());
             const LuminanceRange range = lit_range(lighting, s.bounds.cones()[node], s.tree.bounds()[node].ring, eye);
-            for (const NodeId v : vertices_of(s, node)) {
-                if (s.tree.is_leaf(v) && s.neighbours[v - s.tree.interior_count()].empty())
-                    continue; // drawn by no triangle
+            for (const WedgeId v : vertices_of(s, node)) {
                 const double y = lit_luminance(left, glm::dvec3(s.tree.positions()[v]),
                                                glm::dvec3(glm::vec3(s.tree.normals()[v])), albedo_of(s.tree, v), eye);
                 ASSERT_GE(y, range.lo) << s.name << ", trial " << trial << ", node " << node;

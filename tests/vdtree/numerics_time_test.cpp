@@ -96,7 +96,7 @@ std::vector<bool> naive_order(const VertexTree& tree, std::uint64_t budget, bool
         unfolded[node] = true;
         std::vector<NodeId> children;
         tree.for_each_child(node, [&](NodeId child) {
-            if (!tree.is_leaf(child)) children.push_back(child);
+            if (!tree.is_place(child)) children.push_back(child);
         });
         if (turned) std::ranges::reverse(children);
         for (const NodeId child : children) open.push({2.0f, child});
@@ -121,7 +121,7 @@ TEST(Numerics, MillionsOfEqualCosts) {
         if (used > budget) break;
         expected[node] = true;
         tree.for_each_child(node, [&](NodeId child) {
-            if (!tree.is_leaf(child)) open.push(child);
+            if (!tree.is_place(child)) open.push(child);
         });
     }
     const auto expect_expected = [&](const Cut& cut, const char* how) {

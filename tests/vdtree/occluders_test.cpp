@@ -19,7 +19,7 @@ double winding_number(const VertexTree& tree, glm::dvec3 at) {
     double sum = 0;
     for (const Triangle& t : support::sound(tree).triangles()) {
         glm::dvec3 p[3];
-        for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[tree.interior_count() + t[k]]) - at;
+        for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[tree.wedge_of_leaf(t[k])]) - at;
         const double a = glm::length(p[0]), b = glm::length(p[1]), c = glm::length(p[2]);
         sum +=
             2 * std::atan2(glm::dot(p[0], glm::cross(p[1], p[2])),
@@ -31,7 +31,7 @@ double winding_number(const VertexTree& tree, glm::dvec3 at) {
 double distance_from_surface(const VertexTree& tree, glm::dvec3 at) {
     double least = std::numeric_limits<double>::infinity();
     const auto corner = [&](const Triangle& t, std::size_t k) {
-        return glm::dvec3(tree.positions()[tree.interior_count() + t[k]]);
+        return glm::dvec3(tree.positions()[tree.wedge_of_leaf(t[k])]);
     };
     for (const Triangle& t : support::sound(tree).triangles())
         least = std::min(least, support::distance_to_triangle(at, corner(t, 0), corner(t, 1), corner(t, 2)));

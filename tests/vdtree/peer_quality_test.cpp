@@ -45,7 +45,7 @@ void compare(const char* what, const Mesh& mesh, std::size_t triangles, bool slo
     const auto clustering = require(cluster_quadric(task.input()));
     const Mesh theirs = simplified_by_meshoptimizer(mesh, triangles, sloppy);
     ASSERT_FALSE(theirs.triangles.empty());
-    const Mesh ours = support::simplified_by_deviation(mesh, *clustering, theirs.triangles.size());
+    const Mesh ours = support::simplified_by_deviation(mesh.view(), *clustering, theirs.triangles.size());
     ASSERT_FALSE(ours.triangles.empty());
     // Means over vertices of the original.
     const double their_distance = app::mean_surface_distance(mesh, theirs),

@@ -42,7 +42,7 @@ std::vector<float> outline_shifts(const vdtree::VertexTree& tree, std::span<cons
     for (vdtree::NodeId node = nodes; node-- > 0;) {
         if (is_outline(node)) shifts[node] = std::max(shifts[node], moved[node]);
         tree.for_each_child(node, [&](vdtree::NodeId child) {
-            if (!tree.is_leaf(child)) shifts[node] = std::max(shifts[node], shifts[child]);
+            if (!tree.is_place(child)) shifts[node] = std::max(shifts[node], shifts[child]);
         });
     }
     return shifts;
@@ -72,7 +72,7 @@ std::vector<std::uint64_t> shadowing_outlines(const Object& object, std::span<co
         if (is_small) continue;
         const std::size_t first = open.size();
         tree.for_each_child(subtree.node, [&](NodeId child) {
-            if (tree.is_leaf(child)) return;
+            if (tree.is_place(child)) return;
             if (open.size() > first) open.back().end = child;
             open.push_back({child, subtree.end});
         });

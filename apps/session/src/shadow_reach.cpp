@@ -94,12 +94,12 @@ private:
         const vdtree::SoundTree& tree = *trees_[piece.object];
         const vdtree::Similarity& placement = standing_[piece.object].object->placement;
         tree.for_each_child(piece.node, [&](NodeId child) {
-            if (!tree.is_leaf(child)) pieces_.push(piece_of(piece.object, child));
+            if (!tree.is_place(child)) pieces_.push(piece_of(piece.object, child));
         });
         for (vdtree::Index t = tree.first_triangle()[piece.node]; t < tree.first_triangle()[piece.node + 1]; ++t) {
             Triangle whole;
             for (int k = 0; k < 3; ++k) {
-                const NodeId leaf = tree.interior_count() + tree.triangles()[t][static_cast<std::size_t>(k)];
+                const vdtree::WedgeId leaf = tree.wedge_of_leaf(tree.triangles()[t][static_cast<std::size_t>(k)]);
                 whole.corners[k] = placement.to_world(tree.origin() + glm::dvec3(tree.positions()[leaf]));
                 whole.normals[k] = placement.rotation * glm::dvec3(glm::vec3(tree.normals()[leaf]));
             }
