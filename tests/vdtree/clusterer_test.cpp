@@ -294,7 +294,7 @@ TEST(Quadric, FoldsWithinAColourBeforeAcrossColours) {
     const Mesh mesh = two_colours(40);
     const Clustering c = clustered(ClusteringTask(mesh), ClustererKind::quadric);
     const Mesh simple = support::simplified_by_deviation(mesh.view(), c, 400); // of 3200
-    std::vector<std::uint8_t> colours(c.parents.size(), 0);             // by cluster: which it holds
+    std::vector<std::uint8_t> colours(c.parents.size(), 0);                    // by cluster: which it holds
     for (Index v = 0; v < mesh.positions.size(); ++v) colours[v] = mesh.colours[v].r > 0.5f ? 1 : 2;
     for (std::size_t i = 0; i + 1 < colours.size(); ++i) colours[c.parents[i]] |= colours[i];
     std::size_t used = 0, mixed = 0;

@@ -58,8 +58,8 @@ TEST(ConserveLight, KeepsTheLightOfACurvedSurface) {
 
 // Proxies of other luminances are drawn in other colours: all bounds go with them.
 TEST(ConserveLight, MovesTheBoundsWithTheProxies) {
-    for (const Mesh& mesh : {shapes::torus(24, 12), shapes::bumpy_sphere(2, 0.03), shapes::grid(8),
-                             shapes::random_soup(200, 300, 1)}) {
+    for (const Mesh& mesh :
+         {shapes::torus(24, 12), shapes::bumpy_sphere(2, 0.03), shapes::grid(8), shapes::random_soup(200, 300, 1)}) {
         const VertexTree tree = built(coloured(mesh));
         const Result<VertexTree> conserved = require(conserve_light(tree));
         const Result<void> sound = verify(*conserved);

@@ -606,7 +606,8 @@ TEST(FrustumOf, HoldsAllThatShowsOffCentreAndInParallel) {
         const View view = i % 2 == 0 ? shifted(centred, random) : parallel(centred, random, radius);
         const Frustum frustum = frustum_of(tree, view);
         for (int k = 0; k < 40; ++k) {
-            const glm::dvec3 point = tree.origin() + glm::dvec3(tree.position(static_cast<NodeId>(random() % tree.node_count())));
+            const glm::dvec3 point =
+                tree.origin() + glm::dvec3(tree.position(static_cast<NodeId>(random() % tree.node_count())));
             double lowest = 1e300;
             for (const Plane& plane : frustum)
                 lowest = std::min(lowest, glm::dot(plane.normal, point - tree.origin()) + plane.offset);
@@ -674,8 +675,7 @@ TEST(Orthographic, TakesAllOutlinesForOutlines) {
         for (std::size_t t = 0; t < tree.triangle_count(); ++t) {
             glm::dvec3 corner[3];
             for (int k = 0; k < 3; ++k)
-                corner[k] =
-                    glm::dvec3(tree.positions()[tree.wedge_of_leaf(support::sound(tree).triangles()[t][k])]);
+                corner[k] = glm::dvec3(tree.positions()[tree.wedge_of_leaf(support::sound(tree).triangles()[t][k])]);
             const double facing = glm::dot(glm::cross(corner[1] - corner[0], corner[2] - corner[0]), back);
             for (int k = 0; k < 3; ++k)
                 for (NodeId node =

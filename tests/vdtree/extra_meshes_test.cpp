@@ -33,12 +33,11 @@ std::string fault_in_spheres(const VertexTree& tree) {
     std::string fault;
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
         const Sphere support = tree.support_spheres()[node], ring = tree.bounds()[node].ring;
-        bool holds =
-            support::contains(support, tree.position(node)) && support::contains(ring, tree.position(node));
+        bool holds = support::contains(support, tree.position(node)) && support::contains(ring, tree.position(node));
         tree.for_each_child(node, [&](NodeId child) {
             if (tree.is_place(child)) {
-                holds &= support::contains(support, tree.position(child)) &&
-                         support::contains(ring, tree.position(child));
+                holds &=
+                    support::contains(support, tree.position(child)) && support::contains(ring, tree.position(child));
                 return;
             }
             const Sphere s = tree.support_spheres()[child], r = tree.bounds()[child].ring;

@@ -423,7 +423,8 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
         for (int frame = 0; frame < 12; ++frame) {
             Viewpoint viewpoint = path.next();
             if (frame % 3 == 0)
-                viewpoint.eye = glm::dvec3(tree.position(static_cast<NodeId>(random() % tree.node_count()))); // inside of many rings
+                viewpoint.eye = glm::dvec3(
+                    tree.position(static_cast<NodeId>(random() % tree.node_count()))); // inside of many rings
             const FollowOptions options{.threshold = 0.7f, .cull_back_faces = cull};
             const auto every = require(test_every_node(tree, *criterion, viewpoint, options));
             FoldTester tester(tree, *criterion, cull, options.threshold);

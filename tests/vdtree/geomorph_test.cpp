@@ -74,8 +74,7 @@ std::vector<MovedVertex> drawn_by_leaf(const Geomorph& geomorph) {
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const WedgeId w = geomorph.drawn().wedge_of_leaf(leaf);
         const auto found = moved.find(w);
-        if (found == moved.end())
-            out.push_back({w, tree.positions()[w], tree.luminance()[w], tree.colours()[w]});
+        if (found == moved.end()) out.push_back({w, tree.positions()[w], tree.luminance()[w], tree.colours()[w]});
         else out.push_back(found->second);
     }
     const auto is_drawn = [&](WedgeId w) {

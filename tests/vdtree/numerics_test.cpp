@@ -241,8 +241,8 @@ TEST(Numerics, CoordinatesTinyHugeFarAndMixed) {
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const glm::dvec3 p = map.positions[tree.source_vertices()[leaf]];
         naive_error = std::max(naive_error, glm::distance(glm::dvec3(glm::vec3(p)), p));
-        error = std::max(error,
-                         glm::distance(tree.origin() + glm::dvec3(tree.positions()[tree.wedge_of_leaf(leaf)]), p));
+        error =
+            std::max(error, glm::distance(tree.origin() + glm::dvec3(tree.positions()[tree.wedge_of_leaf(leaf)]), p));
     }
     EXPECT_GT(naive_error, 0.3);
     EXPECT_LT(error, 5e-6); // half a unit in the last place of a float of 60 m

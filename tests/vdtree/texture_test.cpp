@@ -258,7 +258,8 @@ TEST(Textures, StayAtTheirSeams) {
         const auto indices = cut.indices();
         for (std::size_t i = 0; i < indices.size(); i += 3)
             for (std::size_t k = 1; k < 3; ++k)
-                ASSERT_LT(glm::distance(seamed.uvs()[indices[i]], seamed.uvs()[indices[i + k]]), 1.5f) << "node " << node;
+                ASSERT_LT(glm::distance(seamed.uvs()[indices[i]], seamed.uvs()[indices[i + k]]), 1.5f)
+                    << "node " << node;
     }
 }
 
