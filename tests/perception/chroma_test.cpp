@@ -21,6 +21,7 @@ using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::VertexTree;
 using vdtree::View;
+using vdtree::WedgeId;
 
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 
@@ -169,13 +170,13 @@ TEST(Chroma, OfRingsNests) {
     }
     for (const vdtree::Triangle& t : sound->triangles()) {
         for (const Index corner : t) {
-            const NodeId leaf = tree.interior_count() + corner;
+            const WedgeId leaf = tree.wedge_of_leaf(corner);
             const glm::dvec3 rgb(tree.colours()[leaf]);
             const glm::vec2 chroma(opponent_chroma(rgb) *
                                    (static_cast<double>(tree.luminance()[leaf]) / glm::dot(rgb, rec709)));
             for (const Index other : t)
-                EXPECT_TRUE(includes((*rings)[sound->parents()[tree.interior_count() + other]], chroma + 1e-6f,
-                                     chroma - 1e-6f));
+                EXPECT_TRUE(
+                    includes((*rings)[sound->parents()[tree.place_of_leaf(other)]], chroma + 1e-6f, chroma - 1e-6f));
         }
     }
 }

@@ -24,6 +24,7 @@ using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::VertexTree;
 using vdtree::View;
+using vdtree::WedgeId;
 
 // A closed, slightly bumpy sphere of about 2 * n * n triangles.
 Mesh bumpy_sphere(int n, double bump = 0.02) {
@@ -310,11 +311,11 @@ TEST(LuebkeHallenHoles, RangeCoversTheRing) {
 TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
     const VertexTree tree = std::move(*vdtree::build_tree(bumpy_sphere(16).view()));
     const glm::dvec3 eye(2, 1, 4);
-    const NodeId interior = tree.interior_count();
+    const WedgeId leaves = tree.interior_wedge_count();
     std::vector<std::uint8_t> faces(tree.leaf_count(), 0); // 1 front, 2 back, of the triangles around a leaf
     for (const auto& t : support::sound(tree).triangles()) {
-        const glm::dvec3 a = tree.positions()[interior + t[0]], b = tree.positions()[interior + t[1]],
-                         c = tree.positions()[interior + t[2]];
+        const glm::dvec3 a = tree.positions()[leaves + t[0]], b = tree.positions()[leaves + t[1]],
+                         c = tree.positions()[leaves + t[2]];
         const bool front = glm::dot(glm::cross(b - a, c - a), eye - tree.origin() - a) > 0;
         for (const auto leaf : t) faces[leaf] |= front ? 1 : 2;
     }
@@ -324,7 +325,7 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
             // Some corner of a triangle around the leaf lies on the contour: within the ring of every node above the
             // leaf.
             if ((faces[t[0]] | faces[t[1]] | faces[t[2]]) != 3) continue;
-            const NodeId parent = support::sound(tree).parents()[interior + leaf];
+            const NodeId parent = support::sound(tree).parents()[tree.place_of_leaf(leaf)];
             const auto s = tree.bounds()[parent].ring;
             const glm::dvec3 to_eye = eye - tree.origin() - glm::dvec3(s.centre);
             const double d = glm::length(to_eye);

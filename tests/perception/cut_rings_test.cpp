@@ -24,10 +24,12 @@ bool is_larger(const VertexTree& tree, NodeId a, NodeId b) {
 }
 
 // Of a triangle's corners that are proxies; no_node where none is.
-NodeId largest_of(const VertexTree& tree, std::span<const NodeId> corners) {
+NodeId largest_of(const VertexTree& tree, std::span<const WedgeId> corners) {
     NodeId largest = no_node;
-    for (const NodeId corner : corners)
-        if (!tree.is_leaf(corner) && (largest == no_node || is_larger(tree, corner, largest))) largest = corner;
+    for (const WedgeId wedge : corners)
+        if (const NodeId corner = support::node_of(tree, wedge);
+            !tree.is_place(corner) && (largest == no_node || is_larger(tree, corner, largest)))
+            largest = corner;
     return largest;
 }
 
@@ -42,11 +44,11 @@ Looked expect_within_rings(const Cut& cut, const CutRings& rings) {
     Looked looked;
     for (std::size_t i = 0; i < indices.size(); i += 3) {
         const NodeId largest = largest_of(tree, indices.subspan(i, 3));
-        if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
+        if (largest == no_node) continue;
         ++looked.at;
         bool is_outside = false;
         for (std::size_t k = 0; k < 3; ++k) {
-            const NodeId corner = indices[i + k];
+            const WedgeId corner = indices[i + k];
             const double distance =
                 glm::length(glm::dvec3(tree.positions()[corner]) - glm::dvec3(tree.bounds()[largest].ring.centre));
             is_outside |= distance > tree.bounds()[largest].ring.radius ||
@@ -154,12 +156,12 @@ TEST(LitCutRings, HoldWhatLightsMakeOfEveryTriangleOfEveryCut) {
             for (std::size_t i = 0; i < cut.indices().size(); i += 3) {
                 const auto corners = cut.indices().subspan(i, 3);
                 const NodeId largest = largest_of(tree, corners);
-                if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
+                if (largest == no_node) continue;
                 const LuminanceRange range =
                     lit_range(lighting, rings.cones()[largest], rings.sphere(tree, largest), eye);
                 const LuminanceRange of_mesh =
                     lit_range(lighting, mesh_rings.cones()[largest], mesh_rings.sphere(tree, largest), eye);
-                for (const NodeId corner : corners) {
+                for (const WedgeId corner : corners) {
                     const double y = lit_luminance(lighting, glm::dvec3(tree.positions()[corner]),
                                                    glm::dvec3(glm::vec3(tree.normals()[corner])),
                                                    static_cast<double>(albedo_of(tree, corner)), eye);

@@ -18,6 +18,7 @@ using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::VertexTree;
 using vdtree::View;
+using vdtree::WedgeId;
 
 constexpr int window_px = 128;
 constexpr int samples = 64; // a pixel, along an additive recurrence in both directions
@@ -62,7 +63,7 @@ struct Scene {
         std::vector<NodeId> parent_of_vertex(mesh.positions.size());
         for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf)
             parent_of_vertex[tree->source_vertices()[leaf]] =
-                support::sound(*tree).parents()[tree->interior_count() + leaf];
+                support::sound(*tree).parents()[tree->place_of_leaf(leaf)];
         for (const Group& group : groups) nodes.push_back(parent_of_vertex[group.vertices.front()]);
     }
 };
@@ -96,23 +97,23 @@ std::vector<float> ring_costs(const Scene& scene, const View& view) {
 }
 
 double literal_cost(const VertexTree& tree, NodeId node, const View& view, const FoldTestOptions& options) {
-    const NodeId interior = tree.interior_count();
+    const WedgeId leaves = tree.interior_wedge_count();
     const Index first = support::sound(tree).first_leaf()[node], end = support::sound(tree).leaf_end()[node];
     const glm::dvec3 eye = view.eye - tree.origin();
     glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
     float darkest = 1, brightest = 0;
     for (Index leaf = first; leaf < end; ++leaf) {
-        const glm::dvec3 p = tree.positions()[interior + leaf];
+        const glm::dvec3 p = tree.positions()[leaves + leaf];
         low = glm::min(low, p), high = glm::max(high, p);
-        darkest = std::min<float>(darkest, tree.luminance()[interior + leaf]);
-        brightest = std::max<float>(brightest, tree.luminance()[interior + leaf]);
+        darkest = std::min<float>(darkest, tree.luminance()[leaves + leaf]);
+        brightest = std::max<float>(brightest, tree.luminance()[leaves + leaf]);
     }
     bool has_front = false, has_back = false;
     for (const auto& t : support::sound(tree).triangles()) {
         const bool is_own = std::any_of(t.begin(), t.end(), [&](Index leaf) { return first <= leaf && leaf < end; });
         if (!is_own) continue;
-        const glm::dvec3 a = tree.positions()[interior + t[0]], b = tree.positions()[interior + t[1]],
-                         c = tree.positions()[interior + t[2]];
+        const glm::dvec3 a = tree.positions()[leaves + t[0]], b = tree.positions()[leaves + t[1]],
+                         c = tree.positions()[leaves + t[2]];
         (glm::dot(glm::cross(b - a, c - a), eye - a) > 0 ? has_front : has_back) = true;
     }
     if (has_front && has_back) {
@@ -369,7 +370,7 @@ TEST(FoldHoles, FourFacesChangeWhereVerticesDoNot) {
 
     // Along the line from left to right, on which a, b and the proxy lie, all is grey in both.
     const VertexTree& tree = *scene.tree;
-    EXPECT_NEAR(static_cast<float>(tree.luminance()[scene.nodes[0]]), grey, 1e-4f);
+    EXPECT_NEAR(static_cast<float>(tree.luminance()[tree.first_wedge(scene.nodes[0])]), grey, 1e-4f);
     const vdtree::LuminanceRange support = tree.support_luminance()[scene.nodes[0]];
     EXPECT_EQ(support.lo, support.hi);
 }

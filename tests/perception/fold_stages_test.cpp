@@ -255,7 +255,7 @@ Drawn draw(const VertexTree& tree, std::span<const Triangle> triangles, std::siz
     StageSurfaces surfaces;
     StagePainter painter(tree, untextured, camera, surfaces);
     auto pictures =
-        painter.draw<1>(triangles, [&](NodeId node) { return std::array<float, 1>{tree.luminance()[node]}; });
+        painter.draw<1>(triangles, [&](WedgeId wedge) { return std::array<float, 1>{tree.luminance()[wedge]}; });
     return {static_cast<double>(painter.drawn()) / (stage_samples * stage_samples), std::move(pictures[0])};
 }
 
@@ -276,7 +276,7 @@ TEST(StagePictures, DrawLittleOfWhatIsHidden) {
         std::vector<Triangle> triangles(support::sound(tree).triangles().begin(),
                                         support::sound(tree).triangles().end());
         for (Triangle& t : triangles)
-            for (Index& corner : t) corner += tree.interior_count();
+            for (Index& corner : t) corner = tree.wedge_of_leaf(corner);
         for (const std::size_t direction : {0, 5, 12, 20}) {
             const Drawn drawn = draw(tree, triangles, direction);
             EXPECT_LT(drawn.layers, layers_at_most) << name << ", direction " << direction;

@@ -31,12 +31,12 @@ TEST(LitFolds, LightEveryVertexAsItIsDrawn) {
     const auto lit = require(folds->under(tree, lighting));
     EXPECT_TRUE(has_fold_measurement(*lit));
     constexpr float half_step = 0.51f / 65535; // of stored luminances
-    for (NodeId node = 0; node < tree.node_count(); ++node) {
-        const auto drawn = static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
-                                                            glm::dvec3(glm::vec3(tree.normals()[node])),
-                                                            static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
-        const float stored = lit->luminance()[node];
-        ASSERT_NEAR(stored, drawn, half_step) << node;
+    for (WedgeId w = 0; w < tree.wedge_count(); ++w) {
+        const auto drawn = static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[w]),
+                                                            glm::dvec3(glm::vec3(tree.normals()[w])),
+                                                            static_cast<double>(albedo_of(tree, w)), glm::dvec3(0)));
+        const float stored = lit->luminance()[w];
+        ASSERT_NEAR(stored, drawn, half_step) << w;
         ASSERT_GE(lit->luminance_range().hi, stored);
         ASSERT_LE(lit->luminance_range().lo, stored);
     }
@@ -55,7 +55,8 @@ TEST(LitFolds, AreHardlyEverLessThanWhatIsMeasuredUnderTheLight) {
         for (int trial = 0; trial < 3; ++trial) {
             const Lighting lighting = one_light(shapes::random_direction(random));
             const VertexTree lit = *folds->under(tree, lighting);
-            const VertexTree exact = *measure_folds(*tree.shaded([&](NodeId node) { return lit.luminance()[node]; }));
+            const VertexTree exact =
+                *measure_folds(*tree.shaded([&](WedgeId wedge) { return lit.luminance()[wedge]; }));
             const auto bound = lit.attribute<FoldRecord>(record_name), found = exact.attribute<FoldRecord>(record_name);
             ASSERT_EQ(bound.size(), found.size());
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
@@ -88,7 +89,7 @@ TEST(LitFolds, StagesAreHardlyEverLessThanThoseUnderTheLights) {
             lighting.lights.push_back(
                 {.intensity = 0.3, .direction = glm::normalize(shapes::random_direction(random))});
         const VertexTree lit = *folds->under(tree, lighting);
-        const VertexTree exact = *measure_folds(*tree.shaded([&](NodeId node) { return lit.luminance()[node]; }));
+        const VertexTree exact = *measure_folds(*tree.shaded([&](WedgeId wedge) { return lit.luminance()[wedge]; }));
         const auto bound = lit.attribute<FoldStage>(stages_name), found = exact.attribute<FoldStage>(stages_name);
         ASSERT_EQ(bound.size(), found.size());
         for (std::size_t stage = 0; stage < found.size(); ++stage)
@@ -113,7 +114,7 @@ TEST(LitFolds, BiasIsThatOfTheLight) {
     const VertexTree tree = support::built(shapes::bumpy_sphere(4, 0.04));
     const auto folds = require(LitFolds::measure(tree));
     const VertexTree lit = *folds->under(tree, one_light({1, 2, 0.5}, 0.2));
-    const VertexTree exact = *measure_folds(*tree.shaded([&](NodeId node) { return lit.luminance()[node]; }));
+    const VertexTree exact = *measure_folds(*tree.shaded([&](WedgeId wedge) { return lit.luminance()[wedge]; }));
     const auto median = [](const VertexTree& of) {
         std::vector<float> all;
         for (const FoldRecord& fold : of.attribute<FoldRecord>(record_name)) all.push_back(fold.bias);

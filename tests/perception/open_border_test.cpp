@@ -21,19 +21,20 @@ using Place = std::array<float, 3>;
 std::set<std::pair<Place, Place>> border_of(const Mesh& mesh) {
     const VertexTree tree = support::built(mesh);
     const SoundTree sound = support::sound(tree);
-    const OpenBorder border(sound, LeafTriangles(sound));
-    const auto place = [&](Index leaf) {
-        const glm::vec3 p = tree.positions()[tree.interior_count() + leaf];
+    const PlaceTriangles triangles(sound);
+    const OpenBorder border(sound, triangles);
+    const auto place = [&](Index number) {
+        const glm::vec3 p = tree.position(tree.interior_count() + number);
         return Place{p.x, p.y, p.z};
     };
     std::set<std::pair<Place, Place>> edges, by_triangle;
-    for (const OpenBorder::End& end : border.at(0, tree.leaf_count()))
-        edges.insert(std::minmax(place(end.leaf), place(end.other)));
+    for (const OpenBorder::End& end : border.at(0, tree.place_count()))
+        edges.insert(std::minmax(place(end.place), place(end.other)));
     for (Index t = 0; t < sound.triangles().size(); ++t)
         for (unsigned k = 0; k < 3; ++k)
             if ((border.edges_of(t) >> k) & 1)
                 by_triangle.insert(
-                    std::minmax(place(sound.triangles()[t][k]), place(sound.triangles()[t][(k + 1) % 3])));
+                    std::minmax(place(triangles.corners(t)[k]), place(triangles.corners(t)[(k + 1) % 3])));
     EXPECT_EQ(edges, by_triangle);
     return edges;
 }
@@ -124,26 +125,31 @@ class BorderFolds {
 public:
     explicit BorderFolds(const Mesh& mesh)
         : tree_(support::measured(support::built(mesh))), sound_(support::sound(tree_)),
-          border_(sound_, LeafTriangles(sound_)), errors_(fold_errors_of(sound_)->of_nodes) {}
+          border_(sound_, PlaceTriangles(sound_)), errors_(fold_errors_of(sound_)->of_nodes) {}
 
     const VertexTree& tree() const { return tree_; }
     float counted(NodeId node) const { return errors_[node].outline; }
-    bool touches(NodeId node) const { return !border_.at(sound_.first_leaf()[node], sound_.leaf_end()[node]).empty(); }
+    bool touches(NodeId node) const {
+        const NodeId first = tree_.place_of_leaf(sound_.first_leaf()[node]),
+                     last = tree_.place_of_leaf(sound_.leaf_end()[node] - 1);
+        return !border_.at(first - tree_.interior_count(), last - tree_.interior_count() + 1).empty();
+    }
 
     // The distance of the whole border from what it becomes where `is_folded` says which nodes are folded.
     template <class IsFolded>
     float moved(const IsFolded& is_folded) const {
         std::vector<Segment> before, after;
-        const auto place = [&](NodeId node) { return tree_.positions()[node]; };
-        const auto shown = [&](Index leaf) {
-            NodeId at = tree_.interior_count() + leaf;
+        const auto place = [&](NodeId node) { return tree_.position(node); };
+        const auto shown = [&](Index number) {
+            NodeId at = tree_.interior_count() + number;
             for (NodeId up = at; up != no_node; up = sound_.parents()[up])
                 if (up < tree_.interior_count() && is_folded(up)) at = up;
             return at;
         };
-        for (const OpenBorder::End& end : border_.at(0, tree_.leaf_count())) {
-            before.push_back({place(tree_.interior_count() + end.leaf), place(tree_.interior_count() + end.other)});
-            if (shown(end.leaf) != shown(end.other)) after.push_back({place(shown(end.leaf)), place(shown(end.other))});
+        for (const OpenBorder::End& end : border_.at(0, tree_.place_count())) {
+            before.push_back({place(tree_.interior_count() + end.place), place(tree_.interior_count() + end.other)});
+            if (shown(end.place) != shown(end.other))
+                after.push_back({place(shown(end.place)), place(shown(end.other))});
         }
         return std::max(farthest_from(after, points_of(before)), farthest_from(before, points_of(after)));
     }
@@ -181,8 +187,8 @@ TEST(FoldedBorders, MoveByNoMoreThanIsCounted) {
 TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
     const VertexTree tree = support::built(shapes::unwelded(shapes::random_soup(72000, 24000, 1)));
     const SoundTree sound = support::sound(tree);
-    const LeafTriangles of_leaf(sound);
-    BorderShifts shifts(sound, of_leaf);
+    const PlaceTriangles triangles(sound);
+    BorderShifts shifts(sound, triangles);
     NodeId node = 1; // with most leaves, but for the root
     const auto leaves = [&](NodeId n) { return sound.leaf_end()[n] - sound.first_leaf()[n]; };
     for (NodeId other = 1; other < tree.interior_count(); ++other)
@@ -199,7 +205,7 @@ TEST(FoldedBorders, DoNotCostTheSquareOfWhatLiesThroughEachOther) {
         return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
     };
     const double start = cpu_seconds();
-    const float shift = shifts.shift(node, crossing, [&](Index leaf) { return tree.interior_count() + leaf; });
+    const float shift = shifts.shift(node, crossing, [&](Index leaf) { return tree.place_of_leaf(leaf); });
     const double seconds = cpu_seconds() - start;
     EXPECT_GT(shift, 0);
     EXPECT_LT(shift, 2 * tree.support_spheres()[node].radius);
@@ -230,17 +236,18 @@ TEST(FoldedBorders, CountWhatTurnsOverBeyondThem) {
     const BorderFolds folds(sieve());
     const VertexTree& tree = folds.tree();
     const SoundTree sound = support::sound(tree);
-    const OpenBorder border(sound, LeafTriangles(sound));
-    const auto place = [&](NodeId node) { return tree.positions()[node]; };
+    const PlaceTriangles triangles(sound);
+    const OpenBorder border(sound, triangles);
+    const auto place = [&](NodeId node) { return tree.position(node); };
     const auto outside = [&](glm::vec3 p) {
         BorderSide side(p);
-        for (const auto& [leaf, other, opposite] : border.at(0, tree.leaf_count()))
-            side.look_at({place(tree.interior_count() + leaf), place(tree.interior_count() + other)},
+        for (const auto& [end, other, opposite] : border.at(0, tree.place_count()))
+            side.look_at({place(tree.interior_count() + end), place(tree.interior_count() + other)},
                          place(tree.interior_count() + opposite));
         return side.outside();
     };
-    const auto leaves = [&](NodeId node) {
-        if (node >= tree.interior_count()) return std::pair(node - tree.interior_count(), node - tree.interior_count());
+    const auto leaves = [&](NodeId node) { // of a sheet without seams, where each place has one leaf
+        if (tree.is_place(node)) return std::pair(node - tree.interior_count(), node - tree.interior_count());
         return std::pair(sound.first_leaf()[node], sound.leaf_end()[node] - 1);
     };
     const auto nest = [&](NodeId x, NodeId y) {
@@ -250,7 +257,7 @@ TEST(FoldedBorders, CountWhatTurnsOverBeyondThem) {
     for (const Triangle& t : sound.triangles()) {
         std::array<std::vector<NodeId>, 3> chains;
         for (std::size_t k = 0; k < 3; ++k)
-            for (NodeId up = tree.interior_count() + t[k]; up != no_node && up != 0; up = sound.parents()[up])
+            for (NodeId up = tree.place_of_leaf(t[k]); up != no_node && up != 0; up = sound.parents()[up])
                 chains[k].push_back(up);
         const glm::vec3 normal =
             glm::cross(place(chains[1][0]) - place(chains[0][0]), place(chains[2][0]) - place(chains[0][0]));

@@ -30,14 +30,14 @@ constexpr double place_rounding = 1e-5;     // of the sphere's distance: trees k
 constexpr double folds_turned_over = 0.02;
 constexpr int rows = 48; // and as many columns of points
 
-double luminance_of(const VertexTree& tree, NodeId node) {
-    return static_cast<double>(static_cast<float>(tree.luminance()[node]));
+double luminance_of(const VertexTree& tree, WedgeId wedge) {
+    return static_cast<double>(static_cast<float>(tree.luminance()[wedge]));
 }
 
 struct Seen {
     double nearness = 0; // 1 / depth; 0: the background
     double luminance = 0;
-    std::array<NodeId, 3> corners = {no_node, no_node, no_node};
+    std::array<WedgeId, 3> corners = {no_node, no_node, no_node};
     bool operator==(const Seen& other) const { return nearness == other.nearness && luminance == other.luminance; }
 };
 
@@ -58,7 +58,7 @@ public:
     }
 
     // The points at which anything is nearer than what was seen before are filled in.
-    void draw(const VertexTree& tree, std::span<const NodeId> indices, std::vector<Seen>& seen) const {
+    void draw(const VertexTree& tree, std::span<const WedgeId> indices, std::vector<Seen>& seen) const {
         seen.assign(std::size_t{rows} * rows, Seen());
         for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
             draw(tree, {indices[i], indices[i + 1], indices[i + 2]}, seen);
@@ -77,7 +77,7 @@ private:
         return {half_ * (2 * x / rows - 1), half_ * (2 * y / rows - 1)};
     }
 
-    void draw(const VertexTree& tree, const std::array<NodeId, 3>& corners, std::vector<Seen>& seen) const {
+    void draw(const VertexTree& tree, const std::array<WedgeId, 3>& corners, std::vector<Seen>& seen) const {
         std::array<glm::dvec3, 3> p; // tangents and nearness
         for (std::size_t i = 0; i < 3; ++i) {
             const glm::dvec3 from_eye = glm::dvec3(tree.positions()[corners[i]]) - eye_;
@@ -185,7 +185,7 @@ void unfold_around(Cut& cut, NodeId node, std::mt19937_64& random, const std::fu
         const bool is_below = other > node && other < end;
         if (other == node || !(is_below ? is_rough : may_fold(other)) || random() % 3 == 0) continue;
         bool can_fold = true;
-        tree.for_each_child(other, [&](NodeId child) { can_fold &= tree.is_leaf(child) || !cut.is_unfolded(child); });
+        tree.for_each_child(other, [&](NodeId child) { can_fold &= tree.is_place(child) || !cut.is_unfolded(child); });
         if (can_fold) cut.fold(other);
     }
 }
@@ -241,7 +241,7 @@ protected:
         const Sphere whole = tree_.bounding_sphere();
         Found all;
         std::vector<Seen> before, after;
-        std::vector<NodeId> indices;
+        std::vector<WedgeId> indices;
         for (int i = 0; i < folds; ++i) {
             const NodeId node = random_node(tree_, random);
             const double away = static_cast<double>(whole.radius) * (1.2 + 4 * shapes::random_unit(random));
@@ -285,17 +285,20 @@ protected:
         return all;
     }
 
-    bool is_in_subtree(NodeId corner, NodeId node) const {
+    bool is_in_subtree(WedgeId corner, NodeId node) const {
         if (corner == no_node) return false;
-        if (!tree_.is_leaf(corner)) return corner >= node && corner < support::sound(tree_).subtree_end()[node];
-        const Index leaf = corner - tree_.interior_count();
+        if (corner < tree_.interior_wedge_count()) {
+            const NodeId of = support::node_of(tree_, corner);
+            return of >= node && of < support::sound(tree_).subtree_end()[node];
+        }
+        const Index leaf = corner - tree_.interior_wedge_count();
         return leaf >= support::sound(tree_).first_leaf()[node] && leaf < support::sound(tree_).leaf_end()[node];
     }
     // Whether the triangles around a node do not all face the eye, or all face away, in one of the surfaces or the
     // other.
-    bool turns_over(std::initializer_list<std::span<const NodeId>> surfaces, NodeId node, glm::dvec3 eye) const {
+    bool turns_over(std::initializer_list<std::span<const WedgeId>> surfaces, NodeId node, glm::dvec3 eye) const {
         bool has_front = false, has_back = false;
-        for (const std::span<const NodeId> indices : surfaces) {
+        for (const std::span<const WedgeId> indices : surfaces) {
             for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
                 if (!is_in_subtree(indices[i], node) && !is_in_subtree(indices[i + 1], node) &&
                     !is_in_subtree(indices[i + 2], node))

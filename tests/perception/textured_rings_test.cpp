@@ -49,9 +49,10 @@ TEST(TexturedRings, BoundTheRingsOfAllCuts) {
             for (std::size_t i = 0; i < indices.size(); i += 3) {
                 NodeId largest = no_node;
                 for (std::size_t k = 0; k < 3; ++k)
-                    if (!tree.is_leaf(indices[i + k]) && (largest == no_node || is_larger(indices[i + k], largest)))
-                        largest = indices[i + k];
-                if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
+                    if (const NodeId node = support::node_of(tree, indices[i + k]);
+                        !tree.is_place(node) && (largest == no_node || is_larger(node, largest)))
+                        largest = node;
+                if (largest == no_node) continue;
                 for (int k = 0; k < 4; ++k) {
                     double a = shapes::random_unit(random), b = shapes::random_unit(random);
                     if (a + b > 1) a = 1 - a, b = 1 - b;
@@ -59,12 +60,12 @@ TEST(TexturedRings, BoundTheRingsOfAllCuts) {
                     glm::dvec2 uv(0);
                     glm::dvec3 rgb(0);
                     for (std::size_t c = 0; c < 3; ++c) {
-                        const NodeId node = indices[i + c];
-                        uv += weights[c] * glm::dvec2(tree.uvs()[node]);
-                        const double y = tree.luminance()[node];
+                        const WedgeId wedge = indices[i + c];
+                        uv += weights[c] * glm::dvec2(tree.uvs()[wedge]);
+                        const double y = tree.luminance()[wedge];
                         glm::dvec3 shade(y);
                         if (!tree.colours().empty()) {
-                            const glm::dvec3 colour(tree.colours()[node]);
+                            const glm::dvec3 colour(tree.colours()[wedge]);
                             shade = colour * (y / (0.2126 * colour.r + 0.7152 * colour.g + 0.0722 * colour.b));
                         }
                         rgb += weights[c] * shade;
@@ -106,12 +107,13 @@ TEST(TexturedRings, MoveByNoMoreThanTheirDeviation) {
     for (NodeId node = 0; node < flat.interior_count(); ++node)
         EXPECT_LE(of_flat.texture_deviation[node], 1e-5f * size);
 
+    // Without seams: wedges and nodes have the same numbers.
     const VertexTree sphere = built(textures::textured_sphere(4, textures::noise(32, 32, 1)));
     const CutRings of_sphere = *bound_cut_rings(sphere);
     int smaller = 0, looked = 0;
     for (NodeId node = 0; node < sphere.interior_count(); ++node) {
         EXPECT_LE(of_sphere.texture_deviation[node], 2 * of_sphere.radius[node]);
-        if (sphere.support_spheres()[node].radius > 0.2f || sphere.support_spheres()[node].radius == 0) continue;
+        if (sphere.support_spheres()[node].radius > 0.2f) continue;
         smaller += of_sphere.texture_deviation[node] < 0.5f * sphere.support_spheres()[node].radius;
         ++looked;
         // The proxy's place in the texture, on the mesh's triangles around.
@@ -125,10 +127,10 @@ TEST(TexturedRings, MoveByNoMoreThanTheirDeviation) {
             });
             if (!is_around) continue;
             const auto u = [&](int k) {
-                return glm::dvec2(sphere.uvs()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]);
+                return glm::dvec2(sphere.uvs()[sphere.wedge_of_leaf(corners[static_cast<std::size_t>(k)])]);
             };
             const auto p = [&](int k) {
-                return glm::dvec3(sphere.positions()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]);
+                return glm::dvec3(sphere.positions()[sphere.wedge_of_leaf(corners[static_cast<std::size_t>(k)])]);
             };
             const glm::dvec2 e = u(1) - u(0), f = u(2) - u(0), to = uv - u(0);
             const double area = e.x * f.y - e.y * f.x;

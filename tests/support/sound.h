@@ -15,4 +15,15 @@ inline vdtree::SoundTree sound(const vdtree::VertexTree& tree) {
     return std::move(*sound);
 }
 
+// The node that a wedge belongs to.
+inline vdtree::NodeId node_of(const vdtree::VertexTree& tree, vdtree::WedgeId wedge) {
+    if (!tree.has_seams()) return wedge;
+    vdtree::NodeId first = 0, end = tree.node_count();
+    while (end - first > 1) {
+        const vdtree::NodeId middle = first + (end - first) / 2;
+        (tree.first_wedge(middle) <= wedge ? first : end) = middle;
+    }
+    return first;
+}
+
 } // namespace unseen::support

@@ -175,8 +175,8 @@ Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel&
     if (trees.empty()) return invalid_argument("fold test: there is no tree under lights to look at");
     double albedo = 0;
     const vdtree::VertexTree& first = trees.front().tree;
-    for (NodeId node = 0; node < first.node_count(); ++node)
-        albedo = std::max(albedo, static_cast<double>(vdtree::albedo_of(first, node)));
+    for (vdtree::WedgeId wedge = 0; wedge < first.wedge_count(); ++wedge)
+        albedo = std::max(albedo, static_cast<double>(vdtree::albedo_of(first, wedge)));
     LitTrees all;
     all.sound_.reserve(trees.size()), all.errors_.reserve(trees.size()); // they are referred to
     for (const TreeAsLit& one : trees) {

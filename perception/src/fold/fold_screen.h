@@ -111,7 +111,7 @@ struct Surround {
 
 // A quarter of a convex surface's area is what it covers. Cost: one pass over the triangles.
 inline Surround surround_of(const vdtree::SoundTree& tree, const FoldTestOptions& options) {
-    const vdtree::NodeId leaves = tree.interior_count();
+    const vdtree::WedgeId leaves = tree.interior_wedge_count();
     double area = 0;
     for (const vdtree::Triangle& triangle : tree.triangles()) {
         const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[leaves + triangle[k]]); };

@@ -119,13 +119,14 @@ public:
     explicit ContactFinder(std::span<const SoundTree> trees)
         : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
-          boxes_(interior_), of_leaf_(tree_),
+          boxes_(interior_), mesh_(tree_),
           boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         is_textured_ = !trees.front().texture().empty();
-        for (const SoundTree& tree : trees) luminances_.push_back(tree.luminance().subspan(interior_));
-        const auto leaves = tree_.positions().subspan(interior_);
-        positions_.assign(leaves.begin(), leaves.end());
-        for (glm::vec3& p : positions_) p *= scale_;
+        for (const SoundTree& tree : trees)
+            luminances_.push_back(tree.luminance().subspan(tree.interior_wedge_count()));
+        positions_.resize(tree_.place_count());
+        for (Index place = 0; place < positions_.size(); ++place)
+            positions_[place] = tree_.position(interior_ + place) * scale_;
         for (NodeId node = interior_; node-- > 0;) {
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t)
                 boxes_[node].include(box_of(corners(t)));
@@ -138,8 +139,8 @@ public:
         std::vector<Contact> all(interior_);
         const std::span<const NodeId> parents = tree_.parents();
         for (Index t = 0; t < contacts.size(); ++t)
-            for (const Index leaf : triangles_[t])
-                all[parents[interior_ + leaf]].include({contacts[t].gap / scale_, contacts[t].sine});
+            for (const Index place : mesh_.corners(t))
+                all[parents[interior_ + place]].include({contacts[t].gap / scale_, contacts[t].sine});
         for (NodeId node = interior_; node-- > 1;) all[parents[node]].include(all[node]);
         return all;
     }
@@ -160,7 +161,7 @@ private:
     }
 
     Corners corners(Index triangle) const {
-        const Triangle& t = triangles_[triangle];
+        const Triangle& t = mesh_.corners(triangle);
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
     bool look_alike(Index a, Index b) const {
@@ -181,26 +182,26 @@ private:
     void find_neighbours(const Triangle& triangle, std::vector<Index>& neighbours) const {
         neighbours.clear();
         std::size_t count = 0;
-        for (const Index leaf : triangle) count += of_leaf_.around(leaf).size();
+        for (const Index place : triangle) count += mesh_.around(place).size();
         if (count > most_listed) return;
-        for (const Index leaf : triangle)
-            for (const Index t : of_leaf_.around(leaf))
-                for (const Index corner : triangles_[t])
+        for (const Index place : triangle)
+            for (const Index t : mesh_.around(place))
+                for (const Index corner : mesh_.corners(t))
                     if (std::find(neighbours.begin(), neighbours.end(), corner) == neighbours.end())
                         neighbours.push_back(corner);
     }
 
     // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
     bool are_neighbours(const Triangle& a, const Triangle& b, std::size_t& looked_at) const {
-        for (const Index leaf : a)
-            if (leaf == b[0] || leaf == b[1] || leaf == b[2]) return true;
-        for (const Index leaf : a) {
+        for (const Index place : a)
+            if (place == b[0] || place == b[1] || place == b[2]) return true;
+        for (const Index place : a) {
             for (const Index other : b) {
-                const bool is_less = of_leaf_.around(leaf).size() < of_leaf_.around(other).size();
-                const Index wanted = is_less ? other : leaf;
-                for (const Index t : of_leaf_.around(is_less ? leaf : other)) {
+                const bool is_less = mesh_.around(place).size() < mesh_.around(other).size();
+                const Index wanted = is_less ? other : place;
+                for (const Index t : mesh_.around(is_less ? place : other)) {
                     ++looked_at;
-                    if (const Triangle& at = triangles_[t]; at[0] == wanted || at[1] == wanted || at[2] == wanted)
+                    if (const Triangle& at = mesh_.corners(t); at[0] == wanted || at[1] == wanted || at[2] == wanted)
                         return true;
                     if (looked_at > most_triangles) return false;
                 }
@@ -269,16 +270,17 @@ private:
     Contact find(Index triangle, float near, const Box& around, Scratch& scratch) const {
         const Corners own = corners(triangle);
         std::vector<Index>& neighbours = scratch.neighbours;
-        find_neighbours(triangles_[triangle], neighbours);
+        find_neighbours(mesh_.corners(triangle), neighbours);
         std::size_t looked_at = 0;
         const auto is_neighbour = [&](const Triangle& other) {
-            if (neighbours.empty()) return are_neighbours(triangles_[triangle], other, looked_at);
-            return std::any_of(neighbours.begin(), neighbours.end(),
-                               [&](Index leaf) { return leaf == other[0] || leaf == other[1] || leaf == other[2]; });
+            if (neighbours.empty()) return are_neighbours(mesh_.corners(triangle), other, looked_at);
+            return std::any_of(neighbours.begin(), neighbours.end(), [&](Index place) {
+                return place == other[0] || place == other[1] || place == other[2];
+            });
         };
         Contact contact;
         for (const auto& [box, other] : scratch.candidates) {
-            if (!around.meets(box) || is_neighbour(triangles_[other])) continue;
+            if (!around.meets(box) || is_neighbour(mesh_.corners(other))) continue;
             if (looked_at > most_triangles) return {0, 0};
             const Corners its = corners(other);
             if (face_alike(own, its) && look_alike(triangle, other)) continue;
@@ -291,14 +293,14 @@ private:
 
     const SoundTree& tree_;
     NodeId interior_;
-    std::span<const Triangle> triangles_;
+    std::span<const Triangle> triangles_;              // over leaves
     float scale_;                                      // in which they are measured
-    std::vector<glm::vec3> positions_;                 // of leaves
-    std::vector<std::span<const Unorm16>> luminances_; // likewise, by tree
+    std::vector<glm::vec3> positions_;                 // of places
+    std::vector<std::span<const Unorm16>> luminances_; // of leaves, by tree
     bool is_textured_ = false;
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
-    LeafTriangles of_leaf_;
+    PlaceTriangles mesh_;
     std::size_t boxes_a_triangle_; // at most
 };
 

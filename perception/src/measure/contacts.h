@@ -1,4 +1,4 @@
-// Which triangles touch: at leaves, or without sharing a vertex.
+// Which triangles touch: at places, or without sharing one.
 #pragma once
 
 #include <limits>
@@ -27,24 +27,36 @@ struct Contact {
 // Adds the triangles to what is done; where that says to stop, the answer is of no use.
 std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees, MeasuringProgress& progress);
 
-class LeafTriangles {
+// The mesh over places: these have the numbers of their nodes less interior_count().
+class PlaceTriangles {
 public:
-    explicit LeafTriangles(const vdtree::SoundTree& tree)
-        : first_(std::size_t{tree.leaf_count()} + 1, 0), triangles_(tree.triangles().size() * 3) {
-        const std::span<const vdtree::Triangle> triangles = tree.triangles();
-        for (const vdtree::Triangle& t : triangles)
-            for (const vdtree::Index leaf : t) ++first_[leaf + 1];
+    // The tree must stay where it is. Cost: one pass over the triangles.
+    explicit PlaceTriangles(const vdtree::SoundTree& tree)
+        : corners_(tree.triangles()), first_(std::size_t{tree.place_count()} + 1, 0),
+          triangles_(tree.triangles().size() * 3) {
+        if (tree.has_seams()) {
+            own_corners_.assign(corners_.begin(), corners_.end());
+            for (vdtree::Triangle& t : own_corners_)
+                for (vdtree::Index& corner : t) corner = tree.place_of_leaf(corner) - tree.interior_count();
+            corners_ = own_corners_;
+        }
+        for (const vdtree::Triangle& t : corners_)
+            for (const vdtree::Index place : t) ++first_[place + 1];
         for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
         std::vector<vdtree::Index> next(first_.begin(), first_.end() - 1);
-        for (vdtree::Index t = 0; t < triangles.size(); ++t)
-            for (const vdtree::Index leaf : triangles[t]) triangles_[next[leaf]++] = t;
+        for (vdtree::Index t = 0; t < corners_.size(); ++t)
+            for (const vdtree::Index place : corners_[t]) triangles_[next[place]++] = t;
     }
+    PlaceTriangles(PlaceTriangles&&) = default; // moved vectors keep their memory
 
-    std::span<const vdtree::Index> around(vdtree::Index leaf) const {
-        return std::span(triangles_).subspan(first_[leaf], first_[leaf + 1] - first_[leaf]);
+    const vdtree::Triangle& corners(vdtree::Index triangle) const { return corners_[triangle]; }
+    std::span<const vdtree::Index> around(vdtree::Index place) const {
+        return std::span(triangles_).subspan(first_[place], first_[place + 1] - first_[place]);
     }
 
 private:
+    std::vector<vdtree::Triangle> own_corners_; // of trees with seams
+    std::span<const vdtree::Triangle> corners_;
     std::vector<vdtree::Index> first_, triangles_;
 };
 

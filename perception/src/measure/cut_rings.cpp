@@ -49,7 +49,8 @@ struct Box {
 class Neighbours {
 public:
     explicit Neighbours(const SoundTree& tree)
-        : g_(*tree.data().geometry), interior_(tree.interior_count()), parts_(links_of(g_)) {
+        : g_(*tree.data().geometry), links_(links_of(g_)), interior_(tree.interior_count()),
+          leaves_(tree.interior_wedge_count()), parts_(links_) {
         parts_.assign_triangles(g_.first_triangle, g_.triangles);
     }
 
@@ -60,7 +61,7 @@ protected:
         const float ra = g_.support_spheres[a].radius, rb = g_.support_spheres[b].radius;
         return ra != rb ? ra > rb : a < b;
     }
-    NodeId parent_of_leaf(Index leaf) const { return g_.parents[interior_ + leaf]; }
+    NodeId parent_of_leaf(Index leaf) const { return g_.parents[links_.place_of_leaf(leaf)]; }
     // From a node up, the first that the part owns: what is true of it is true of all above. Or no_node.
     NodeId lowest_owned(const TreePart& part, NodeId node) const {
         while (node != no_node && !parts_.owns(part, node)) node = parts_.is_top(node) ? no_node : g_.parents[node];
@@ -77,8 +78,16 @@ protected:
         });
     }
 
+    // Calls f(wedge) for each wedge of a node.
+    template <class F>
+    void for_each_wedge(NodeId node, F&& f) const {
+        for (WedgeId w = links_.first_wedge_of(node); w < links_.first_wedge_of(node + 1); ++w) f(w);
+    }
+
     const TreeGeometry& g_;
+    TreeLinks links_;
     NodeId interior_;
+    WedgeId leaves_; // the first leaf's
     TreeParts parts_;
 };
 
@@ -98,8 +107,8 @@ struct Lit {
 struct GreyVertices {
     using Light = double;
     explicit GreyVertices(const VertexTree& tree) : luminance(tree.luminance()) {}
-    double operator[](NodeId node) const { return static_cast<double>(luminance[node].value) / Unorm16::largest; }
-    double mean(NodeId a, NodeId b, NodeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3; }
+    double operator[](WedgeId wedge) const { return static_cast<double>(luminance[wedge].value) / Unorm16::largest; }
+    double mean(WedgeId a, WedgeId b, WedgeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3; }
     std::span<const Unorm16> luminance;
 };
 
@@ -109,7 +118,7 @@ struct TexturedVertices {
     explicit TexturedVertices(const VertexTree& tree)
         : luminance(tree.luminance()), uvs(tree.uvs()), pyramid(tree.texture()) {}
 
-    glm::dvec2 mean(NodeId a, NodeId b, NodeId c) const {
+    glm::dvec2 mean(WedgeId a, WedgeId b, WedgeId c) const {
         const glm::dvec3 y(luminance[a].value, luminance[b].value, luminance[c].value);
         const glm::dvec2 u(uvs[a]), v(uvs[b]), w(uvs[c]);
         const double width = std::max({glm::length(v - u), glm::length(w - v), glm::length(u - w)}) / parts;
@@ -136,12 +145,12 @@ struct ColouredVertices {
     using Light = glm::dvec3;
     explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
         parallel_loop(std::size_t{0}, chroma.size(),
-                      [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
+                      [&](std::size_t w) { chroma[w] = drawn_chroma(tree.colours()[w], luminance[w]); });
     }
-    glm::dvec3 operator[](NodeId node) const {
-        return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y};
+    glm::dvec3 operator[](WedgeId wedge) const {
+        return {static_cast<double>(luminance[wedge].value) / Unorm16::largest, chroma[wedge].x, chroma[wedge].y};
     }
-    glm::dvec3 mean(NodeId a, NodeId b, NodeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3.0; }
+    glm::dvec3 mean(WedgeId a, WedgeId b, WedgeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3.0; }
     std::span<const Unorm16> luminance;
     std::vector<glm::vec2> chroma;
 };
@@ -180,7 +189,10 @@ public:
         if constexpr (is_textured) bound_texture();
         find_mean_shifts();
         for (NodeId node = interior_; node-- > 1;) nest(node, g_.parents[node]);
-        if constexpr (is_textured) narrow_unmoved();
+        if constexpr (is_textured) {
+            float& of_root = rings_.texture_deviation[VertexTree::root()];
+            of_root = std::min(of_root, 2 * rings_.radius[VertexTree::root()]);
+        }
         return std::move(rings_);
     }
 
@@ -188,37 +200,39 @@ private:
     // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.
     void bound_along(const TreePart& part, Index here, Index neighbour) {
         NodeId other = parent_of_leaf(neighbour);
+        WedgeId own = links_.wedge_of_leaf(here), its = links_.wedge_of_leaf(neighbour); // that hold the two
         Box places;
         PackedRange lights = empty_range;
         ChromaRange colours{glm::vec2(1e30f), glm::vec2(-1e30f)};
         UvBox uvs;
-        thread_local std::vector<NodeId> others; // with a texture: those seen so far
-        if constexpr (is_textured) others.assign(1, interior_ + neighbour);
+        thread_local std::vector<WedgeId> others; // with a texture: those seen so far
+        if constexpr (is_textured) others.assign(1, its);
         int steps = 0;
         for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour);
              node = g_.parents[node]) {
             for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other]) {
-                places.include(g_.positions[other]);
+                its = links_.wedge_above(other, its);
+                places.include(g_.positions[its]);
                 if constexpr (is_textured) {
-                    lights = unite(lights, shade_of(other));
-                    uvs.include(g_.uvs[other]);
-                    others.push_back(other);
+                    lights = unite(lights, shade_of(its));
+                    uvs.include(g_.uvs[its]);
+                    others.push_back(its);
                 } else {
-                    lights = unite(lights, {l_.luminance[other], l_.luminance[other]});
+                    lights = unite(lights, {l_.luminance[its], l_.luminance[its]});
                 }
-                if constexpr (has_chroma) colours = unite(colours, {vertices_.chroma[other], vertices_.chroma[other]});
+                if constexpr (has_chroma) colours = unite(colours, {vertices_.chroma[its], vertices_.chroma[its]});
                 ++steps;
             }
+            own = links_.wedge_above(node, own);
             if (++steps > most_steps) return reach_everywhere(part, node);
             if (!parts_.owns(part, node)) continue;
             if constexpr (is_textured) {
-                for (const NodeId vertex : others)
-                    residuals_[node] = std::max(residuals_[node], fits_.residual(node, vertex));
-                footprints_[node].include(uvs);
+                for (const WedgeId vertex : others)
+                    residuals_[node] = std::max(residuals_[node], fits_.residual(own, vertex));
+                footprints_[own].include(uvs);
             }
             if (places.is_empty()) continue;
             if constexpr (is_textured) rings_.vertices[node] = unite(rings_.vertices[node], lights);
-            if (is_coincident(node)) continue;
             if constexpr (!is_textured) rings_.luminance[node] = unite(rings_.luminance[node], lights);
             if constexpr (has_chroma) rings_.chroma[node] = unite(rings_.chroma[node], colours);
             include(rings_.radius[node], places.farthest_from(g_.bounds[node].ring.centre));
@@ -231,15 +245,12 @@ private:
         rings_.luminance[node] = {{0}, {Unorm16::largest}};
         if constexpr (is_textured) {
             rings_.vertices[node] = {{0}, {Unorm16::largest}};
-            footprints_[node] = footprints_[VertexTree::root()];
+            for_each_wedge(node, [&](WedgeId wedge) { footprints_[wedge] = footprint_of_all_; });
             residuals_[node] = std::numeric_limits<double>::infinity();
         }
         if constexpr (has_chroma) rings_.chroma[node] = ring_chroma_[VertexTree::root()];
         rings_.radius[node] = std::numeric_limits<float>::max();
     }
-
-    // When it folds nothing moves.
-    bool is_coincident(NodeId node) const { return g_.support_spheres[node].radius == 0; }
 
     // Rounded up.
     static void include(float& radius, double distance) {
@@ -250,18 +261,20 @@ private:
 
     // To the nodes above `here` that support none of the triangle's other corners: the triangle stays when they fold.
     void add_light(const TreePart& part, Index here, Index next, Index last) {
-        const Lit before = light_of(interior_ + here, interior_ + next, interior_ + last);
+        WedgeId own = leaves_ + here;
+        const Lit before = light_of(own, leaves_ + next, leaves_ + last);
         int steps = 0;
         for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, next) && !supports(node, last);
              node = g_.parents[node]) {
             if (++steps > most_steps) return; // it reaches everywhere
+            own = links_.wedge_above(node, own);
             if (!parts_.owns(part, node)) continue;
             around_[node] += before;
-            left_[node] += light_of(node, interior_ + next, interior_ + last);
+            left_[node] += light_of(own, leaves_ + next, leaves_ + last);
         }
     }
 
-    Lit light_of(NodeId a, NodeId b, NodeId c) const {
+    Lit light_of(WedgeId a, WedgeId b, WedgeId c) const {
         const glm::dvec3 at = g_.positions[a];
         const double area =
             glm::length(glm::cross(glm::dvec3(g_.positions[b]) - at, glm::dvec3(g_.positions[c]) - at)) / 2;
@@ -270,14 +283,15 @@ private:
 
     // ---- textures
 
-    PackedRange shade_of(NodeId node) const {
-        const Unorm16 y = l_.luminance[node];
-        return g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y);
+    PackedRange shade_of(WedgeId wedge) const {
+        const Unorm16 y = l_.luminance[wedge];
+        return g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[wedge], y);
     }
 
     // Without the neighbours' proxies: the mesh's own rings and the subtrees.
     void begin_texture() {
         footprints_ = bound_footprints(g_, parts_);
+        for_each_wedge(VertexTree::root(), [&](WedgeId wedge) { footprint_of_all_.include(footprints_[wedge]); });
         fits_ = TextureFits(g_, parts_);
         residuals_.assign(interior_, 0);
         rings_.vertices.assign(interior_, empty_range);
@@ -285,14 +299,15 @@ private:
             return [&](Index triangle) {
                 const Triangle& t = g_.triangles[triangle];
                 PackedRange range = empty_range;
-                for (const Index leaf : t) range = unite(range, shade_of(interior_ + leaf));
+                for (const Index leaf : t) range = unite(range, shade_of(leaves_ + leaf));
                 for (const Index leaf : t)
                     if (const NodeId parent = parent_of_leaf(leaf); parts_.owns(part, parent))
                         rings_.vertices[parent] = unite(rings_.vertices[parent], range);
             };
         });
         for (NodeId node = interior_; node-- > 0;) {
-            rings_.vertices[node] = unite(rings_.vertices[node], shade_of(node));
+            PackedRange& own = rings_.vertices[node];
+            for_each_wedge(node, [&](WedgeId wedge) { own = unite(own, shade_of(wedge)); });
             if (node > 0)
                 rings_.vertices[g_.parents[node]] = unite(rings_.vertices[g_.parents[node]], rings_.vertices[node]);
         }
@@ -305,14 +320,16 @@ private:
         rings_.texture_deviation.resize(interior_);
         for (NodeId node = interior_; node-- > 1;) {
             const NodeId parent = g_.parents[node];
-            footprints_[parent].include(footprints_[node]);
+            for_each_wedge(node, [&](WedgeId wedge) {
+                footprints_[links_.wedge_above(parent, wedge)].include(footprints_[wedge]);
+            });
             rings_.vertices[parent] = unite(rings_.vertices[parent], rings_.vertices[node]);
         }
         parallel_loop(NodeId{0}, interior_, [&](NodeId node) {
-            rings_.texture[node] = vertices_.pyramid.range(footprints_[node]);
-            if (!is_still(node))
-                rings_.luminance[node] =
-                    unite(rings_.luminance[node], product(rings_.vertices[node], rings_.texture[node]));
+            PackedRange& texture = rings_.texture[node] = empty_range;
+            for_each_wedge(
+                node, [&](WedgeId wedge) { texture = unite(texture, vertices_.pyramid.range(footprints_[wedge])); });
+            rings_.luminance[node] = unite(rings_.luminance[node], product(rings_.vertices[node], texture));
             float deviation = 0;
             include(deviation, 2 * residuals_[node]);
             rings_.texture_deviation[node] = deviation;
@@ -320,27 +337,6 @@ private:
         for (NodeId node = interior_; node-- > 1;)
             rings_.texture_deviation[g_.parents[node]] =
                 std::max(rings_.texture_deviation[g_.parents[node]], rings_.texture_deviation[node]);
-    }
-
-    // When it folds nothing moves, not even the texture.
-    bool is_still(NodeId node) const { return is_coincident(node) && !fits_.moves(node); }
-
-    // There no more changes than the coincident vertices differ by, and that shows best where the texture is brightest.
-    void narrow_unmoved() {
-        float& of_root = rings_.texture_deviation[VertexTree::root()];
-        of_root = std::min(of_root, 2 * rings_.radius[VertexTree::root()]);
-        for (NodeId node = 0; node < interior_; ++node) {
-            if (!is_still(node)) continue;
-            PackedRange spread = shade_of(node);
-            for (NodeId below = node; below < g_.subtree_end[node]; ++below) spread = unite(spread, shade_of(below));
-            for (Index leaf = g_.first_leaf[node]; leaf < g_.leaf_end[node]; ++leaf)
-                spread = unite(spread, shade_of(interior_ + leaf));
-            PackedRange& vertices = rings_.vertices[node];
-            const int hi = vertices.lo.value + (spread.hi.value - spread.lo.value);
-            vertices.hi.value = static_cast<std::uint16_t>(std::min<int>(vertices.hi.value, hi));
-            rings_.texture[node].lo = rings_.texture[node].hi;
-            rings_.texture_deviation[node] = 0;
-        }
     }
 
     // What the light shifts by, of vertices alone and of all that is drawn. The latter is measured, by means over parts
@@ -360,10 +356,10 @@ private:
     // Running sums: over the triangles in their order, and over the leaves of a third of the areas around each.
     void sum_up_triangles() {
         before_triangle_.resize(g_.triangles.size() + 1);
-        std::vector<double> of_leaf(l_.luminance.size() - interior_, 0.0);
+        std::vector<double> of_leaf(l_.luminance.size() - leaves_, 0.0);
         for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
             const Triangle& corners = g_.triangles[t];
-            const Lit light = light_of(interior_ + corners[0], interior_ + corners[1], interior_ + corners[2]);
+            const Lit light = light_of(leaves_ + corners[0], leaves_ + corners[1], leaves_ + corners[2]);
             before_triangle_[t + 1] = before_triangle_[t];
             before_triangle_[t + 1] += light;
             for (const Index leaf : corners) of_leaf[leaf] += light.area / 3;
@@ -419,10 +415,11 @@ private:
     std::vector<Lit> before_triangle_;
     std::vector<double> before_leaf_;
 
-    // With a texture, by node.
-    std::vector<UvBox> footprints_;
+    // With a texture.
+    std::vector<UvBox> footprints_; // by wedge
+    UvBox footprint_of_all_;
     TextureFits fits_;
-    std::vector<double> residuals_; // mesh units
+    std::vector<double> residuals_; // by node; mesh units
 };
 
 // The vertices of all cuts' rings, one by one: RingBounder has their luminances' ranges, which lights change.
@@ -440,21 +437,22 @@ public:
 private:
     // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.
     void walk(const TreePart& part, Index here, Index neighbour) {
-        thread_local std::vector<NodeId> others;
+        thread_local std::vector<WedgeId> others;
         others.clear();
         NodeId other = parent_of_leaf(neighbour);
+        WedgeId its = links_.wedge_of_leaf(neighbour);
         std::size_t added = 0;
         for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour);
              node = g_.parents[node]) {
             for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other])
-                others.push_back(other);
+                others.push_back(its = links_.wedge_above(other, its));
             added += others.size() + 1;
             if (added > most_added) { // whatever is above counts as reaching everywhere
                 if (const NodeId owned = lowest_owned(part, node); owned != no_node) add_(owned, no_node);
                 return;
             }
             if (!parts_.owns(part, node)) continue;
-            for (const NodeId vertex : others) add_(node, vertex);
+            for (const WedgeId vertex : others) add_(node, vertex);
         }
     }
 

@@ -45,7 +45,7 @@ public:
 private:
     StagePicture draw(StagePainter& painter, std::span<const Triangle> triangles) const {
         return std::move(
-            painter.draw<1>(triangles, [&](NodeId node) { return std::array<float, 1>{luminance_[node]}; })[0]);
+            painter.draw<1>(triangles, [&](WedgeId wedge) { return std::array<float, 1>{luminance_[wedge]}; })[0]);
     }
 
     std::span<const Unorm16> luminance_;
@@ -57,9 +57,9 @@ public:
     static constexpr std::size_t table_count = LitStages::ambient_shares.size();
 
     explicit SingleLights(const VertexTree& tree)
-        : normals_(tree.node_count()), has_albedo_(!tree.colours().empty() || !tree.texture().empty()) {
-        for (NodeId node = 0; node < tree.node_count(); ++node)
-            normals_[node] = {glm::vec3(tree.normals()[node]), albedo_of(tree, node)};
+        : normals_(tree.wedge_count()), has_albedo_(!tree.colours().empty() || !tree.texture().empty()) {
+        for (WedgeId wedge = 0; wedge < tree.wedge_count(); ++wedge)
+            normals_[wedge] = {glm::vec3(tree.normals()[wedge]), albedo_of(tree, wedge)};
     }
 
     struct Seen {
@@ -109,8 +109,8 @@ private:
                          std::sin(from_view[i]) * (std::cos(around) * camera.right + std::sin(around) * camera.up);
         }
         const auto draw_lit = [&]<std::size_t pictures>() { // the last one painted, if there is one more
-            auto drawn = painter.draw<pictures>(triangles, [&](NodeId node) {
-                const glm::vec4& vertex = normals_[node];
+            auto drawn = painter.draw<pictures>(triangles, [&](WedgeId wedge) {
+                const glm::vec4& vertex = normals_[wedge];
                 std::array<float, pictures> luminance;
                 luminance.back() = vertex.w;
                 for (std::size_t i = 0; i < towards.size(); ++i)
@@ -130,7 +130,7 @@ private:
         }
     }
 
-    std::vector<glm::vec4> normals_; // and the albedo
+    std::vector<glm::vec4> normals_; // by wedge, and the albedo
     bool has_albedo_;
 };
 
@@ -143,7 +143,12 @@ public:
           interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
-            for (NodeId& corner : t) corner += interior_;
+            for (WedgeId& corner : t) corner = tree.wedge_of_leaf(corner);
+        if (tree.has_seams()) {
+            nodes_.resize(tree.wedge_count());
+            for (NodeId node = 0; node < tree.node_count(); ++node)
+                std::fill(nodes_.begin() + tree.first_wedge(node), nodes_.begin() + tree.wedge_end(node), node);
+        }
         for (std::size_t i = 0; i < direction_count; ++i) cameras_.push_back(stage_camera(tree.bounding_sphere(), i));
     }
 
@@ -234,8 +239,11 @@ private:
         folded_.resize(interior_);
         for (NodeId node = 0; node < interior_; ++node) folded_[node] = goes_on(node) ? folded_[parents_[node]] : node;
         for (Triangle& t : triangles_)
-            for (NodeId& corner : t)
-                if (goes_on(corner)) corner = folded_[parents_[corner]];
+            for (WedgeId& corner : t) {
+                const NodeId node = nodes_.empty() ? corner : nodes_[corner];
+                if (goes_on(node)) corner = tree_.wedge_above(folded_[parents_[node]], corner);
+            }
+        // Two corners of one triangle in one node are one wedge.
         std::erase_if(triangles_, uses_a_vertex_twice);
     }
 
@@ -258,7 +266,8 @@ private:
     double dearness_ = 1; // of a picture, of the first ones'
     NodeId interior_;
     std::span<const NodeId> parents_;
-    std::vector<Triangle> triangles_; // as folded, over nodes
+    std::vector<Triangle> triangles_; // as folded, over wedges
+    std::vector<NodeId> nodes_;       // by wedge; empty: they have the same numbers
     std::vector<NodeId> folded_;      // by interior node: where it has gone
     std::vector<StageCamera> cameras_;
     tbb::enumerable_thread_specific<StageSurfaces> surfaces_;

@@ -39,15 +39,16 @@ public:
              std::vector<Contact> contacts)
         : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()),
           leaf_end_(tree_.leaf_end()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
-          support_(tree_.support_spheres()), interior_(tree_.interior_count()), of_leaf_(tree_),
-          border_(tree_, of_leaf_), neighbours_(trees), crossing_(interior_), contacts_(std::move(contacts)),
-          witnesses_(interior_), points_(tree_.node_count()) {
-        for (NodeId node = 0; node < tree_.node_count(); ++node) {
-            points_[node].position = tree_.positions()[node];
-            for (std::size_t i = 0; i < luminances; ++i) points_[node].luminance[i] = trees[i].luminance()[node];
+          support_(tree_.support_spheres()), interior_(tree_.interior_count()), mesh_(tree_), border_(tree_, mesh_),
+          neighbours_(trees), crossing_(interior_), contacts_(std::move(contacts)), witnesses_(interior_),
+          points_(tree_.wedge_count()) {
+        for (WedgeId wedge = 0; wedge < tree_.wedge_count(); ++wedge) {
+            Point& to = points_[wedge];
+            to.position = tree_.positions()[wedge];
+            for (std::size_t i = 0; i < luminances; ++i) to.luminance[i] = trees[i].luminance()[wedge];
             if constexpr (is_textured) {
-                const glm::vec2 uv = tree_.uvs()[node];
-                points_[node].luminance[Texture::u_channel] = uv.x, points_[node].luminance[Texture::v_channel] = uv.y;
+                const glm::vec2 uv = tree_.uvs()[wedge];
+                to.luminance[Texture::u_channel] = uv.x, to.luminance[Texture::v_channel] = uv.y;
             }
         }
         if constexpr (is_textured) texture_.emplace(tree_, lights_);
@@ -95,6 +96,7 @@ private:
     };
     struct Sample {
         Point point;
+        unsigned sheet;  // of RingTriangle
         Index leaf;      // none for points that are no leaves
         bool is_typical; // not chosen for its error
         Difference error;
@@ -106,6 +108,7 @@ private:
         Ring<channels> ring;
         std::vector<NodeId> shown_before; // Ring::shown as it was measured before
         Surface before_surface, after_surface;
+        float aside = 0; // of Surface::compare()
         Points points;
         bool compares_fine = false; // the fine surfaces are others than the coarse ones, and small enough
         std::array<FoldPicture, picture_sizes.size()> pictures;
@@ -113,16 +116,14 @@ private:
     };
     using Witnesses = std::array<Index, witness_count>;
 
-    const Point& point(NodeId node) const { return points_[node]; }
-    const Point& leaf_point(Index leaf) const { return point(interior_ + leaf); }
+    const Point& leaf_point(Index leaf) const { return points_[tree_.wedge_of_leaf(leaf)]; }
 
     // Triangles with a corner in the support that the children, folded, leave.
     std::vector<Index> crossing(NodeId node) {
         std::vector<Index> all;
         tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) {
-                const Index leaf = child - interior_;
-                const std::span<const Index> around = of_leaf_.around(leaf);
+            if (tree_.is_place(child)) {
+                const std::span<const Index> around = mesh_.around(child - interior_);
                 all.insert(all.end(), around.begin(), around.end());
                 return;
             }
@@ -170,11 +171,12 @@ private:
             lay_out(tree_, std::span<const Point>(points_), node, crossing_[node], stand_in, ring).slabs();
         if (says == Says::all && ring.shown == scratch.shown_before) return;
         facing.facing |= turned;
-        const Point proxy = point(node);
+        const Point proxy = points_[tree_.first_wedge(node)];
         if (ring.after.empty()) ring.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
         const auto raise = [](float& to, float value) { to = std::max(to, value); };
         const float extent = mean_reach(std::span<const RingTriangle>(ring.after), proxy) / 2,
                     width = std::max(support_[node].radius, extent);
+        scratch.aside = tree_.has_seams() ? seam_width * width : 0.0f;
         if constexpr (is_textured) texture_->look_at(node, crossing_[node], width, scratch.texture);
         Difference worst;
         const Difference mean = compare_surfaces(scratch, worst);
@@ -210,8 +212,8 @@ private:
         scratch.after_surface.assign(scratch.ring.after);
         Mean over_leaves, over_before, over_after;
         scratch.points.clear();
-        for (const Sample& sample : scratch.samples) scratch.points.add(sample.point);
-        scratch.after_surface.compare(scratch.points);
+        for (const Sample& sample : scratch.samples) scratch.points.add(sample.point, sample.sheet);
+        scratch.after_surface.compare(scratch.points, scratch.aside);
         for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
             Sample& sample = scratch.samples[i];
             const Difference error = difference(scratch.points, i, scratch);
@@ -252,7 +254,7 @@ private:
         if (!(length > 0) || !(width > 0)) return false;
         std::array<FoldPicture, picture_sizes.size()>& pictures = scratch.pictures;
         for (std::size_t size = 0; size < pictures.size(); ++size)
-            pictures[size].look(points_[node].position, normal / length, picture_sizes[size] * width);
+            pictures[size].look(tree_.position(node), normal / length, picture_sizes[size] * width);
         draw_mesh(node, scratch);
         if constexpr (is_textured) texture_->begin_pictures(pictures, scratch.texture);
         const auto weights = [&](std::size_t size) -> const typename FoldPicture::BandCells* {
@@ -317,12 +319,12 @@ private:
             for (std::size_t k = 0; k < 3; ++k) {
                 if (!((t.inside >> k) & 1)) continue;
                 const Point &a = t.corner[k], &b = t.corner[(k + 1) % 3], middle = middle_of(a, b);
-                points.add(middle);
-                points.add(middle_of(a, middle));
-                points.add(middle_of(middle, b));
+                points.add(middle, t.sheet);
+                points.add(middle_of(a, middle), t.sheet);
+                points.add(middle_of(middle, b), t.sheet);
             }
         }
-        with.compare(points);
+        with.compare(points, scratch.aside);
         for (std::size_t i = 0; i < points.size(); ++i) {
             const Difference here = difference(points, i, scratch);
             worst.include(here);
@@ -350,15 +352,20 @@ private:
     }
 
     void add_samples(NodeId node, Scratch& scratch) const {
-        const auto add_leaf = [&](Index leaf, bool is_typical) {
-            scratch.samples.push_back({leaf_point(leaf), leaf, is_typical, {}});
+        const WedgeId first = tree_.first_wedge(node), leaves_from = tree_.interior_wedge_count();
+        const auto add = [&](WedgeId wedge, Index leaf, bool is_typical) {
+            const unsigned sheet = tree_.wedge_above(node, wedge) - first;
+            scratch.samples.push_back({points_[wedge], sheet, leaf, is_typical, {}});
         };
+        const auto add_leaf = [&](Index leaf, bool is_typical) { add(leaves_from + leaf, leaf, is_typical); };
         tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) {
-                add_leaf(child - interior_, false);
-                return;
+            const WedgeId begin = tree_.first_wedge(child), wedges = tree_.wedge_end(child) - begin,
+                          compared = std::min(wedges, most_wedges_compared);
+            for (WedgeId i = 0; i < compared; ++i) {
+                const WedgeId wedge = begin + static_cast<WedgeId>(std::uint64_t{wedges} * i / compared);
+                add(wedge, tree_.is_place(child) ? wedge - leaves_from : none, false);
             }
-            scratch.samples.push_back({point(child), none, false, {}});
+            if (tree_.is_place(child)) return;
             for (const Index leaf : witnesses_[child])
                 if (leaf != none) add_leaf(leaf, false);
         });
@@ -392,13 +399,13 @@ private:
     std::span<const Triangle> triangles_;
     std::span<const Sphere> support_;
     NodeId interior_;
-    LeafTriangles of_leaf_;
+    PlaceTriangles mesh_;
     BorderShifts border_;
     FoldNeighbours<luminances> neighbours_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
-    std::vector<Point> points_; // of nodes
+    std::vector<Point> points_; // of wedges
     std::optional<Texture> texture_;
 };
 

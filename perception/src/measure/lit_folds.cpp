@@ -197,10 +197,10 @@ struct LitFolds::State {
 Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Progress& progress) {
     std::vector<Shading> shadings;
     for (int axis = 0; axis < 3; ++axis)
-        shadings.push_back([&tree, axis](NodeId node) {
-            return (offset + albedo_of(tree, node) * glm::vec3(tree.normals()[node])[axis]) / scale;
+        shadings.push_back([&tree, axis](WedgeId wedge) {
+            return (offset + albedo_of(tree, wedge) * glm::vec3(tree.normals()[wedge])[axis]) / scale;
         });
-    if (has_albedo(tree)) shadings.push_back([&tree](NodeId node) { return albedo_of(tree, node); });
+    if (has_albedo(tree)) shadings.push_back([&tree](WedgeId wedge) { return albedo_of(tree, wedge); });
     constexpr float unlit = offset / scale; // what a vertex is in the pictures that no light makes bright
     constexpr float dark[] = {unlit, unlit, unlit, 0};
     auto measured = measure_shadings(tree, shadings, std::span(dark).first(shadings.size()), scale, threads, progress);
@@ -290,10 +290,10 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
     if (state_->folds.size() != tree.interior_count())
         return invalid_argument("What folds change under lights was measured of another tree.");
     const auto lit = tree.shaded(
-        [&](NodeId node) {
-            return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[node]),
-                                                    glm::dvec3(glm::vec3(tree.normals()[node])),
-                                                    static_cast<double>(albedo_of(tree, node)), glm::dvec3(0)));
+        [&](WedgeId wedge) {
+            return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[wedge]),
+                                                    glm::dvec3(glm::vec3(tree.normals()[wedge])),
+                                                    static_cast<double>(albedo_of(tree, wedge)), glm::dvec3(0)));
         },
         true);
     if (!lit) return lit.error();

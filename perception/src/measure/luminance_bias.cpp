@@ -59,20 +59,23 @@ private:
         }
     }
 
-    float mean_luminance(const Triangle& t) const {
+    using Wedges = std::array<WedgeId, 3>;
+    float mean_luminance(const Wedges& t) const {
         if (of_texture_.texture)
             return of_texture_.mean({luminance_[t[0]], luminance_[t[1]], luminance_[t[2]]},
                                     {tree_.uvs()[t[0]], tree_.uvs()[t[1]], tree_.uvs()[t[2]]});
+        return mean_of_vertices(t);
+    }
+    float mean_of_vertices(const Wedges& t) const {
         return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
     }
 
     // A third of each triangle belongs to each corner.
     void collect_surfaces() {
-        for (const Triangle& corners : tree_.triangles()) {
-            const Triangle t = {corners[0] + interior_, corners[1] + interior_, corners[2] + interior_};
+        for (Index t = 0; t < tree_.triangle_count(); ++t) {
             Surface third;
-            third.add(mesh_.vector_area(t) / 3.0f, mean_luminance(t));
-            for (const NodeId leaf : t) surfaces_[parents_[leaf]].add(third);
+            third.add(mesh_.vector_area(t) / 3.0f, mean_luminance(mesh_.wedges(t)));
+            for (const NodeId place : mesh_.corners(t)) surfaces_[parents_[place]].add(third);
         }
         for (NodeId node = interior_; node-- > 1;) surfaces_[parents_[node]].add(surfaces_[node]);
     }
@@ -87,29 +90,31 @@ private:
             glm::vec3 light(0), of_vertices(0);
             float area = 0;
             mean_texture_ = textures_.empty() ? 1.0f : textures_[node].mean;
-            mesh_.fold(node, [&](const Triangle& t) {
+            mesh_.fold(node, [&](Index t) {
                 light -= light_of(t);
                 of_vertices -= light_of_vertices(t);
             });
             for (const Index t : mesh_.ring(node)) {
-                light += light_of(mesh_.corners(t));
-                of_vertices += light_of_vertices(mesh_.corners(t));
-                area += glm::length(mesh_.vector_area(mesh_.corners(t)));
+                light += light_of(t);
+                of_vertices += light_of_vertices(t);
+                area += glm::length(mesh_.vector_area(t));
             }
             light_[node] = textures_.empty() ? light : of_vertices + from_slide(node, light - of_vertices, area);
         }
         for (NodeId node = interior_; node-- > 1;) light_[parents_[node]] += light_[node];
     }
 
-    glm::vec3 light_of(const Triangle& t) const { return mean_luminance(t) * mesh_.vector_area(t); }
+    glm::vec3 light_of(Index triangle) const {
+        return mean_luminance(mesh_.wedges(triangle)) * mesh_.vector_area(triangle);
+    }
 
     // ---- with a texture
 
     // With the texture's mean all over it.
-    glm::vec3 light_of_vertices(const Triangle& t) const {
+    glm::vec3 light_of_vertices(Index triangle) const {
         if (textures_.empty()) return glm::vec3(0);
-        const float vertices = (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
-        return of_texture_.with_texture(vertices, mean_texture_) * mesh_.vector_area(t);
+        const float vertices = mean_of_vertices(mesh_.wedges(triangle));
+        return of_texture_.with_texture(vertices, mean_texture_) * mesh_.vector_area(triangle);
     }
     // No more light comes and goes with a texture than lies where it slides to; what is measured of it above that is
     // what means over parts of triangles are wrong by.
@@ -238,7 +243,7 @@ private:
     std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
     NodeId interior_;
-    std::span<const Unorm16> luminance_;
+    std::span<const Unorm16> luminance_; // by wedge
     float mean_texture_ = 1;
     std::span<const NodeId> parents_;
     FoldSequence mesh_;

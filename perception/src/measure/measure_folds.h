@@ -13,8 +13,8 @@ struct MeasuredFolds { // by interior node
     std::vector<FoldTexture> textures; // of textured trees; else empty
 };
 
-// What a tree's nodes are given as luminance.
-using Shading = Callback<float(vdtree::NodeId)>;
+// What a tree's wedges are given as luminance.
+using Shading = Callback<float(vdtree::WedgeId)>;
 
 struct MeasuredShadings {
     std::vector<MeasuredFolds> of; // by shading

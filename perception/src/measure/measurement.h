@@ -17,8 +17,12 @@ inline constexpr int revision = 2; // one more where the same settings give othe
 // ---- points
 // Leaves of a node for its parent: the worst in distance, the worst in luminance.
 inline constexpr std::size_t witness_count = 4;
-inline constexpr std::uint32_t spread_count = 8;       // leaves compared besides, at equal steps through the support
-inline constexpr std::size_t triangles_compared = 16;  // of each surface, at equal steps
+inline constexpr std::uint32_t spread_count = 8;          // leaves compared besides, at equal steps through the support
+inline constexpr std::size_t triangles_compared = 16;     // of each surface, at equal steps
+inline constexpr std::uint32_t most_wedges_compared = 16; // of a child: poles have as many as triangles
+// Of the width that a fold changes: surfaces whose distances from a point differ by less meet at a seam, and of those
+// the point's own side counts. Some hundred times what rounding makes of distances.
+inline constexpr float seam_width = 1e-3f;
 inline constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 // Neighbours with more than so many times the node's luminance range fold later than it: they are not folded with it.
 inline constexpr int much_more = 2;
@@ -76,6 +80,8 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        witness_count,
                                                        spread_count,
                                                        triangles_compared,
+                                                       most_wedges_compared,
+                                                       seam_width,
                                                        most_fine_triangles,
                                                        much_more,
                                                        much_less,

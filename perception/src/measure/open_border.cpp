@@ -1,7 +1,6 @@
 #include "measure/open_border.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "measure/measurement.h"
 
@@ -11,37 +10,6 @@ using namespace vdtree;
 
 namespace {
 
-// Nodes that may touch a border. The tree does not say so for nodes of coincident vertices alone, whose merging moves
-// nothing: they are like the node above them.
-std::vector<bool> nodes_near_border(const SoundTree& tree) {
-    std::vector<bool> is_near(tree.interior_count());
-    for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        const bool is_point = node > 0 && tree.support_spheres()[node].radius == 0;
-        is_near[node] = (tree.bounds()[node].flags & irregular_ring) || (is_point && is_near[tree.parents()[node]]);
-    }
-    return is_near;
-}
-
-// Leaves at one position are one place, named after the first of them.
-struct Places {
-    std::vector<Index> leaves; // those at the same place side by side
-    std::vector<Index> of;     // by leaf
-
-    explicit Places(std::span<const glm::vec3> positions) : leaves(positions.size()), of(positions.size()) {
-        std::iota(leaves.begin(), leaves.end(), Index{0});
-        std::sort(leaves.begin(), leaves.end(), [&](Index a, Index b) {
-            const glm::vec3 &p = positions[a], &q = positions[b];
-            if (p.x != q.x) return p.x < q.x;
-            if (p.y != q.y) return p.y < q.y;
-            return p.z != q.z ? p.z < q.z : a < b;
-        });
-        for (std::size_t i = 0; i < leaves.size(); ++i) {
-            const bool is_first = i == 0 || positions[leaves[i - 1]] != positions[leaves[i]];
-            of[leaves[i]] = is_first ? leaves[i] : of[leaves[i - 1]];
-        }
-    }
-};
-
 // An edge from a place.
 struct Edge {
     Index to, opposite; // places: the other end, and the triangle's third corner
@@ -49,8 +17,7 @@ struct Edge {
     unsigned number; // of the triangle's edges
 };
 
-void add_edges(Index from, Index triangle, const std::array<Index, 3>& at, std::vector<Edge>& edges) {
-    if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) return;
+void add_edges(Index from, Index triangle, const Triangle& at, std::vector<Edge>& edges) {
     for (unsigned k = 0; k < 3; ++k) {
         const unsigned next = (k + 1) % 3;
         if (at[k] == from) edges.push_back({at[next], at[(k + 2) % 3], triangle, k});
@@ -73,40 +40,28 @@ void mark_odd(std::vector<Edge>& edges, std::vector<std::uint8_t>& edges_of) {
 
 } // namespace
 
-OpenBorder::OpenBorder(const SoundTree& tree, const LeafTriangles& of_leaf) {
+OpenBorder::OpenBorder(const SoundTree& tree, const PlaceTriangles& mesh) {
     if (!(tree.bounds()[VertexTree::root()].flags & irregular_ring)) return;
-    find_edges(tree, of_leaf);
-    collect_ends(tree);
+    find_edges(tree, mesh);
+    collect_ends(tree, mesh);
     if (ends_.empty()) edges_of_ = {};
 }
 
-void OpenBorder::find_edges(const SoundTree& tree, const LeafTriangles& of_leaf) {
-    const NodeId interior = tree.interior_count();
-    const std::vector<bool> is_near = nodes_near_border(tree);
-    const Places places(tree.positions().subspan(interior));
+void OpenBorder::find_edges(const SoundTree& tree, const PlaceTriangles& mesh) {
     edges_of_.assign(tree.triangles().size(), 0);
     std::vector<Edge> edges;
-    for (std::size_t first = 0, end = 0; first < places.leaves.size(); first = end) {
-        const Index here = places.of[places.leaves[first]];
-        while (end < places.leaves.size() && places.of[places.leaves[end]] == here) ++end;
-        const std::span<const Index> at_place = std::span(places.leaves).subspan(first, end - first);
-        if (std::none_of(at_place.begin(), at_place.end(),
-                         [&](Index leaf) { return is_near[tree.parents()[interior + leaf]]; }))
-            continue;
+    for (Index place = 0; place < tree.place_count(); ++place) {
+        const NodeId above = tree.parents()[tree.interior_count() + place];
+        if (!(tree.bounds()[above].flags & irregular_ring)) continue;
         edges.clear();
-        for (const Index leaf : at_place) {
-            for (const Index triangle : of_leaf.around(leaf)) {
-                const Triangle& t = tree.triangles()[triangle];
-                add_edges(here, triangle, {places.of[t[0]], places.of[t[1]], places.of[t[2]]}, edges);
-            }
-        }
+        for (const Index triangle : mesh.around(place)) add_edges(place, triangle, mesh.corners(triangle), edges);
         mark_odd(edges, edges_of_);
     }
 }
 
-void OpenBorder::collect_ends(const SoundTree& tree) {
+void OpenBorder::collect_ends(const SoundTree& tree, const PlaceTriangles& mesh) {
     for (Index triangle = 0; triangle < tree.triangles().size(); ++triangle) {
-        const Triangle& t = tree.triangles()[triangle];
+        const Triangle& t = mesh.corners(triangle);
         for (unsigned k = 0; k < 3; ++k) {
             if (!((edges_of_[triangle] >> k) & 1)) continue;
             ends_.push_back({t[k], t[(k + 1) % 3], t[(k + 2) % 3]});
@@ -114,8 +69,8 @@ void OpenBorder::collect_ends(const SoundTree& tree) {
         }
     }
     std::sort(ends_.begin(), ends_.end());
-    first_end_.assign(std::size_t{tree.leaf_count()} + 1, 0);
-    for (const End& end : ends_) ++first_end_[end.leaf + 1];
+    first_end_.assign(std::size_t{tree.place_count()} + 1, 0);
+    for (const End& end : ends_) ++first_end_[end.place + 1];
     for (std::size_t i = 1; i < first_end_.size(); ++i) first_end_[i] += first_end_[i - 1];
 }
 
@@ -149,15 +104,14 @@ float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3
 using namespace vdtree;
 using namespace measurement;
 
-BorderShifts::BorderShifts(const SoundTree& tree, const LeafTriangles& of_leaf)
-    : tree_(tree), border_(tree, of_leaf), interior_(tree.interior_count()), positions_(tree.positions()),
-      first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
-      triangles_(tree.triangles()), support_(tree.support_spheres()), levels_below_(interior_) {}
+BorderShifts::BorderShifts(const SoundTree& tree, const PlaceTriangles& mesh)
+    : tree_(tree), border_(tree, mesh), interior_(tree.interior_count()), first_leaf_(tree.first_leaf()),
+      leaf_end_(tree.leaf_end()), parents_(tree.parents()), triangles_(tree.triangles()),
+      support_(tree.support_spheres()), levels_below_(interior_) {}
 
 float BorderShifts::shift(NodeId node, std::span<const Index> crossing,
                           const FunctionRef<NodeId(Index leaf)>& stand_in) {
     if (border_.is_empty() || !(tree_.bounds()[node].flags & irregular_ring)) return 0;
-    if (!(support_[node].radius > 0)) return 0; // all of it is at one point
     thread_local Scratch scratch;
     int below = 0;
     tree_.for_each_child(node, [&](NodeId child) {
@@ -173,7 +127,8 @@ float BorderShifts::shift(NodeId node, std::span<const Index> crossing,
 
 std::span<const OpenBorder::End> BorderShifts::border_of(NodeId node) const {
     if (node >= interior_) return border_.at(node - interior_, node - interior_ + 1);
-    return border_.at(first_leaf_[node], leaf_end_[node]);
+    const NodeId first = tree_.place_of_leaf(first_leaf_[node]), last = tree_.place_of_leaf(leaf_end_[node] - 1);
+    return border_.at(first - interior_, last - interior_ + 1);
 }
 
 // Down the tree, where the ring may be nearer than what was seen. False where that was too much: then only some edges
@@ -181,7 +136,7 @@ std::span<const OpenBorder::End> BorderShifts::border_of(NodeId node) const {
 bool BorderShifts::look_at_border(NodeId top, BorderSide& side, Scratch& scratch) const {
     constexpr std::size_t few = 16; // edges, which are looked at one by one
     const auto look_at = [&](const OpenBorder::End& end) {
-        side.look_at({leaf_place(end.leaf), leaf_place(end.other)}, leaf_place(end.opposite));
+        side.look_at({at_place(end.place), at_place(end.other)}, at_place(end.opposite));
     };
     if (scratch.looks_left == 0) {
         const std::span<const OpenBorder::End> ends = border_of(top);
@@ -214,7 +169,7 @@ float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> cros
                                         const FunctionRef<NodeId(Index)>& stand_in, Scratch& scratch) const {
     const std::span<const OpenBorder::End> ends = border_of(node);
     if (ends.empty()) return 0;
-    const glm::vec3 proxy = place(node);
+    const glm::vec3 proxy = at(node);
     scratch.folded.clear();
     scratch.folded_alone.clear();
     for (const Index t : crossing) {
@@ -223,14 +178,14 @@ float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> cros
             Index in = triangles_[t][k], out = triangles_[t][(k + 1) % 3];
             if (!supports(node, in)) std::swap(in, out);
             if (!supports(node, in) || supports(node, out)) continue; // not here, or vanishes
-            scratch.folded.push_back({proxy, place(stand_in(out))});
-            scratch.folded_alone.push_back({proxy, leaf_place(out)});
+            scratch.folded.push_back({proxy, at(stand_in(out))});
+            scratch.folded_alone.push_back({proxy, at_leaf(out)});
         }
     }
     scratch.points.clear();
     const std::size_t count = std::min(ends.size(), most_border_ends);
     for (std::size_t i = 0; i < count; ++i) {
-        const glm::vec3& p = leaf_place(ends[i * ends.size() / count].leaf);
+        const glm::vec3& p = at_place(ends[i * ends.size() / count].place);
         if (scratch.points.empty() || scratch.points.back() != p) scratch.points.push_back(p);
     }
     float largest = 0;
@@ -252,7 +207,7 @@ float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> cros
 
 // The nodes that may stand for a leaf while they are no larger than the node, and not for another leaf, too.
 void BorderShifts::find_stand_ins(Index leaf, NodeId node, Index without, std::vector<NodeId>& nodes) const {
-    nodes.assign(1, interior_ + leaf);
+    nodes.assign(1, tree_.place_of_leaf(leaf));
     for (NodeId up = parents_[nodes.back()];
          up != no_node && is_larger(node, up) && !supports(up, without) && nodes.size() < most_stand_ins;
          up = parents_[up])
@@ -262,20 +217,20 @@ void BorderShifts::find_stand_ins(Index leaf, NodeId node, Index without, std::v
 // A folded sheet covers what lies beyond its folded border from both sides equally often: only triangles that have
 // turned over, and others below them, lie there. In any cut, each such triangle has a largest node among its corners.
 float BorderShifts::turned_reach(NodeId node, std::span<const Index> crossing, float least, Scratch& scratch) const {
-    const glm::vec3 proxy = place(node);
+    const glm::vec3 proxy = at(node);
     for (const Index t : crossing) {
         const Triangle& corners = triangles_[t];
         std::size_t k = 0;
         while (!supports(node, corners[k])) ++k;
         const Index next = corners[(k + 1) % 3], last = corners[(k + 2) % 3];
         if (supports(node, next) || supports(node, last)) continue; // vanishes
-        const glm::vec3 a = leaf_place(corners[k]);
-        const glm::vec3 normal = glm::cross(leaf_place(next) - a, leaf_place(last) - a);
+        const glm::vec3 a = at_leaf(corners[k]);
+        const glm::vec3 normal = glm::cross(at_leaf(next) - a, at_leaf(last) - a);
         find_stand_ins(next, node, last, scratch.second);
         find_stand_ins(last, node, next, scratch.third);
         for (const NodeId second : scratch.second) {
             for (const NodeId third : scratch.third) {
-                const glm::vec3 b = place(second) - proxy, c = place(third) - proxy, turned = glm::cross(b, c);
+                const glm::vec3 b = at(second) - proxy, c = at(third) - proxy, turned = glm::cross(b, c);
                 if (!(glm::dot(turned, normal) < 0)) continue;
                 // It reaches no farther than its least height.
                 const float longest = std::max({glm::dot(b, b), glm::dot(c, c), glm::dot(c - b, c - b)});
@@ -289,7 +244,7 @@ float BorderShifts::turned_reach(NodeId node, std::span<const Index> crossing, f
 
 float BorderShifts::reach_of(NodeId a, NodeId b, NodeId c, Scratch& scratch) const {
     if (border_of(a).empty() && border_of(b).empty() && border_of(c).empty()) return 0;
-    const glm::vec3 p = place(a), q = place(b), r = place(c);
+    const glm::vec3 p = at(a), q = at(b), r = at(c);
     float reach = 0;
     for (const glm::vec3& at : {(p + q) * 0.5f, (q + r) * 0.5f, (r + p) * 0.5f, (p + q + r) / 3.0f}) {
         BorderSide side(at);

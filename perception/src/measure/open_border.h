@@ -7,36 +7,35 @@
 
 namespace unseen::perception {
 
-// Edges of an odd number of triangles, of one mostly. Vertices at one position are one vertex here: triangles that have
-// two corners there have no edges, and triangles with the same corners count once. Folded, the border is what becomes
+// Edges between places of an odd number of triangles, of one mostly. Triangles with the same corners count once. Folded, the border is what becomes
 // of these edges: it goes with the triangles' corners.
 class OpenBorder {
 public:
     // Cost: nothing where the surface is closed; some 100 ns for each triangle of a place where it is not.
-    OpenBorder(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+    OpenBorder(const vdtree::SoundTree& tree, const PlaceTriangles& mesh);
 
     bool is_empty() const { return ends_.empty(); }
 
     // A bit for each edge, from corner k to the next.
     unsigned edges_of(vdtree::Index triangle) const { return edges_of_.empty() ? 0 : edges_of_[triangle]; }
 
-    // By the leaf at the one end; each edge is there twice.
+    // By the place at the one end; each edge is there twice.
     struct End {
-        vdtree::Index leaf, other, opposite; // the third corner of the triangle
+        vdtree::Index place, other, opposite; // the third corner of the triangle
         auto operator<=>(const End&) const = default;
     };
-    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const {
+    std::span<const End> at(vdtree::Index first_place, vdtree::Index place_end) const {
         if (ends_.empty()) return {};
-        return std::span(ends_).subspan(first_end_[first_leaf], first_end_[leaf_end] - first_end_[first_leaf]);
+        return std::span(ends_).subspan(first_end_[first_place], first_end_[place_end] - first_end_[first_place]);
     }
 
 private:
-    void find_edges(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
-    void collect_ends(const vdtree::SoundTree& tree);
+    void find_edges(const vdtree::SoundTree& tree, const PlaceTriangles& mesh);
+    void collect_ends(const vdtree::SoundTree& tree, const PlaceTriangles& mesh);
 
     std::vector<std::uint8_t> edges_of_; // by triangle; empty: there is no border
     std::vector<End> ends_;
-    std::vector<vdtree::Index> first_end_; // by leaf, one more
+    std::vector<vdtree::Index> first_end_; // by place, one more
 };
 
 struct Segment {
@@ -86,7 +85,7 @@ float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3
 class BorderShifts {
 public:
     // Keeps references to both.
-    BorderShifts(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+    BorderShifts(const vdtree::SoundTree& tree, const PlaceTriangles& mesh);
 
     // The largest distance, mesh units, between the mesh's own border and the one that the node's fold leaves: with no
     // neighbour folded, and with those that `stand_in` gives for leaves outside of the support. And how far triangles
@@ -112,8 +111,9 @@ private:
     bool is_larger(vdtree::NodeId a, vdtree::NodeId b) const { // ancestors are larger than their descendants
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
-    const glm::vec3& place(vdtree::NodeId node) const { return positions_[node]; }
-    const glm::vec3& leaf_place(vdtree::Index leaf) const { return positions_[interior_ + leaf]; }
+    const glm::vec3& at(vdtree::NodeId node) const { return tree_.position(node); }
+    const glm::vec3& at_place(vdtree::Index place) const { return tree_.position(interior_ + place); }
+    const glm::vec3& at_leaf(vdtree::Index leaf) const { return tree_.positions()[tree_.wedge_of_leaf(leaf)]; }
     std::span<const OpenBorder::End> border_of(vdtree::NodeId node) const;
     bool look_at_border(vdtree::NodeId top, BorderSide& side, Scratch& scratch) const;
     float distance_of_borders(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
@@ -128,7 +128,6 @@ private:
     const vdtree::SoundTree& tree_;
     OpenBorder border_;
     vdtree::NodeId interior_;
-    std::span<const glm::vec3> positions_; // of nodes
     std::span<const vdtree::Index> first_leaf_, leaf_end_;
     std::span<const vdtree::NodeId> parents_;
     std::span<const vdtree::Triangle> triangles_;

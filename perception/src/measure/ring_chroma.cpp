@@ -37,8 +37,8 @@ glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance) {
 bool has_chroma(const VertexTree& tree) {
     const auto colours = tree.colours();
     const auto luminance = tree.luminance();
-    for (std::size_t node = 0; node < colours.size(); ++node) {
-        const glm::vec2 chroma = drawn_chroma(colours[node], luminance[node]);
+    for (std::size_t wedge = 0; wedge < colours.size(); ++wedge) {
+        const glm::vec2 chroma = drawn_chroma(colours[wedge], luminance[wedge]);
         if (!(std::max(std::abs(chroma.x), std::abs(chroma.y)) <= grey_slack)) return true;
     }
     return false;
@@ -53,15 +53,15 @@ Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {
     TreeParts parts(links_of(g));
     parts.assign_triangles(sound->first_triangle(), sound->triangles());
     const TreeLinks tree = links_of(g);
-    const NodeId interior = tree.interior();
-    std::vector<glm::vec2> chroma(luminance.size());
+    const WedgeId leaves = tree.wedge_of_leaf(0);
+    std::vector<glm::vec2> chroma(luminance.size()); // by wedge
     constexpr std::size_t grain = 4096;
     parallel_loop_over(tbb::blocked_range<std::size_t>(0, chroma.size(), grain), [&](const auto& range) {
-        for (std::size_t node = range.begin(); node < range.end(); ++node)
-            chroma[node] = drawn_chroma(g.colours[node], luminance[node]);
+        for (std::size_t wedge = range.begin(); wedge < range.end(); ++wedge)
+            chroma[wedge] = drawn_chroma(g.colours[wedge], luminance[wedge]);
     });
 
-    const auto of_leaf = [&](Index leaf) { return ChromaRange{chroma[interior + leaf], chroma[interior + leaf]}; };
+    const auto of_leaf = [&](Index leaf) { return ChromaRange{chroma[leaves + leaf], chroma[leaves + leaf]}; };
     std::vector<ChromaRange> around(tree.leaves());
     for (Index leaf = 0; leaf < tree.leaves(); ++leaf) around[leaf] = of_leaf(leaf);
     parts.for_each_triangle([&](const TreePart& part) {
@@ -73,19 +73,15 @@ Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {
                 if (parts.owns_leaf(part, leaf)) around[leaf] = unite(around[leaf], range);
         };
     });
-    std::vector<ChromaRange> ring(interior);
+    std::vector<ChromaRange> ring(tree.interior());
     parts.bottom_up([&] {
         return [&](NodeId node) {
-            const bool is_coincident = g.support_spheres[node].radius == 0; // nothing moves
-            ChromaRange range{chroma[node], chroma[node]};
+            const WedgeId first = tree.first_wedge_of(node), end = tree.first_wedge_of(node + 1);
+            ChromaRange range{chroma[first], chroma[first]};
+            for (WedgeId wedge = first + 1; wedge < end; ++wedge) range = unite(range, {chroma[wedge], chroma[wedge]});
             tree.for_each_child(
-                node,
-                [&](NodeId child) {
-                    range = unite(range, ring[child]);
-                    if (g.support_spheres[child].radius == 0 && !is_coincident) // it has its own leaves only
-                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) range = unite(range, around[l]);
-                },
-                [&](Index leaf) { range = unite(range, is_coincident ? of_leaf(leaf) : around[leaf]); });
+                node, [&](NodeId child) { range = unite(range, ring[child]); },
+                [&](Index leaf) { range = unite(range, around[leaf]); });
             ring[node] = range;
         };
     });

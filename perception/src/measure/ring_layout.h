@@ -21,6 +21,7 @@ template <std::size_t count>
 struct RingTriangle {
     LitPointOf<count> corner[3];
     unsigned inside = 0; // a bit for each corner in the support
+    unsigned sheet = 0;  // which of the node's wedges these corners fold into
 };
 
 // Points by columns, so that a surface is compared with eight at once, and the nearest points of that surface.
@@ -30,21 +31,23 @@ public:
     using Point = LitPointOf<count>;
     static constexpr std::size_t lanes = 8;
 
-    void clear() { points_.clear(); }
-    void add(const Point& p) { points_.push_back(p); }
+    void clear() { points_.clear(), sheets_.clear(); }
+    void add(const Point& p, unsigned sheet) { points_.push_back(p), sheets_.push_back(static_cast<float>(sheet)); }
     std::size_t size() const { return points_.size(); }
 
     // Columns of the points from `first` on; after the last point it is repeated.
     struct alignas(32) Block {
-        float x[lanes], y[lanes], z[lanes];
+        float x[lanes], y[lanes], z[lanes], sheet[lanes];
         float squared[lanes], luminance[count][lanes]; // the distance to the nearest point, and its luminances
     };
     std::span<Block> blocks() {
         blocks_.resize((size() + lanes - 1) / lanes);
         for (std::size_t i = 0; i < blocks_.size() * lanes; ++i) {
-            const glm::vec3& p = points_[std::min(i, size() - 1)].position;
+            const std::size_t point = std::min(i, size() - 1);
+            const glm::vec3& p = points_[point].position;
             Block& to = blocks_[i / lanes];
             to.x[i % lanes] = p.x, to.y[i % lanes] = p.y, to.z[i % lanes] = p.z;
+            to.sheet[i % lanes] = sheets_[point];
         }
         return blocks_;
     }
@@ -63,6 +66,7 @@ public:
 
 private:
     std::vector<Point> points_;
+    std::vector<float> sheets_; // of RingTriangle
     std::vector<Block> blocks_;
 };
 
@@ -73,7 +77,7 @@ public:
 
     void assign(std::span<const RingTriangle<count>> ring) {
         triangles_.clear();
-        for (const auto& [corner, inside] : ring) {
+        for (const auto& [corner, inside, sheet] : ring) {
             const auto& [a, b, c] = corner;
             const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
             const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
@@ -81,6 +85,7 @@ public:
             PreparedTriangle& t = triangles_.emplace_back();
             t.a = a.position, t.b = ab, t.c = ac;
             t.bb = bb, t.bc = bc, t.cc = cc;
+            t.sheet = static_cast<float>(sheet);
             t.along_b = divisor(bb), t.along_c = divisor(cc), t.along_bc = divisor(bb - 2 * bc + cc);
             t.inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
             for (std::size_t i = 0; i < count; ++i) {
@@ -92,11 +97,16 @@ public:
     bool empty() const { return triangles_.empty(); }
 
     // How the points differ from the nearest ones of the surface; of equally near ones, those of the first triangle.
-    void compare(ComparedPoints<count>& points) const {
+    // `aside`: 0, or a length. A point of another sheet must be nearer than the nearest one of a point's own, about by
+    // this much, to count: where sheets meet, at a seam, both are equally near.
+    void compare(ComparedPoints<count>& points, float aside) const {
+        const float squared = aside * aside;
         for (Block& block : points.blocks())
             on_widest([&]<class Floats>() UNSEEN_INLINE_LAMBDA {
-                for (std::size_t first = 0; first < ComparedPoints<count>::lanes; first += width_of<Floats>)
-                    find<Floats>(triangles_, block, first);
+                for (std::size_t first = 0; first < ComparedPoints<count>::lanes; first += width_of<Floats>) {
+                    if (squared > 0) find<Floats, true>(triangles_, block, first, squared);
+                    else find<Floats, false>(triangles_, block, first, 0);
+                }
             });
     }
 
@@ -108,7 +118,7 @@ private:
     struct PreparedTriangle {
         glm::vec3 a, b, c;                                            // b and c from a
         std::array<float, count> luminance, luminance_b, luminance_c; // a's; the others' less that
-        float bb, bc, cc;                                             // products
+        float bb, bc, cc, sheet;                                      // products
         float along_b, along_c, along_bc;                             // what lengths along the edges are divided by
         float inverse;                                                // of the determinant; 0: only its edges count
     };
@@ -117,15 +127,16 @@ private:
 
     // The nearest point a + v b + w c of each triangle: of its inside, where the foot of the perpendicular lies there,
     // or of an edge. `Floats`: a register's.
-    template <class Floats>
-    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Block& points, std::size_t first) {
+    template <class Floats, bool has_sheets>
+    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Block& points, std::size_t first,
+                                   float squared_aside) {
         const auto share = [](const Floats& part, float whole) UNSEEN_INLINE_LAMBDA {
             const Floats s = part / whole, above = s > 0 ? s : Floats{};
             return above < 1 ? above : Floats{} + 1;
         };
         const Floats x = floats_at<Floats>(points.x + first), y = floats_at<Floats>(points.y + first),
-                     z = floats_at<Floats>(points.z + first);
-        Floats nearest = Floats{} + infinitely_far, nearest_luminance[count] = {};
+                     z = floats_at<Floats>(points.z + first), sheet = floats_at<Floats>(points.sheet + first);
+        Floats nearest = Floats{} + infinitely_far, nearest_cost = nearest, nearest_luminance[count] = {};
         for (const PreparedTriangle& t : triangles) {
             const Floats px = x - t.a.x, py = y - t.a.y, pz = z - t.a.z;
             const Floats pb = px * t.b.x + py * t.b.y + pz * t.b.z, pc = px * t.c.x + py * t.c.y + pz * t.c.z;
@@ -146,8 +157,11 @@ private:
             const Floats dx = px - v * t.b.x - w * t.c.x, dy = py - v * t.b.y - w * t.c.y,
                          dz = pz - v * t.b.z - w * t.c.z;
             const Floats squared = dx * dx + dy * dy + dz * dz;
-            const auto is_nearer = squared < nearest;
+            Floats cost = squared;
+            if constexpr (has_sheets) cost += sheet == t.sheet ? Floats{} : Floats{} + squared_aside;
+            const auto is_nearer = cost < nearest_cost;
             nearest = is_nearer ? squared : nearest;
+            nearest_cost = is_nearer ? cost : nearest_cost;
             for (std::size_t i = 0; i < count; ++i) {
                 const Floats luminance = t.luminance[i] + v * t.luminance_b[i] + w * t.luminance_c[i];
                 nearest_luminance[i] = is_nearer ? luminance : nearest_luminance[i];
@@ -170,10 +184,10 @@ class FoldNeighbours {
 public:
     // `trees`: the same except for their luminances.
     explicit FoldNeighbours(std::span<const vdtree::SoundTree> trees)
-        : tree_(trees.front()), interior_(tree_.interior_count()), first_leaf_(tree_.first_leaf()),
-          leaf_end_(tree_.leaf_end()), parents_(tree_.parents()), support_(tree_.support_spheres()),
-          luminance_span_(interior_), most_changed_(interior_) {
-        for (NodeId node = 0; node < interior_; ++node) {
+        : tree_(trees.front()), first_leaf_(tree_.first_leaf()), leaf_end_(tree_.leaf_end()), parents_(tree_.parents()),
+          support_(tree_.support_spheres()), luminance_span_(tree_.interior_count()),
+          most_changed_(tree_.interior_count()) {
+        for (NodeId node = 0; node < tree_.interior_count(); ++node) {
             for (std::size_t i = 0; i < luminances; ++i) {
                 const vdtree::PackedRange support = trees[i].support_luminance()[node];
                 luminance_span_[node][i] = support.hi.value - support.lo.value;
@@ -185,7 +199,7 @@ public:
     // The node that stands for a leaf outside of `node`. Nodes up to its size are folded unless they have more to hide,
     // and so are nodes of any size that hardly anybody sees fold, such as the faces beside an edge.
     NodeId stand_in(Index leaf, NodeId node, Says says) const {
-        NodeId at = interior_ + leaf;
+        NodeId at = tree_.place_of_leaf(leaf);
         const auto folds_earlier = [&](NodeId up) {
             const bool is_smaller = is_larger(node, up);
             for (std::size_t i = 0; i < luminances; ++i) {
@@ -236,7 +250,6 @@ private:
     bool supports(NodeId a, NodeId b) const { return first_leaf_[a] <= first_leaf_[b] && leaf_end_[b] <= leaf_end_[a]; }
 
     const vdtree::SoundTree& tree_;
-    NodeId interior_;
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
     std::span<const vdtree::Sphere> support_;
@@ -289,14 +302,15 @@ inline bool are_distinct(const std::array<vdtree::NodeId, 3>& nodes) {
     return nodes[0] != nodes[1] && nodes[1] != nodes[2] && nodes[2] != nodes[0];
 }
 
-// Lays out the ring of a node; returns what its triangles face. `points`: of all nodes. `crossing`: triangles with a
+// Lays out the ring of a node; returns what its triangles face. `points`: of all wedges. `crossing`: triangles with a
 // corner in the support that the children, folded, leave. `stand_in`: the node that stands for a leaf outside.
 template <std::size_t channels, class StandIn>
 NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<channels>> points, vdtree::NodeId node,
                     std::span<const vdtree::Index> crossing, const StandIn& stand_in, Ring<channels>& ring) {
     using vdtree::Index, vdtree::NodeId;
     using Child = typename Ring<channels>::Child;
-    const NodeId interior = tree.interior_count();
+    using vdtree::WedgeId;
+    const WedgeId first_wedge = tree.first_wedge(node), leaves = tree.interior_wedge_count();
     const std::span<const vdtree::Triangle> triangles = tree.triangles();
     const std::span<const Index> first_leaf = tree.first_leaf();
     const Index first_vanishing = tree.first_triangle()[node], end_vanishing = tree.first_triangle()[node + 1];
@@ -305,7 +319,7 @@ NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<ch
     ring.clear();
     std::vector<Child>& children = ring.children;
     tree.for_each_child(node, [&](NodeId child) {
-        children.push_back({tree.is_leaf(child) ? child - interior : first_leaf[child], child});
+        children.push_back({tree.is_place(child) ? tree.first_wedge(child) - leaves : first_leaf[child], child});
     });
     const auto child_of = [&](Index leaf) {
         const auto after = std::upper_bound(children.begin(), children.end(), leaf,
@@ -324,16 +338,16 @@ NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<ch
         for (std::size_t k = 0; k < 3; ++k) {
             const Index leaf = triangles[t][k];
             const bool is_here = is_inside(leaf);
-            whole.corner[k] = points[interior + leaf];
+            whole.corner[k] = points[leaves + leaf];
             whole.inside |= static_cast<unsigned>(is_here) << k;
             shown[k] = is_here ? node : stand_in(leaf);
             shown_before[k] = is_here ? child_of(leaf) : shown[k];
+            const WedgeId wedge = tree.wedge_at(shown[k], leaf);
+            if (is_here) whole.sheet = wedge - first_wedge; // one for all corners here, which the triangle joins
+            before.corner[k] = points[is_here ? tree.wedge_at(shown_before[k], leaf) : wedge];
+            after.corner[k] = points[wedge];
         }
-        before.inside = after.inside = whole.inside;
-        for (std::size_t k = 0; k < 3; ++k) {
-            before.corner[k] = points[shown_before[k]];
-            after.corner[k] = points[shown[k]];
-        }
+        before.inside = after.inside = whole.inside, before.sheet = after.sheet = whole.sheet;
         ring.shown.insert(ring.shown.end(), shown.begin(), shown.end());
         turned.insert(whole);
         if (are_distinct(shown_before)) add(ring.before, before);
@@ -341,13 +355,13 @@ NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<ch
         std::array<NodeId, 3> shown_fine = shown_before;
         for (std::size_t k = 0; k < 3; ++k) {
             if ((whole.inside >> k) & 1) fine_before.corner[k] = before.corner[k];
-            else shown_fine[k] = interior + triangles[t][k];
+            else shown_fine[k] = tree.place_of_leaf(triangles[t][k]);
         }
         if (are_distinct(shown_fine)) ring.fine_before.push_back(fine_before);
         if (t >= first_vanishing && t < end_vanishing) continue; // vanishes here
         RingTriangle<channels> fine = whole;
         for (std::size_t k = 0; k < 3; ++k)
-            if ((whole.inside >> k) & 1) fine.corner[k] = points[node];
+            if ((whole.inside >> k) & 1) fine.corner[k] = after.corner[k];
         add(ring.fine_after, fine);
         if (are_distinct(shown)) add(ring.after, after);
     }

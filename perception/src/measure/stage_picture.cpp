@@ -260,7 +260,7 @@ StagePainter::StagePainter(const VertexTree& tree, const TexturedLight& light, c
 
 template <std::size_t lights>
 std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> triangles,
-                                                    const FunctionRef<std::array<float, lights>(NodeId)>& luminance) {
+                                                    const FunctionRef<std::array<float, lights>(WedgeId)>& luminance) {
     surfaces_.clear(lights);
     std::optional<StageCovers> covers;
     for (std::size_t number = 0; number < triangles.size(); ++number) {
@@ -337,11 +337,11 @@ std::array<StagePicture, lights> StagePainter::cells() const {
 }
 
 template std::array<StagePicture, 1> StagePainter::draw(std::span<const Triangle>,
-                                                        const FunctionRef<std::array<float, 1>(NodeId)>&);
+                                                        const FunctionRef<std::array<float, 1>(WedgeId)>&);
 template std::array<StagePicture, 3> StagePainter::draw(std::span<const Triangle>,
-                                                        const FunctionRef<std::array<float, 3>(NodeId)>&);
+                                                        const FunctionRef<std::array<float, 3>(WedgeId)>&);
 template std::array<StagePicture, 4> StagePainter::draw(std::span<const Triangle>,
-                                                        const FunctionRef<std::array<float, 4>(NodeId)>&);
+                                                        const FunctionRef<std::array<float, 4>(WedgeId)>&);
 
 namespace {
 

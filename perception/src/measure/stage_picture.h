@@ -79,10 +79,10 @@ public:
     StagePainter(const vdtree::VertexTree& tree, const TexturedLight& light, const StageCamera& camera,
                  StageSurfaces& surfaces);
 
-    // A picture under each light of triangles over nodes. `luminance`: of a node under each light, relative.
+    // A picture under each light of triangles over wedges. `luminance`: of a wedge under each light, relative.
     template <std::size_t lights>
     std::array<StagePicture, lights> draw(std::span<const vdtree::Triangle> triangles,
-                                          const FunctionRef<std::array<float, lights>(vdtree::NodeId)>& luminance);
+                                          const FunctionRef<std::array<float, lights>(vdtree::WedgeId)>& luminance);
 
     std::size_t drawn() const { return surfaces_.drawn; } // samples of the last picture, hidden ones too
 
@@ -99,11 +99,11 @@ private:
     StageSurfaces& surfaces_;
 };
 extern template std::array<StagePicture, 1>
-StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 1>(vdtree::NodeId)>&);
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 1>(vdtree::WedgeId)>&);
 extern template std::array<StagePicture, 3>
-StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 3>(vdtree::NodeId)>&);
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 3>(vdtree::WedgeId)>&);
 extern template std::array<StagePicture, 4>
-StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 4>(vdtree::NodeId)>&);
+StagePainter::draw(std::span<const vdtree::Triangle>, const FunctionRef<std::array<float, 4>(vdtree::WedgeId)>&);
 
 // A picture, split into bands.
 class StageBands {

@@ -106,11 +106,18 @@ public:
     // it by the surface's shift, seen from aside.
     void find_detail(vdtree::NodeId node, float width, const Here& here, const Ring<channels>& ring,
                      const FoldRecord& record, FoldTexture& found) const {
-        vdtree::UvBox box;
+        thread_local std::vector<vdtree::UvBox> boxes; // by wedge
+        const vdtree::WedgeId first = tree_.first_wedge(node);
+        boxes.assign(footprints_.begin() + first, footprints_.begin() + tree_.wedge_end(node));
         for (const auto* surface : {&ring.before, &ring.after, &ring.fine_before, &ring.fine_after})
             for (const RingTriangle<channels>& t : *surface)
-                for (const Point& p : t.corner) box.include({p.luminance[u_channel], p.luminance[v_channel]});
-        box.include(footprints_[node]);
+                for (const Point& p : t.corner)
+                    boxes[t.sheet].include({p.luminance[u_channel], p.luminance[v_channel]});
+        const auto contrast_of = [&](std::size_t level) {
+            float largest = 0;
+            for (const vdtree::UvBox& box : boxes) largest = std::max(largest, texture_.contrast(level, box));
+            return largest;
+        };
         const bool is_dense = here.density.least > 0 && std::isfinite(here.density.most);
         const float height = std::max(record.shift, record.mean_distance);
         const float aside = height > 0 ? height * here.density.most : 0.0f;
@@ -124,7 +131,7 @@ public:
             if (level >= measured_from && wave > 2 * width) break; // as the ring's range shows it
             const float slide = aside + (level < measured_from ? here.slide : 0.0f);
             if (!(slide > 0)) continue;
-            const float contrast = 2 * std::min(1.0f, slide / texel) * texture_.contrast(level, box);
+            const float contrast = 2 * std::min(1.0f, slide / texel) * contrast_of(level);
             const float octaves = wave > 0 ? std::floor(std::log2(width / wave)) : 0.0f;
             const auto finer =
                 static_cast<std::size_t>(std::clamp(octaves, 0.0f, static_cast<float>(texture_octaves - 1)));
@@ -166,7 +173,7 @@ private:
     std::span<const TexturedLight> lights_;
     const TextureDetail& texture_;
     TextureDensities densities_;
-    std::vector<vdtree::UvBox> footprints_; // by node
+    std::vector<vdtree::UvBox> footprints_; // by wedge
 };
 
 } // namespace unseen::perception

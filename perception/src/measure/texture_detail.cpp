@@ -191,7 +191,7 @@ float TexturedLight::mean(const std::array<float, 3>& luminance, const std::arra
 TextureDensities::TextureDensities(const SoundTree& tree, const TextureDetail& texture)
     : before_triangle_(tree.triangles().size() + 1), subtree_end_(tree.subtree_end()),
       first_triangle_(tree.first_triangle()) {
-    const NodeId leaves = tree.interior_count();
+    const WedgeId leaves = tree.interior_wedge_count();
     const TexturedLight white{&texture};
     const glm::dvec2 size(texture.size());
     for (std::size_t i = 0; i < tree.triangles().size(); ++i) {

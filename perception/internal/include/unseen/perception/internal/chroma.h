@@ -30,9 +30,8 @@ struct ChromaRange {
 // one pass over the nodes at most; nothing where the mesh has no colours. Textures are not looked at.
 bool has_chroma(const vdtree::VertexTree& tree);
 
-// By interior node: the chroma of the ring and of the subtree's proxies; where all leaves of a node lie at one point,
-// of these alone. Includes the children's. Empty where has_chroma() is false. Cost: one pass over the triangles and the
-// nodes, in parallel; so a tree for which nobody asks pays nothing. Fails where VertexTree::check() does.
+// By interior node: the chroma of the ring and of the subtree's proxies. Includes the children's. Empty where
+// has_chroma() is false. Cost: one pass over the triangles and the nodes, in parallel; so a tree for which nobody asks pays nothing. Fails where VertexTree::check() does.
 Result<std::vector<ChromaRange>> ring_chroma(const vdtree::VertexTree& tree);
 
 // How a vertex is drawn: its colour scaled to its luminance.

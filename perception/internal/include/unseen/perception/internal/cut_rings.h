@@ -16,8 +16,7 @@ namespace unseen::perception {
 // In every cut, each triangle drawn that is not one of the mesh's own has a largest node among its corners. All of the
 // triangle's corners lie within `radius` of the centre of that node's ring sphere, and their luminances within its
 // `luminance`: the corners of the mesh's triangles around the node's support, and the proxies of all nodes no larger
-// that one of these can have been folded into. (Where all of a node's leaves lie at one point, nothing moves, and its
-// luminance is the tree's ring_luminance().)
+// that one of these can have been folded into.
 struct CutRings {
     std::vector<vdtree::PackedRange> luminance; // at least the children's
     std::vector<float> radius;                  // mesh units; at least the children's
@@ -39,9 +38,8 @@ struct CutRings {
     // Mesh units: how far apart two points of triangles around the node can be that show the same place of the texture,
     // whatever is folded among those that `luminance` is of. (Points of triangles that are interpolated between
     // vertices near an affine map from the texture to the surface are no farther from it than these: twice the largest
-    // distance of all these vertices from the best such map. Where the surface is flat and the texture lies evenly on
-    // it that is 0.) Twice `radius` at most. (Where all of a node's leaves lie at one point, of the texture, too, these
-    // three are of what changes: the vertices' spread.)
+    // distance of all these vertices from the best such map, one a wedge. Where the surface is flat and the texture
+    // lies evenly on it that is 0.) Twice `radius` at most.
     std::vector<float> texture_deviation;
 
     // The same of the colours, as they are drawn; empty where ring_chroma() is, of textured trees, and where they are
