@@ -43,6 +43,9 @@ Result<void> validate(const MeshView& mesh) {
         if (length != 0 && length != vertices)
             return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
                            " vertices; give one for each vertex or none.");
+    if (!mesh.smoothing.empty() && mesh.smoothing.size() != mesh.triangles.size())
+        return invalid("The mesh has " + std::to_string(mesh.smoothing.size()) + " smoothing groups for " +
+                       std::to_string(mesh.triangles.size()) + " triangles; give one for each triangle or none.");
     if (Result<void> checked = validate(mesh.texture); !checked) return checked;
     if (!mesh.texture.empty() && mesh.uvs.empty())
         return invalid(
@@ -56,10 +59,14 @@ std::uint64_t drop_degenerate_triangles(Mesh& mesh) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         if (uses_a_vertex_twice(mesh.triangles[i])) dropped.push_back(i);
-        else mesh.triangles[kept++] = mesh.triangles[i];
+        else {
+            if (i < mesh.smoothing.size()) mesh.smoothing[kept] = mesh.smoothing[i];
+            mesh.triangles[kept++] = mesh.triangles[i];
+        }
     }
     if (dropped.empty()) return 0;
     mesh.triangles.resize(kept);
+    if (!mesh.smoothing.empty()) mesh.smoothing.resize(kept);
 
     const auto dropped_before = [&](std::uint64_t triangle) {
         const auto found = std::lower_bound(dropped.begin(), dropped.end(), triangle);

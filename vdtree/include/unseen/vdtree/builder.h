@@ -1,6 +1,8 @@
 // Builds vertex trees: a clusterer decides which vertices merge, everything else is derived from the mesh.
 #pragma once
 
+#include <optional>
+
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
@@ -69,6 +71,10 @@ struct BuildOptions {
     // Whether light is baked into the colours and the texture, so that they are drawn unlit. Otherwise they are
     // reflectance and `light` lights them. Meshes without either have the default albedo, lit.
     bool prelit = false;
+    // Where the mesh states neither normals nor smoothing groups, edges between faces at a larger angle are hard, from 0
+    // (all) to 180 degrees (none). Not given: 30, or 60 if the mesh looks organic, which 30 would facet: if it has more
+    // than 2.5 times as many edges above 30 degrees as above 60.
+    std::optional<float> crease = {};
     int threads = 0;                  // 0: one for each core. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader dropped; added to the tree's count
     Progress progress = {};

@@ -66,6 +66,9 @@ struct MeshView {
     std::span<const MeshRange> ranges = {}; // ordered by first_triangle; may overlap between kinds
     TextureView texture = {};               // over the whole mesh by its UVs, multiplied with the colours; may be empty
     std::span<const std::byte> document = {}; // the rest of its file, in the reader's own form; trees keep it unread
+    // By triangle, or empty: the file does not state any. Decides how computed normals are shared: triangles of one group
+    // share at any angle, those of different groups never, and those of group 0 are flat.
+    std::span<const Index> smoothing = {};
 };
 
 // A triangle soup that owns its arrays.
@@ -78,12 +81,16 @@ struct Mesh {
     std::vector<MeshRange> ranges;
     Texture texture;
     std::vector<std::byte> document;
+    std::vector<Index> smoothing;
 
-    MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document}; }
+    MeshView view() const {
+        return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document, smoothing};
+    }
 };
 
 // Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the positions, ranges
-// within the triangles, a valid texture, and UVs where there is one. The error names the first offender.
+// within the triangles, smoothing groups for all triangles or none, a valid texture, and UVs where there is one. The error
+// names the first offender.
 Result<void> validate(const MeshView& mesh);
 
 // Removes the triangles that use a vertex twice, shrinks the ranges to match, and returns how many went.
@@ -95,6 +102,18 @@ enum class Closedness : std::uint8_t {
     open,           // a boundary, a non-manifold or an inconsistently oriented edge, or no volume
     closed_outward, // every edge has two faces that run it in opposite ways, and the volume is positive
     closed_inward,  // the same with a negative volume: inside out
+};
+
+// How normals were found where the mesh has none of its own: edges of a larger angle are hard.
+struct Creases {
+    enum class Source : std::uint8_t {
+        file,  // the mesh has normals or smoothing groups everywhere
+        asked, // the caller chose the angle
+        rule,  // the angle follows from the mesh: see BuildOptions::crease
+    };
+    Source source = Source::file;
+    float degrees = 180; // 180: all edges are smooth
+    bool operator==(const Creases&) const = default;
 };
 
 } // namespace unseen::vdtree

@@ -1,0 +1,536 @@
+#include "build/creases.h"
+
+#include <atomic>
+#include <numbers>
+#include <numeric>
+#include <unordered_map>
+
+#include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/vectors.h>
+
+#include "build/parallel_array.h"
+#include "build/spatial_order.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+constexpr std::size_t block_size = 4096; // places of a task
+
+// The rule where no angle is asked for. Edges above 30 degrees were 1.0 to 2.2 times those above 60 on 14 made things
+// (castings, controllers, gears, leaves), whose own normals 30 degrees meet best; 2.9 to 74 times on 12 organic forms.
+constexpr double made_degrees = 30, organic_degrees = 60, largest_ratio_of_made = 2.5;
+
+// Turned things have sides whose angles divide 360 degrees (12 sides: 30), and floats store their corners with errors.
+constexpr double slack_degrees = 0.05;
+
+// A triangle's height below this share of the mesh's extent is lost in the rounding of floats: its normal is noise.
+constexpr double lost_height = 0x1p-24;
+
+// Normals of one place that differ by less are one. In controllers' files equal ones differ by up to 0.1 degrees, for
+// exporters computed each by itself; one such model has a third of the normals then. A quarter of a degree changes light
+// that falls at 45 degrees by 0.4%, less than anybody sees; whole degrees join what is meant to differ.
+constexpr double same_degrees = 0.25;
+
+// Beyond so many normals at one place they are searched by a grid.
+constexpr std::size_t most_in_line = 16;
+
+double cosine_of(double degrees) { return std::cos(std::min(degrees, 180.0) * std::numbers::pi / 180); }
+
+bool is_stated(glm::vec3 v) {
+    const float sum = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
+    return sum > 0 && std::isfinite(sum);
+}
+
+// ---- what is known of faces
+
+struct FaceNormals {
+    ParallelArray<glm::dvec3> vectors; // normals as long as twice the areas
+    ParallelArray<glm::vec3> normals;  // unit length; zero: no area
+};
+
+bool has_area(glm::vec3 normal) { return normal != glm::vec3(0); }
+
+FaceNormals find_face_normals(const CornerInput& in) {
+    FaceNormals faces{ParallelArray<glm::dvec3>(in.triangles.size(), Unfilled()),
+                      ParallelArray<glm::vec3>(in.triangles.size(), Unfilled())};
+    const double least_height = in.positions.empty() ? 0 : box_around(in.positions).extent() * lost_height;
+    parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
+        const Triangle& corners = in.triangles[t];
+        const glm::dvec3 &a = in.positions[corners[0]], &b = in.positions[corners[1]], &c = in.positions[corners[2]];
+        const glm::dvec3 vector = glm::cross(b - a, c - a);
+        const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
+        faces.vectors[t] = vector;
+        faces.normals[t] = glm::length(vector) > longest * least_height ? glm::vec3(unit(vector)) : glm::vec3(0);
+    });
+    return faces;
+}
+
+// Corners by place, in the order of the triangles.
+struct CornersOfPlaces {
+    std::vector<Index> start; // one longer
+    ParallelArray<Index> corners;
+
+    std::span<const Index> at(std::size_t place) const {
+        return std::span<const Index>(corners).subspan(start[place], start[place + 1] - start[place]);
+    }
+};
+
+CornersOfPlaces sort_corners(const CornerInput& in) {
+    CornersOfPlaces out{std::vector<Index>(in.positions.size() + 1, 0),
+                        ParallelArray<Index>(in.triangles.size() * 3, Unfilled())};
+    parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
+        for (const Index place : in.triangles[t])
+            std::atomic_ref(out.start[place]).fetch_add(1, std::memory_order_relaxed);
+    });
+    std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
+    parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            Index& start = out.start[in.triangles[t][k]];
+            out.corners[std::atomic_ref(start).fetch_sub(1, std::memory_order_relaxed) - 1] =
+                static_cast<Index>(3 * t + k);
+        }
+    });
+    const std::span<Index> corners = out.corners;
+    parallel_loop(std::size_t{0}, in.positions.size(), [&](std::size_t place) {
+        std::sort(corners.begin() + out.start[place], corners.begin() + out.start[place + 1]);
+    });
+    return out;
+}
+
+// ---- sets that are united
+
+class CornerSets {
+public:
+    void reset(std::size_t count) {
+        parents_.resize(count);
+        std::iota(parents_.begin(), parents_.end(), Index{0});
+    }
+    Index find(Index i) {
+        while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
+        return i;
+    }
+    // The lower number stands for both.
+    void unite(Index a, Index b) {
+        a = find(a), b = find(b);
+        parents_[std::max(a, b)] = std::min(a, b);
+    }
+
+private:
+    std::vector<Index> parents_;
+};
+
+// ---- edges around one place
+
+// A corner at a place has two edges that end there.
+struct EdgeOfCorner {
+    Index neighbour; // the place at the edge's other end; later one of several that faces without an area make one edge
+    Index corner;    // among those of the place
+    bool follows;    // the triangle runs from the place to the neighbour
+};
+
+// Looks at one place after another. Corners are numbered at the place.
+class CornerFan {
+public:
+    CornerFan(const CornerInput& in, const FaceNormals& faces) : in_(in), faces_(faces) {}
+
+    std::uint64_t compared = 0;
+
+    void look_at(std::span<const Index> corners) {
+        corners_ = corners;
+        sum_ = glm::dvec3(0);
+        for (const Index corner : corners) sum_ += faces_.vectors[corner / 3];
+    }
+
+    // Of the faces' area vectors.
+    glm::dvec3 sum() const { return sum_; }
+    glm::vec3 normal(Index corner) const { return faces_.normals[corners_[corner] / 3]; }
+
+    // Whether each face with an area is so near to the mean of all that the place has no hard edge.
+    bool is_within(double least_cosine) {
+        const glm::dvec3 mean = unit(sum_);
+        compared += corners_.size();
+        return std::ranges::all_of(corners_, [&](Index corner) {
+            const glm::vec3 normal = faces_.normals[corner / 3];
+            return !has_area(normal) || glm::dot(glm::dvec3(normal), mean) >= least_cosine;
+        });
+    }
+
+    // Calls use(edges, neighbour) for each edge.
+    template <class Use>
+    void for_each_edge(Use&& use) {
+        collect_edges();
+        for (auto run = edges_.begin(); run != edges_.end();) {
+            const auto end =
+                std::find_if(run, edges_.end(), [&](const EdgeOfCorner& e) { return e.neighbour != run->neighbour; });
+            use(std::span(run, end), run->neighbour);
+            run = end;
+        }
+    }
+
+    // Unites corners across edges. Corners in smoothing groups take no part.
+    void unite(double least_cosine, CornerSets& groups) {
+        for_each_edge([&](std::span<EdgeOfCorner> edges, Index neighbour) {
+            const auto solid = std::stable_partition(edges.begin(), edges.end(),
+                                                     [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); });
+            const auto faces = static_cast<std::size_t>(solid - edges.begin());
+            if (faces == 2 && is_smooth(edges[0].corner, edges[1].corner, least_cosine))
+                groups.unite(edges[0].corner, edges[1].corner);
+            if (faces > 2) unite_around(edges.first(faces), neighbour, least_cosine, groups);
+        });
+        join_faces_without_area(groups);
+    }
+
+    // Unites corners of one smoothing group.
+    void unite_smoothing_groups(CornerSets& groups) {
+        numbers_.clear();
+        for (std::size_t i = 0; i < corners_.size(); ++i)
+            if (const Index number = in_.smoothing[corners_[i] / 3]; number != 0)
+                numbers_.emplace_back(number, static_cast<Index>(i));
+        std::sort(numbers_.begin(), numbers_.end());
+        for (std::size_t i = 1; i < numbers_.size(); ++i)
+            if (numbers_[i].first == numbers_[i - 1].first) groups.unite(numbers_[i - 1].second, numbers_[i].second);
+    }
+
+    // Whether two corners' faces may share a normal.
+    bool is_smooth(Index a, Index b, double least_cosine) {
+        ++compared;
+        return glm::dot(glm::dvec3(normal(a)), glm::dvec3(normal(b))) >= least_cosine;
+    }
+
+private:
+    void collect_edges() {
+        edges_.clear();
+        bool all_solid = true;
+        for (std::size_t i = 0; i < corners_.size(); ++i) {
+            if (!in_.smoothing.empty() && in_.smoothing[corners_[i] / 3] != 0) continue;
+            const auto [following, preceding] = neighbours_of(i);
+            edges_.push_back({following, static_cast<Index>(i), true});
+            edges_.push_back({preceding, static_cast<Index>(i), false});
+            all_solid = all_solid && has_area(normal(static_cast<Index>(i)));
+        }
+        sort_edges();
+        if (!all_solid) close_slivers();
+    }
+
+    std::pair<Index, Index> neighbours_of(std::size_t corner) const {
+        const Triangle& places = in_.triangles[corners_[corner] / 3];
+        const std::size_t k = corners_[corner] % 3;
+        return {places[(k + 1) % 3], places[(k + 2) % 3]};
+    }
+
+    void sort_edges() {
+        std::sort(edges_.begin(), edges_.end(), [](const EdgeOfCorner& a, const EdgeOfCorner& b) {
+            return std::pair(a.neighbour, a.corner) < std::pair(b.neighbour, b.corner);
+        });
+    }
+
+    // The two edges of a face without an area become one.
+    void close_slivers() {
+        neighbours_.clear();
+        for (const EdgeOfCorner& e : edges_)
+            if (neighbours_.empty() || neighbours_.back() != e.neighbour) neighbours_.push_back(e.neighbour);
+        const auto number = [&](Index neighbour) {
+            return static_cast<Index>(std::lower_bound(neighbours_.begin(), neighbours_.end(), neighbour) -
+                                      neighbours_.begin());
+        };
+        ends_.reset(neighbours_.size());
+        for (const EdgeOfCorner& e : edges_) {
+            if (has_area(normal(e.corner))) continue;
+            const auto [following, preceding] = neighbours_of(e.corner);
+            ends_.unite(number(following), number(preceding));
+        }
+        for (EdgeOfCorner& e : edges_) e.neighbour = neighbours_[ends_.find(number(e.neighbour))];
+        sort_edges();
+    }
+
+    // Any two of the faces around an edge. Their normals lie on a circle, so it suffices to compare those that follow
+    // each other there.
+    void unite_around(std::span<EdgeOfCorner> edges, Index neighbour, double least_cosine, CornerSets& groups) {
+        const Index place = in_.triangles[corners_[0] / 3][corners_[0] % 3];
+        const glm::dvec3 axis = unit(in_.positions[neighbour] - in_.positions[place]);
+        const glm::dvec3 aside = std::abs(axis.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+        const glm::dvec3 first = unit(glm::cross(axis, aside)), second = glm::cross(axis, first);
+        angles_.clear();
+        for (const EdgeOfCorner& e : edges) {
+            const glm::dvec3 n(normal(e.corner));
+            angles_.emplace_back(std::atan2(glm::dot(n, second), glm::dot(n, first)), e.corner);
+        }
+        std::sort(angles_.begin(), angles_.end());
+        Index before = angles_.back().second;
+        for (const auto& [angle, corner] : angles_) {
+            if (is_smooth(before, corner, least_cosine)) groups.unite(before, corner);
+            before = corner;
+        }
+    }
+
+    // To a face across their edge, else to any at the place. None of them joins two groups.
+    void join_faces_without_area(CornerSets& groups) {
+        if (edges_.empty()) return;
+        const auto solid =
+            std::ranges::find_if(edges_, [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); });
+        const Index any = (solid == edges_.end() ? edges_.front() : *solid).corner;
+        Index edge = edges_.front().neighbour, host = any;
+        for (auto e = edges_.begin(); e != edges_.end(); ++e) {
+            const bool begins = e == edges_.begin() || e->neighbour != edge;
+            edge = e->neighbour;
+            const bool is_solid = has_area(normal(e->corner)); // these come first at each edge
+            if (begins) host = is_solid ? e->corner : any;
+            if (!is_solid) groups.unite(host, e->corner); // both edges of the face are this one
+        }
+    }
+
+    const CornerInput& in_;
+    const FaceNormals& faces_;
+    std::span<const Index> corners_;
+    glm::dvec3 sum_{0};
+    std::vector<EdgeOfCorner> edges_;
+    std::vector<Index> neighbours_;
+    std::vector<std::pair<double, Index>> angles_;
+    std::vector<std::pair<Index, Index>> numbers_; // of smoothing groups, and corners
+    CornerSets ends_;
+};
+
+// ---- the rule
+
+struct EdgeCounts {
+    std::uint64_t above_made = 0, above_organic = 0;
+};
+
+// Edges of two faces, each counted at the end with the lower number.
+EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces, const CornersOfPlaces& corners) {
+    const double made = cosine_of(made_degrees + slack_degrees), organic = cosine_of(organic_degrees + slack_degrees);
+    const double no_edges = cosine_of(made_degrees / 2);
+    std::atomic<std::uint64_t> above_made = 0, above_organic = 0;
+    parallel_loop_over(tbb::blocked_range<std::size_t>(0, in.positions.size(), block_size), [&](const auto& places) {
+        CornerFan fan(in, faces);
+        EdgeCounts counts;
+        for (std::size_t place = places.begin(); place < places.end(); ++place) {
+            fan.look_at(corners.at(place));
+            if (fan.is_within(no_edges)) continue;
+            fan.for_each_edge([&](std::span<const EdgeOfCorner> edges, Index neighbour) {
+                if (edges.size() != 2 || neighbour < place || edges[0].follows == edges[1].follows) return;
+                const Index a = edges[0].corner, b = edges[1].corner;
+                if (!has_area(fan.normal(a)) || !has_area(fan.normal(b))) return;
+                counts.above_made += !fan.is_smooth(a, b, made);
+                counts.above_organic += !fan.is_smooth(a, b, organic);
+            });
+        }
+        above_made.fetch_add(counts.above_made, std::memory_order_relaxed);
+        above_organic.fetch_add(counts.above_organic, std::memory_order_relaxed);
+    });
+    return {above_made.load(), above_organic.load()};
+}
+
+double angle_by_rule(const EdgeCounts& edges) {
+    const bool is_made =
+        static_cast<double>(edges.above_made) <= largest_ratio_of_made * static_cast<double>(edges.above_organic);
+    return is_made ? made_degrees : organic_degrees;
+}
+
+// ---- normals of one place
+
+// Numbers different normals in the order in which they come; one that is nearly another gets its number.
+class DifferentNormals {
+public:
+    explicit DifferentNormals(std::vector<glm::vec3>& normals) : normals_(normals) {}
+
+    std::uint64_t compared = 0;
+
+    // At a new place.
+    void begin() { begin_ = normals_.size(), cells_.clear(); }
+    std::size_t count() const { return normals_.size() - begin_; }
+
+    std::size_t number_of(glm::vec3 normal) {
+        const std::size_t found = count() > most_in_line ? find_in_grid(normal) : find_in_line(normal);
+        if (found != none) return found;
+        normals_.push_back(normal);
+        if (count() == most_in_line + 1)
+            for (std::size_t i = begin_; i < normals_.size(); ++i) enter(i);
+        else if (count() > most_in_line) enter(normals_.size() - 1);
+        return normals_.size() - 1;
+    }
+
+private:
+    static constexpr std::size_t none = ~std::size_t{0};
+    static constexpr double cell_ = same_degrees * std::numbers::pi / 180; // side; chords are shorter than their arcs
+
+    bool is_same(std::size_t number, glm::vec3 normal) {
+        ++compared;
+        const glm::vec3& other = normals_[number];
+        return other == normal ||
+               (has_area(normal) && glm::dot(glm::dvec3(other), glm::dvec3(normal)) >= least_cosine_);
+    }
+    std::size_t find_in_line(glm::vec3 normal) {
+        for (std::size_t i = begin_; i < normals_.size(); ++i)
+            if (is_same(i, normal)) return i;
+        return none;
+    }
+    // The same as in line: the lowest number.
+    std::size_t find_in_grid(glm::vec3 normal) {
+        std::size_t found = none;
+        const glm::ivec3 at = cell_of(normal);
+        for (int x = -1; x <= 1; ++x)
+            for (int y = -1; y <= 1; ++y)
+                for (int z = -1; z <= 1; ++z) {
+                    const auto cell = cells_.find(key(at + glm::ivec3(x, y, z)));
+                    if (cell == cells_.end()) continue;
+                    for (const std::size_t i : cell->second)
+                        if (i < found && is_same(i, normal)) found = i;
+                }
+        return found;
+    }
+    void enter(std::size_t number) { cells_[key(cell_of(normals_[number]))].push_back(number); }
+
+    static glm::ivec3 cell_of(glm::vec3 normal) { return glm::ivec3(glm::floor(glm::dvec3(normal) / cell_)); }
+    static std::uint64_t key(glm::ivec3 cell) {
+        std::uint64_t key = 0;
+        for (int axis = 0; axis < 3; ++axis) key = key << 21 | static_cast<std::uint32_t>(cell[axis] + (1 << 20));
+        return key;
+    }
+
+    std::vector<glm::vec3>& normals_;
+    std::size_t begin_ = 0;
+    std::unordered_map<std::uint64_t, std::vector<std::size_t>> cells_;
+    const double least_cosine_ = cosine_of(same_degrees);
+};
+
+// What every place needs.
+struct CreaseSettings {
+    double crease = 180; // degrees
+    float face_sign = 1; // of computed normals
+    double own_sign = 1; // of the mesh's
+    bool is_smooth() const { return crease >= 180; }
+    double least_cosine() const { return cosine_of(crease + slack_degrees); }
+};
+
+// Makes the normals of a block of places and numbers them, the first one 0.
+class NormalBlock {
+public:
+    NormalBlock(const CornerInput& in, const FaceNormals& faces, const CreaseSettings& settings,
+                std::span<Index> number)
+        : in_(in), settings_(settings), fan_(in, faces), faces_(faces), number_(number) {}
+
+    std::vector<glm::vec3> normals;
+    bool has_creases = false;
+
+    std::uint64_t compared() const { return fan_.compared + different_.compared; }
+
+    void add(std::span<const Index> corners) {
+        if (corners.empty()) return;
+        fan_.look_at(corners);
+        different_.begin();
+        group(corners);
+        first_.assign(corners.size(), none);
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            const Index corner = corners[i];
+            if (!in_.own.empty() && is_stated(in_.own[corner])) {
+                const glm::vec3 own(settings_.own_sign * unit(glm::dvec3(in_.own[corner])));
+                number_[corner] = static_cast<Index>(different_.number_of(own));
+                continue;
+            }
+            const Index g = is_one_ ? 0 : groups_.find(static_cast<Index>(i));
+            if (first_[g] == none)
+                first_[g] = static_cast<Index>(
+                    different_.number_of(settings_.face_sign * glm::vec3(unit(is_one_ ? fan_.sum() : sums_[g]))));
+            number_[corner] = first_[g];
+        }
+        has_creases = has_creases || different_.count() > 1;
+    }
+
+private:
+    static constexpr Index none = ~Index{0};
+
+    // Which corners share a computed normal.
+    void group(std::span<const Index> corners) {
+        const bool stated = !in_.smoothing.empty();
+        is_one_ = !stated && (settings_.is_smooth() || fan_.is_within(within_));
+        if (is_one_) return;
+        groups_.reset(corners.size());
+        fan_.unite(stated ? flat_ : least_cosine_, groups_);
+        if (stated) fan_.unite_smoothing_groups(groups_);
+        sums_.assign(corners.size(), glm::dvec3(0));
+        for (std::size_t i = 0; i < corners.size(); ++i)
+            sums_[groups_.find(static_cast<Index>(i))] += faces_.vectors[corners[i] / 3];
+    }
+
+    const CornerInput& in_;
+    const CreaseSettings& settings_;
+    CornerFan fan_;
+    const FaceNormals& faces_;
+    std::span<Index> number_;
+    DifferentNormals different_{normals};
+    const double least_cosine_ = settings_.least_cosine(), flat_ = cosine_of(slack_degrees),
+                 within_ = cosine_of(settings_.crease / 2);
+    bool is_one_ = true;
+    CornerSets groups_;
+    std::vector<glm::dvec3> sums_; // by the group's first corner
+    std::vector<Index> first_;     // likewise: the number of its normal
+};
+
+// ---- the whole mesh
+
+bool states_all(const CornerInput& in) {
+    return !in.smoothing.empty() || (!in.own.empty() && std::ranges::all_of(in.own, is_stated));
+}
+
+// Whether the mesh's own normals agree with its faces on the whole.
+bool own_agree(const CornerInput& in, const FaceNormals& faces) {
+    double agreement = 0;
+    for (std::size_t corner = 0; corner < in.own.size(); ++corner)
+        if (is_stated(in.own[corner]))
+            agreement += glm::dot(faces.vectors[corner / 3], unit(glm::dvec3(in.own[corner])));
+    return agreement > 0;
+}
+
+} // namespace
+
+CornerNormals find_corner_normals(const CornerInput& input) {
+    const FaceNormals faces = find_face_normals(input);
+    const CornersOfPlaces corners = sort_corners(input);
+    CornerNormals out;
+    if (states_all(input)) out.creases = {};
+    else if (input.crease) out.creases = {Creases::Source::asked, std::min(*input.crease, 180.0f)};
+    else out.creases = {Creases::Source::rule, static_cast<float>(angle_by_rule(count_edges(input, faces, corners)))};
+
+    CreaseSettings settings;
+    settings.crease = static_cast<double>(out.creases.degrees);
+    if (input.inward) settings.face_sign = -1, settings.own_sign = own_agree(input, faces) ? -1 : 1;
+    out.number.resize(input.triangles.size() * 3);
+    const std::size_t places = input.positions.size(), blocks = (places + block_size - 1) / block_size;
+    std::vector<std::vector<glm::vec3>> normals(blocks);
+    std::atomic<bool> has_creases = false;
+    std::atomic<std::uint64_t> compared = 0;
+    const auto for_each_place = [&](std::size_t block, auto&& use) {
+        for (std::size_t p = block * block_size; p < std::min(places, (block + 1) * block_size); ++p)
+            use(corners.at(p));
+    };
+    parallel_loop(std::size_t{0}, blocks, [&](std::size_t b) {
+        NormalBlock block(input, faces, settings, out.number);
+        for_each_place(b, [&](std::span<const Index> at) { block.add(at); });
+        normals[b] = std::move(block.normals);
+        if (block.has_creases) has_creases.store(true, std::memory_order_relaxed);
+        compared.fetch_add(block.compared(), std::memory_order_relaxed);
+    });
+    std::vector<std::size_t> begin(blocks + 1, 0);
+    for (std::size_t b = 0; b < blocks; ++b) begin[b + 1] = begin[b] + normals[b].size();
+    out.normals.resize(begin[blocks]);
+    parallel_loop(std::size_t{0}, blocks, [&](std::size_t b) {
+        std::ranges::copy(normals[b], out.normals.begin() + static_cast<std::ptrdiff_t>(begin[b]));
+        for_each_place(b, [&](std::span<const Index> at) {
+            for (const Index corner : at) out.number[corner] += static_cast<Index>(begin[b]);
+        });
+    });
+    out.has_creases = has_creases.load();
+    out.compared = compared.load();
+    return out;
+}
+
+Result<void> check_crease(const std::optional<float>& degrees) {
+    if (!degrees || (*degrees >= 0 && *degrees <= 180)) return {};
+    return invalid_argument(
+        "The crease angle must be from 0 to 180 degrees; leave it out to have it follow from the mesh.");
+}
+
+} // namespace unseen::vdtree
