@@ -39,6 +39,7 @@ constexpr OptionName option_names[] = {
     {"load.texture", "--texture"},
     {"load.without_textures", "--texture none"},
     {"load.prelit", "--prelit"},
+    {"load.crease", "--crease"},
     {"load.as = ", "--as "},
     {"load.unit_metres", "--unit"},
     {"Follower::set_glide()", "--geomorph"},

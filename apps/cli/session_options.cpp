@@ -71,6 +71,7 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
     options.skip_bad = texture.skips_bad;
     options.weld = !texture.is_unwelded;
     options.prelit = texture.is_prelit;
+    options.crease = texture.crease;
     options.messages = terminal_messages();
     options.messages.progress = std::ref(bar);
     return options;

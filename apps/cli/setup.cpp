@@ -221,6 +221,19 @@ void Setup::add_files() {
                   "In STL files each facet keeps its normal and three vertices of its own (default: those at the same "
                   "place become one)")
         ->group(in_file_alone);
+    group
+        .add_option_function<std::string>(
+            "--crease",
+            [&o](const std::string& text) {
+                o.crease = text == "smooth" ? 180.0f : number_from<float>(text);
+                if (!o.crease || !(*o.crease >= 0 && *o.crease <= 180))
+                    refuse("--crease must be smooth or an angle from 0 to 180 degrees, not '" + text + "'");
+            },
+            "Where a mesh has neither normals nor smoothing groups, edges at a larger angle are hard (default: 30, or "
+            "60 "
+            "where that would facet an organic form)")
+        ->type_name("DEGREES|smooth")
+        ->group(in_file_alone);
     group.add_flag("--prelit", o.is_prelit,
                    "Colours and images have light baked in (default: they are reflectance, and are lit)");
     mark(group, files);

@@ -235,11 +235,13 @@ private:
         std::vector<Triangle> parts;
         parts.reserve(count);
         std::vector<std::uint64_t> first_part; // by triangle, and their end; where ranges have to follow
+        std::vector<Index> smoothing;
         for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
             if (!mesh_.ranges.empty()) first_part.push_back(parts.size());
             std::array<Index, 3> middles;
             for (std::size_t i = 0; i < 3; ++i) middles[i] = midpoints[edge_of_corner[3 * t + i]];
             append_parts(mesh_.triangles[t], middles, parts);
+            if (!mesh_.smoothing.empty()) smoothing.resize(parts.size(), mesh_.smoothing[t]);
         }
         first_part.push_back(parts.size());
         for (vdtree::MeshRange& range : mesh_.ranges) {
@@ -248,6 +250,7 @@ private:
             range.triangle_count = end - range.first_triangle;
         }
         mesh_.triangles = std::move(parts);
+        mesh_.smoothing = std::move(smoothing);
     }
 
     // By the edges that are split:

@@ -98,6 +98,7 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     options.clusterer = a.clusterer();
     options.threads = a.threads;
     options.prelit = a.texture.is_prelit;
+    options.crease = a.texture.crease;
     if (team && team->size() > 1) {
         options.team = team;
         options.threads = a.threads > 0 ? a.threads : std::max(1, team->cores() / team->members_on_machine());
@@ -191,7 +192,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     auto source = open_source(a);
     if (team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
-        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer()) : 0);
+        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), building(a, nullptr)) : 0);
         if (!ok) {
             print_error(ok.error().message); // before anybody leaves: mpirun ends all when the first one fails
             team->leave();
@@ -230,7 +231,7 @@ Result<int> help(const BuildArguments& a, ProcessTeam& team) {
     Repaired repair;
     const auto read = read_source(a, read_quietly, repair);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
-    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer()) : 0);
+    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), building(a, nullptr)) : 0);
     if (ok)
         if (const auto helped = vdtree::help_build_tree(read->mesh.view(), building(a, &team)); !helped)
             return helped.error();
@@ -303,6 +304,7 @@ Command build_command(CLI::App& app, Setup& setup) {
     add_verbose_option(*verb, a->is_verbose);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
+                 "  unseen build part.stl -o part.vdt --crease 45\n"
                  "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
                  "  unseen build parts.stl -o parts.vdt --repair --largest-hole 0.02" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));

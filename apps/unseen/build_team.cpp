@@ -1,6 +1,7 @@
 #include "process_team.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <sstream>
 #include <string>
@@ -75,14 +76,16 @@ Statement conclude(vdtree::Team& team, Statement own) {
 
 } // namespace
 
-std::uint64_t fingerprint(const vdtree::MeshView& mesh, vdtree::ClustererKind clusterer) {
+std::uint64_t fingerprint(const vdtree::MeshView& mesh, const vdtree::BuildOptions& options) {
     Hash hash;
     hash.add(mesh.positions);
     hash.add(mesh.triangles);
     hash.add(mesh.normals);
     hash.add(mesh.colours);
     hash.add(mesh.uvs);
-    hash.add_word(static_cast<std::uint64_t>(clusterer));
+    hash.add(mesh.smoothing);
+    hash.add_word(static_cast<std::uint64_t>(options.clusterer));
+    hash.add_word(std::bit_cast<std::uint32_t>(options.crease.value_or(-1.0f))); // never negative
     return hash.value();
 }
 

@@ -29,7 +29,7 @@ public:
 // ---- what its members settle before they build
 
 // A number that differs, but for bad luck, where meshes or what is made of them differ.
-std::uint64_t fingerprint(const vdtree::MeshView& mesh, vdtree::ClustererKind clusterer);
+std::uint64_t fingerprint(const vdtree::MeshView& mesh, const vdtree::BuildOptions& options);
 
 // All go on or none. Every member calls this, with what has gone wrong for it and the fingerprint of what it is to work
 // on. All get the same answer: member 0's error, that of the first other one that has one, or that they do not have the

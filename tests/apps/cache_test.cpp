@@ -71,6 +71,9 @@ TEST_F(CacheTest, WhatATreeDependsOnBuildsItAnew) {
     EXPECT_EQ(origin("plain.obj", {"--prelit"}), "built") << "an option";
     EXPECT_EQ(origin("plain.obj", {"--skip-bad"}), "built") << "an option";
     EXPECT_EQ(origin("plain.obj", {"--no-weld"}), "built") << "an option";
+    for (const char* crease : {"30", "60", "smooth"})
+        EXPECT_EQ(origin("plain.obj", {"--crease", crease}), "built") << "an option";
+    EXPECT_EQ(origin("plain.obj", {"--crease", "180"}), "cache") << "the same angle";
     EXPECT_EQ(origin("plain.obj", {"--triangles", "50%"}), "cache") << "not of the tree";
     write_text(path("my paints.mtl"), "newmtl paint\nKd 0.6 0.5 0.5\n");
     EXPECT_EQ(origin("plain.obj"), "built") << "a library";

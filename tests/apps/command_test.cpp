@@ -307,6 +307,17 @@ TEST_F(BuildTest, WeldsStlUnlessAskedNotTo) {
     EXPECT_EQ(run({"info", "m.vdt", "--json"}).json()["vertices"], 6);
 }
 
+TEST_F(BuildTest, RefusesCreasesThatAreNoAngleOrComeTooLate) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for (const char* bad : {"-1", "181", "nan", "soft", "30deg"})
+        EXPECT_THAT(run({"build", "m.obj", "-o", "m.vdt", "--crease", bad}),
+                    fails(2, HasSubstr("--crease must be smooth or an angle from 0 to 180 degrees")))
+            << bad;
+    ASSERT_EQ(run({"build", "m.obj", "-o", "m.vdt", "--crease", "smooth"}).status, 0);
+    EXPECT_THAT(run({"simplify", "m.vdt", "-o", "o.ply", "--crease", "30"}),
+                fails(1, AllOf(HasSubstr("m.vdt is a tree"), HasSubstr("Give --crease with the mesh"))));
+}
+
 TEST_F(InfoTest, SaysWhatIsUnusualAboutAMesh) {
     write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv nan 1 0\nf 1 2 3\nf 2 3 4\nf 2 5 3\n");
     const Json found = run({"info", "m.obj", "--json"}).json()["examination"];
@@ -737,7 +748,8 @@ TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
                            "--texture t.png",  "--no-texture",
                            "--drop skins",     "--no-weld",
                            "--prelit",         "--skip-bad",
-                           "--no-cache",       "--as model"};
+                           "--crease smooth",  "--no-cache",
+                           "--as model"};
     const std::string setup = run({"help", "setup"}).out;
     for (const std::string& verb : verbs) {
         const auto parse = [&](const std::string& more) {
@@ -755,7 +767,7 @@ TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
             const std::string first =
                 option.substr(option.rfind("--"), option.find(' ', option.rfind("--")) - option.rfind("--"));
             const bool is_field =
-                std::set<std::string>{"--black", "--ambient", "--fill-light", "--no-weld"}.contains(first);
+                std::set<std::string>{"--black", "--ambient", "--fill-light", "--no-weld", "--crease"}.contains(first);
             const std::string shown = first == "--no-shadows"   ? "--shadows"
                                       : first == "--no-texture" ? "--texture"
                                                                 : first;

@@ -312,6 +312,29 @@ TEST(Obj, ShrinksRangesWithTheTrianglesTheyLose) {
     EXPECT_EQ(mesh.ranges[1].triangle_count, 1u);
 }
 
+TEST(Obj, KeepsSmoothingGroupsByTriangle) {
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    const auto groups = [&](const std::string& faces) { return read(vertices + faces, "a.obj").mesh.smoothing; };
+    EXPECT_THAT(groups("f 1 2 3 4\n"), IsEmpty()) << "nothing stated";
+    EXPECT_THAT(groups("s 1\nf 1 2 3 4\nf 1 2 3\n"), ElementsAre(1, 1, 1)) << "a quadrangle is two triangles";
+    EXPECT_THAT(
+        groups("f 1 2 3\ns 7 # a comment\nf 1 2 3\ns off\nf 2 3 4\ng new\ns 4294967295\nf 2 3 4\ns 0\nf 1 2 4\n"),
+        ElementsAre(0, 7, 0, 4294967295u, 0));
+    EXPECT_THAT(groups("s OFF\nf 1 2 3\nf 1 1 3\ns 2\nf 1 1 2\nf 1 2 4\ns 3\n"), ElementsAre(0, 2))
+        << "dropped triangles take theirs along";
+    EXPECT_THAT(groups("f 1 2 3\ns 1\n"), ElementsAre(0)) << "flat before the first";
+}
+
+TEST(Obj, WarnsOfSmoothingGroupsThatAreNone) {
+    const meshio::ReadResult result =
+        read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns 2\ns -1\ns on\ns\ns 4294967296\ns 1.5\nf 1 2 3\n", "a.obj");
+    EXPECT_THAT(result.mesh.smoothing, ElementsAre(2));
+    EXPECT_THAT(result.warnings,
+                ElementsAre("5 smoothing groups were neither a number nor off, the first '-1' in line 5; "
+                            "faces stay in the group before."));
+    EXPECT_THAT(read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns x\nf 1 2 3\n", "a.obj").mesh.smoothing, IsEmpty());
+}
+
 TEST(Obj, SaysWhichKeywordItDidNotKnow) {
     const meshio::ReadResult result = read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns off\nwobble 3\nf 1 2 3\n", "a.obj");
     EXPECT_THAT(result.warnings,
@@ -948,6 +971,9 @@ TEST(Mesh, ValidateNamesTheFirstOffender) {
     bad = mesh;
     bad.normals.resize(2);
     EXPECT_THAT(message(bad), HasSubstr("2 normals for 3 vertices"));
+    bad = mesh;
+    bad.smoothing = {1, 1};
+    EXPECT_THAT(message(bad), HasSubstr("2 smoothing groups for 1 triangles"));
     bad = mesh;
     bad.ranges = {{"r", MeshRange::Kind::group, 1, std::numeric_limits<std::uint64_t>::max()}};
     EXPECT_THAT(message(bad), HasSubstr("Range 0 ('r')"));

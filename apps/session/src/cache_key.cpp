@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // One more where the same file gives another tree, or trees are written in another way.
-constexpr std::uint32_t revision = 3;
+constexpr std::uint32_t revision = 4;
 // More is no mesh that anybody has made.
 constexpr std::size_t most_words = 64, most_names = 4096;
 
@@ -45,6 +45,11 @@ public:
 private:
     XXH3_state_t state_;
 };
+
+// Of an angle, which is never negative.
+std::uint32_t bits_of(const std::optional<float>& crease) {
+    return std::bit_cast<std::uint32_t>(crease.value_or(-1.0f));
+}
 
 // Names that a text may mean, relative to its file. Nothing where that is not clear.
 using Names = std::optional<std::set<std::string>>;
@@ -149,8 +154,8 @@ Names names_in(const fs::path& file, std::string_view mesh, const fs::path& sear
 
 } // namespace
 
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
-                           bool conserves_light) {
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit,
+                           const std::optional<float>& crease, bool measures, bool conserves_light) {
     Hash hash;
     const auto add_all = [&](const auto& values) {
         hash.add({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0])});
@@ -159,6 +164,7 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
     const std::uint64_t numbers[] = {revision,
                                      std::endian::native == std::endian::little,
                                      prelit,
+                                     bits_of(crease),
                                      measures,
                                      conserves_light,
                                      dropped_triangles,
@@ -169,7 +175,7 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
     hash.add("a mesh alone");
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     add_all(mesh.positions), add_all(mesh.triangles), add_all(mesh.normals), add_all(mesh.colours), add_all(mesh.uvs);
-    add_all(mesh.texture.texels), add_all(mesh.document);
+    add_all(mesh.texture.texels), add_all(mesh.document), add_all(mesh.smoothing);
     for (const vdtree::MeshRange& range : mesh.ranges) {
         const std::uint64_t place[] = {static_cast<std::uint64_t>(range.kind), range.first_triangle,
                                        range.triangle_count};
@@ -198,6 +204,7 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
                                      options.conserves_light,
                                      options.without_textures,
                                      options.prelit,
+                                     bits_of(options.crease),
                                      options.drop.skins,
                                      options.drop.morph_targets,
                                      options.drop.animations,

@@ -31,6 +31,10 @@ Result<vdtree::VertexTree> as_asked(Result<vdtree::VertexTree> tree, const fs::p
         return invalid_field("{} is a tree: whether its colours are pre-lit was decided when it was built. Give "
                              "{load.prelit} with the mesh.",
                              {file.string()});
+    if (tree && options.crease)
+        return invalid_field("{} is a tree: which of its edges are hard was decided when it was built. Give "
+                             "{load.crease} with the mesh.",
+                             {file.string()});
     if (tree && options.without_textures && !tree->texture().empty()) return tree->untextured();
     return tree;
 }
@@ -71,6 +75,7 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     building.progress = options.messages.progress;
     building.dropped_before = read->dropped_triangles;
     building.prelit = options.prelit;
+    building.crease = options.crease;
     auto tree = vdtree::build_tree(read->mesh.view(), building);
     if (!tree) return Error{tree.error().code, file.string() + ": " + tree.error().message};
     if (const Message hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)

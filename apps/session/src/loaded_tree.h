@@ -1,6 +1,8 @@
 // Trees from files, with what the session needs to know of where they are from.
 #pragma once
 
+#include <optional>
+
 #include <unseen/perception/internal/lit_folds.h>
 #include <unseen/session/scene.h>
 
@@ -65,8 +67,8 @@ Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree
 std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
 
 // The key of the tree of a mesh that was read, with its texture and document.
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures,
-                           bool conserves_light);
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit,
+                           const std::optional<float>& crease, bool measures, bool conserves_light);
 
 // The key of what a tree's folds change under lights, whichever these are. `key`: the tree's.
 std::string lights_key(const std::string& key);

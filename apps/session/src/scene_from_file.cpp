@@ -86,8 +86,8 @@ private:
         if (!*read) return {};
         const bool is_measured = !is_lit_ && part.folds;
         const std::string key =
-            mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, is_measured && options_.measures,
-                           is_measured && options_.conserves_light);
+            mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, options_.crease,
+                           is_measured && options_.measures, is_measured && options_.conserves_light);
         if (cache_.is_on()) {
             auto kept = cache_.find(key);
             if (!kept) return kept.error();
@@ -101,6 +101,7 @@ private:
         vdtree::BuildOptions building;
         building.dropped_before = (*read)->dropped_triangles;
         building.prelit = options_.prelit;
+        building.crease = options_.crease;
         auto tree = vdtree::build_tree((*read)->mesh.view(), building);
         if (!tree) return in_file(name_, tree.error());
         if (is_measured) tree = measured_as_asked(std::move(*tree), options_, {});

@@ -1,4 +1,4 @@
-// Wavefront OBJ: polygons with positions, UVs, normals, groups and material names. Two passes over the text: vertices
+// Wavefront OBJ: polygons with positions, UVs, normals, smoothing groups, groups and material names. Two passes over the text: vertices
 // first, so that polygons can be cut by their positions, then faces.
 #include "mesh_readers.h"
 #include "mtl_reader.h"
@@ -16,13 +16,14 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr Index none = std::numeric_limits<Index>::max(); // a corner without UV or normal
+constexpr std::int64_t most_smoothing = std::numeric_limits<Index>::max();
 constexpr const char* too_many_vertices = "it has more vertices than 32-bit indices can number; split the mesh.";
 // Statements of surfaces, curves, display and grouping that change no triangle.
 constexpr std::string_view ignored_keywords[] = {
-    "s",          "l",         "p",      "vp",     "mg",     "lod",  "bevel", "c_interp", "d_interp",
-    "shadow_obj", "trace_obj", "maplib", "usemap", "cstype", "deg",  "bmat",  "step",     "curv",
-    "curv2",      "surf",      "parm",   "trim",   "hole",   "scrv", "sp",    "end",      "con",
-    "ctech",      "stech",     "call",   "csh",    "cdc",    "cdp",  "bzp",   "bsp",      "res"};
+    "l",         "p",      "vp",     "mg",     "lod",  "bevel", "c_interp", "d_interp", "shadow_obj",
+    "trace_obj", "maplib", "usemap", "cstype", "deg",  "bmat",  "step",     "curv",     "curv2",
+    "surf",      "parm",   "trim",   "hole",   "scrv", "sp",    "end",      "con",      "ctech",
+    "stech",     "call",   "csh",    "cdc",    "cdp",  "bzp",   "bsp",      "res"};
 
 struct Corner {
     Index position = none;
@@ -226,6 +227,8 @@ private:
             } else if (keyword == "g" || keyword == "o") {
                 start_range(group_, rest, MeshRange::Kind::group);
                 change_part(keyword == "g" ? &SourceDocument::Part::group : &SourceDocument::Part::object, rest);
+            } else if (keyword == "s") {
+                change_smoothing(rest);
             } else if (keyword == "mtllib") {
                 read_materials(rest);
             } else if (keyword == "usemtl") {
@@ -237,6 +240,7 @@ private:
         });
         end_range(group_);
         end_range(material_);
+        if (states_smoothing_) result_.mesh.smoothing.resize(triangle_corners_.size() / 3, smoothing_);
         std::stable_sort(ranges().begin(), ranges().end(),
                          [](const MeshRange& a, const MeshRange& b) { return a.first_triangle < b.first_triangle; });
     }
@@ -320,6 +324,22 @@ private:
                                          : number < 0 && number >= -static_cast<std::int64_t>(seen);
         if (is_valid) index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
         return is_valid;
+    }
+
+    // s N, s off or s 0. Faces before the first one are flat, as the format says, but where there is none nothing is known.
+    void change_smoothing(std::string_view rest) {
+        const std::string_view word = take_word(rest);
+        const char* const end = word.data() + word.size();
+        std::int64_t number = 0;
+        const bool is_off = equals_ignoring_case(word, "off");
+        if (!is_off &&
+            (word.empty() || parse_number(word.data(), end, number) != end || number < 0 || number > most_smoothing)) {
+            if (lost_smoothing_++ == 0) first_lost_smoothing_ = text_of(in_quotes(word), " in line ", line_);
+            return;
+        }
+        result_.mesh.smoothing.resize(triangle_corners_.size() / 3, smoothing_);
+        states_smoothing_ = true;
+        smoothing_ = static_cast<Index>(number);
     }
 
     // ---- groups and materials ----
@@ -482,6 +502,9 @@ private:
             warn(text_of(lost_attributes_, lost_attributes_ == 1 ? " corner goes" : " corners go",
                          " without a normal or texture coordinate that is not there, the first ", first_lost_attribute_,
                          "."));
+        if (lost_smoothing_ > 0)
+            warn(counted_were(lost_smoothing_, "smoothing group") + " neither a number nor off, the first " +
+                 first_lost_smoothing_ + "; faces stay in the group before.");
         if (has_library_) warn_of_unknown_materials();
         if (const auto fanned = polygons_.fanned_concave(); fanned > 0)
             warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
@@ -516,6 +539,8 @@ private:
     bool is_whole_ = true;                 // all that the face uses is there
     bool has_uvs_ = false;
     bool has_normals_ = false;
+    Index smoothing_ = 0; // group of the next triangle
+    bool states_smoothing_ = false;
     OpenRange group_, material_;
     NamedFiles files_{source_};
     std::set<std::string> libraries_; // that were asked for
@@ -533,8 +558,8 @@ private:
     PolygonTriangulator polygons_;
     std::uint64_t statements_ = 0, line_ = 0;
     std::uint64_t small_faces_ = 0;
-    std::uint64_t unknown_ = 0, lost_attributes_ = 0;
-    std::string first_unknown_, first_lost_attribute_;
+    std::uint64_t unknown_ = 0, lost_attributes_ = 0, lost_smoothing_ = 0;
+    std::string first_unknown_, first_lost_attribute_, first_lost_smoothing_;
 };
 
 } // namespace

@@ -393,10 +393,12 @@ private:
         }
         std::vector<std::uint64_t> place(mesh_.triangles.size() + 1, 0); // by old triangle: where it lies now
         std::vector<Triangle> triangles;
+        std::vector<vdtree::Index> smoothing;
         for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
             place[t] = triangles.size();
             triangles.push_back(mesh_.triangles[t]);
             triangles.insert(triangles.end(), after[t].begin(), after[t].end());
+            if (!mesh_.smoothing.empty()) smoothing.resize(triangles.size(), mesh_.smoothing[t]);
         }
         place.back() = triangles.size();
         for (MeshRange& range : mesh_.ranges) {
@@ -405,6 +407,7 @@ private:
             range.triangle_count = end - range.first_triangle;
         }
         mesh_.triangles = std::move(triangles);
+        mesh_.smoothing = std::move(smoothing);
     }
 
     struct Cap {

@@ -10,13 +10,16 @@
 //     format       text  binary  normals  colours  texture      materials  nodes and  values of
 //                                                  coordinates  and images scenes     vertices
 //     PLY          r     rw      rw       rw       rw           -          -          rw
-//     OBJ          rw    -       rw       rw       rw           rw         rw (1)     -
+//     OBJ          rw    -       rw (3)   rw       rw           rw         rw (1)     -
 //     glTF, GLB    rw    rw      rw       rw       rw           rw         rw         -
 //     VTP          r     rw      rw       rw       rw           -          -          rw
 //     STL          r     rw      - (2)    -        -            -          -          -
 //     OFF          rw    -       rw       rw       rw           -          -          -
 //
-// (1) objects and groups. (2) Facets' normals are read if vertices are not welded, and written as computed.
+// (1) objects and groups. (2) Facets' normals are read if vertices are not welded, and written as computed. (3) Smoothing
+// groups are read.
+// Normals that are missing are computed when a tree is built (BuildOptions::crease). So are those of glTF primitives without
+// any, for which its specification asks for flat faces: files of smooth surfaces leave normals out, too.
 // A new format is a reader, a writer and a line of the table in src/mesh_file.cpp.
 #pragma once
 
