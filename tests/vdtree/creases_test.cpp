@@ -16,13 +16,13 @@ constexpr float hard = 0, smooth = 180; // degrees
 struct Options {
     std::optional<float> crease = {};
     std::vector<glm::vec3> own = {}; // by corner
-    bool inward = false;
+    float face_sign = 1, own_sign = 1;
 };
 
 // Of a mesh whose vertices are places.
 CornerNormals find(const Mesh& mesh, const Options& options = {}) {
-    return find_corner_normals(
-        {mesh.positions, mesh.triangles, options.own, mesh.smoothing, options.crease, options.inward});
+    return find_corner_normals({mesh.positions, mesh.triangles, options.own, mesh.smoothing, options.crease,
+                                options.face_sign, options.own_sign});
 }
 
 // Normals at each place, in the order of the places.
@@ -170,12 +170,10 @@ TEST(Creases, SmoothSurfacesHaveTheNormalsOfTheirPlaces) {
          {shapes::icosphere(3), shapes::torus(40, 20), shapes::bumpy_sphere(4, 0.002), shapes::grid(9)}) {
         for (const bool turned : {false, true}) {
             const Mesh mesh = turned ? shapes::inside_out(outward) : outward;
-            std::vector<Index> places(mesh.positions.size());
-            std::iota(places.begin(), places.end(), Index{0});
-            const Surface surface = analyse_surface(mesh.view(), places);
-            const bool inward = surface.closedness == Closedness::closed_inward;
+            const Surface surface = analyse_surface(mesh.view());
+            const float sign = surface.closedness == Closedness::closed_inward ? -1 : 1;
             for (const std::optional<float> crease : {std::optional<float>(), std::optional(smooth)}) {
-                const CornerNormals found = find(mesh, {crease, {}, inward});
+                const CornerNormals found = find(mesh, {crease, {}, sign});
                 EXPECT_EQ(fault(mesh, found), "");
                 EXPECT_FALSE(found.has_creases);
                 EXPECT_EQ(found.normals, surface.normals);
@@ -186,10 +184,8 @@ TEST(Creases, SmoothSurfacesHaveTheNormalsOfTheirPlaces) {
 
 TEST(Creases, SmoothMeansEverywhere) {
     const Mesh mesh = shapes::together(shapes::cube(3), shapes::spiky_star(3));
-    std::vector<Index> places(mesh.positions.size());
-    std::iota(places.begin(), places.end(), Index{0});
     const CornerNormals found = find(mesh, {smooth});
-    EXPECT_EQ(found.normals, analyse_surface(mesh.view(), places).normals);
+    EXPECT_EQ(found.normals, analyse_surface(mesh.view()).normals);
     EXPECT_FALSE(found.has_creases);
 }
 
@@ -304,18 +300,17 @@ TEST(Creases, NormalsThatAreNearlyEqualAreOne) {
     }
 }
 
-TEST(Creases, NormalsOfInsideOutMeshesAreTurned) {
-    const Mesh mesh = shapes::inside_out(shapes::icosphere(2));
-    std::vector<Index> places(mesh.positions.size());
-    std::iota(places.begin(), places.end(), Index{0});
-    for (const float sign : {-1.0f, 1.0f}) { // normals that agree with the faces, and normals that point outward
-        Mesh with_normals = mesh;
-        for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-            with_normals.normals.push_back(v % 7 == 0 ? glm::vec3(0) : sign * glm::vec3(mesh.positions[v]));
-        std::vector<glm::vec3> own;
-        for (const Triangle& t : mesh.triangles)
-            for (const Index v : t) own.push_back(with_normals.normals[v]);
-        EXPECT_EQ(find(mesh, {{}, own, true}).normals, analyse_surface(with_normals.view(), places).normals);
+TEST(Creases, NormalsAreTurnedWhereAsked) {
+    const Mesh mesh = shapes::icosphere(2);
+    std::vector<glm::vec3> own(3 * mesh.triangles.size(), glm::vec3(0, 0, 1));
+    for (std::size_t i = 0; i < own.size(); i += 3) own[i] = glm::vec3(0); // computed
+    const CornerNormals found = find(mesh, {{}, own}), turned = find(mesh, {{}, own, -1, -1}),
+                        faces_turned = find(mesh, {{}, own, -1, 1});
+    EXPECT_EQ(turned.number, found.number);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+        const glm::vec3 normal = found.normals[found.number[i]];
+        EXPECT_EQ(turned.normals[turned.number[i]], -normal);
+        EXPECT_EQ(faces_turned.normals[faces_turned.number[i]], i % 3 == 0 ? -normal : normal);
     }
 }
 

@@ -396,21 +396,13 @@ private:
     const double least_cosine_ = cosine_of(same_degrees);
 };
 
-// What every place needs.
-struct CreaseSettings {
-    double crease = 180; // degrees
-    float face_sign = 1; // of computed normals
-    double own_sign = 1; // of the mesh's
-    bool is_smooth() const { return crease >= 180; }
-    double least_cosine() const { return cosine_of(crease + slack_degrees); }
-};
-
 // Makes the normals of a block of places and numbers them, the first one 0.
 class NormalBlock {
 public:
-    NormalBlock(const CornerInput& in, const FaceNormals& faces, const CreaseSettings& settings,
-                std::span<Index> number)
-        : in_(in), settings_(settings), fan_(in, faces), faces_(faces), number_(number) {}
+    // `degrees`: larger angles are creases.
+    NormalBlock(const CornerInput& in, const FaceNormals& faces, double degrees, std::span<Index> number)
+        : in_(in), fan_(in, faces), faces_(faces), number_(number), is_smooth_(degrees >= 180),
+          least_cosine_(cosine_of(degrees + slack_degrees)), within_(cosine_of(degrees / 2)) {}
 
     std::vector<glm::vec3> normals;
     bool has_creases = false;
@@ -419,21 +411,20 @@ public:
 
     void add(std::span<const Index> corners) {
         if (corners.empty()) return;
-        fan_.look_at(corners);
         different_.begin();
         group(corners);
         first_.assign(corners.size(), none);
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Index corner = corners[i];
-            if (!in_.own.empty() && is_stated(in_.own[corner])) {
-                const glm::vec3 own(settings_.own_sign * unit(glm::dvec3(in_.own[corner])));
+            if (has_own(corner)) {
+                const glm::vec3 own = in_.own_sign * glm::vec3(unit(glm::dvec3(in_.own[corner])));
                 number_[corner] = static_cast<Index>(different_.number_of(own));
                 continue;
             }
             const Index g = is_one_ ? 0 : groups_.find(static_cast<Index>(i));
             if (first_[g] == none)
                 first_[g] = static_cast<Index>(
-                    different_.number_of(settings_.face_sign * glm::vec3(unit(is_one_ ? fan_.sum() : sums_[g]))));
+                    different_.number_of(in_.face_sign * glm::vec3(unit(is_one_ ? fan_.sum() : sums_[g]))));
             number_[corner] = first_[g];
         }
         has_creases = has_creases || different_.count() > 1;
@@ -442,10 +433,15 @@ public:
 private:
     static constexpr Index none = ~Index{0};
 
+    bool has_own(Index corner) const { return !in_.own.empty() && is_stated(in_.own[corner]); }
+
     // Which corners share a computed normal.
     void group(std::span<const Index> corners) {
+        is_one_ = true;
+        if (std::ranges::all_of(corners, [&](Index corner) { return has_own(corner); })) return;
+        fan_.look_at(corners);
         const bool stated = !in_.smoothing.empty();
-        is_one_ = !stated && (settings_.is_smooth() || fan_.is_within(within_));
+        is_one_ = !stated && (is_smooth_ || fan_.is_within(within_));
         if (is_one_) return;
         groups_.reset(corners.size());
         fan_.unite(stated ? flat_ : least_cosine_, groups_);
@@ -456,13 +452,12 @@ private:
     }
 
     const CornerInput& in_;
-    const CreaseSettings& settings_;
     CornerFan fan_;
     const FaceNormals& faces_;
     std::span<Index> number_;
     DifferentNormals different_{normals};
-    const double least_cosine_ = settings_.least_cosine(), flat_ = cosine_of(slack_degrees),
-                 within_ = cosine_of(settings_.crease / 2);
+    const bool is_smooth_;
+    const double least_cosine_, within_, flat_ = cosine_of(slack_degrees);
     bool is_one_ = true;
     CornerSets groups_;
     std::vector<glm::dvec3> sums_; // by the group's first corner
@@ -475,15 +470,6 @@ bool states_all(const CornerInput& in) {
     return !in.smoothing.empty() || (!in.own.empty() && std::ranges::all_of(in.own, is_stated));
 }
 
-// Whether the mesh's own normals agree with its faces on the whole.
-bool own_agree(const CornerInput& in, const FaceNormals& faces) {
-    double agreement = 0;
-    for (std::size_t corner = 0; corner < in.own.size(); ++corner)
-        if (is_stated(in.own[corner]))
-            agreement += glm::dot(faces.vectors[corner / 3], unit(glm::dvec3(in.own[corner])));
-    return agreement > 0;
-}
-
 } // namespace
 
 CornerNormals find_corner_normals(const CornerInput& input) {
@@ -494,9 +480,6 @@ CornerNormals find_corner_normals(const CornerInput& input) {
     else if (input.crease) out.creases = {Creases::Source::asked, std::min(*input.crease, 180.0f)};
     else out.creases = {Creases::Source::rule, static_cast<float>(angle_by_rule(count_edges(input, faces, corners)))};
 
-    CreaseSettings settings;
-    settings.crease = static_cast<double>(out.creases.degrees);
-    if (input.inward) settings.face_sign = -1, settings.own_sign = own_agree(input, faces) ? -1 : 1;
     out.number.resize(input.triangles.size() * 3);
     const std::size_t places = input.positions.size(), blocks = (places + block_size - 1) / block_size;
     std::vector<std::vector<glm::vec3>> normals(blocks);
@@ -507,7 +490,7 @@ CornerNormals find_corner_normals(const CornerInput& input) {
             use(corners.at(p));
     };
     parallel_loop(std::size_t{0}, blocks, [&](std::size_t b) {
-        NormalBlock block(input, faces, settings, out.number);
+        NormalBlock block(input, faces, static_cast<double>(out.creases.degrees), out.number);
         for_each_place(b, [&](std::span<const Index> at) { block.add(at); });
         normals[b] = std::move(block.normals);
         if (block.has_creases) has_creases.store(true, std::memory_order_relaxed);

@@ -15,7 +15,7 @@ struct CornerInput {
     std::span<const glm::vec3> own = {};   // by corner, 3 a triangle; zero or non-finite: computed. Empty: all are
     std::span<const Index> smoothing = {}; // by triangle, see MeshView::smoothing; empty: not stated
     std::optional<float> crease = {};      // degrees, see BuildOptions::crease
-    bool inward = false;                   // Closedness::closed_inward: normals are turned outward
+    float face_sign = 1, own_sign = 1;     // -1: turns computed normals, or the mesh's own, around
 };
 
 struct CornerNormals {
