@@ -95,7 +95,7 @@ struct LoadOptions {
     // meshes only: tree files know it.
     bool prelit = false;
     std::optional<float> crease = {}; // degrees, for meshes; see vdtree::BuildOptions
-    double unit_metres = 1; // world units (metres) in a mesh unit; above 0. For Scene::load()
+    double unit_metres = 1;           // world units (metres) in a mesh unit; above 0. For Scene::load()
     // For meshes: measure what folds change (see measured()), if the tree has at most two million folds and the test
     // `error` can handle its texture (perception::knows_texture()).
     bool measures = true;
