@@ -73,7 +73,7 @@ TEST(CgalAdapter, ATreesFullCutIsTheMesh) {
     const auto there = made->mesh.property_map<Surface::Vertex_index, CGAL::IO::Color>("v:color");
     ASSERT_TRUE(here.second && there.second);
     for (const auto v : whole->mesh.vertices()) {
-        const Index source = tree->source_vertices()[whole->sources[v] - tree->interior_count()];
+        const Index source = tree->source_vertices()[whole->sources[v] - tree->interior_wedge_count()];
         EXPECT_LT(CGAL::squared_distance(whole->mesh.point(v), made->mesh.point(Surface::Vertex_index(source))), 1e-12);
         EXPECT_EQ(here.first[v], there.first[Surface::Vertex_index(source)]);
     }

@@ -144,13 +144,12 @@ private:
     void check_node(NodeId node) {
         const Sphere& support = tree_.support_spheres()[node];
         const Sphere& ring = tree_.bounds()[node].ring;
-        const auto positions = tree_.positions();
-        const glm::vec3 proxy = positions[node];
+        const glm::vec3 proxy = tree_.position(node);
         expect(contains(support, proxy, 0), "the support's sphere does not contain the proxy.");
         expect(contains(ring, proxy, 0), "the ring's sphere does not contain the proxy.");
         tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) {
-                expect(contains(support, positions[child], 0), "the support's sphere does not contain a leaf.");
+            if (tree_.is_place(child)) {
+                expect(contains(support, tree_.position(child), 0), "the support's sphere does not contain a leaf.");
                 return;
             }
             const Sphere &s = tree_.support_spheres()[child], &r = tree_.bounds()[child].ring;
@@ -159,22 +158,20 @@ private:
         });
         const Sphere reach{proxy, tree_.displacement()[node]};
         for (Index leaf = tree_.first_leaf()[node]; leaf < tree_.leaf_end()[node]; ++leaf)
-            expect(contains(reach, positions[tree_.interior_count() + leaf], 0),
+            expect(contains(reach, tree_.positions()[tree_.wedge_of_leaf(leaf)], 0),
                    "a leaf moves farther than the displacement.");
     }
 
     // At the lowest node that moves a corner; nesting carries it to the nodes above.
     void check_triangle(Index t) {
-        const NodeId interior = tree_.interior_count();
-        const auto positions = tree_.positions();
         std::array<glm::vec3, 3> corners;
         for (std::size_t k = 0; k < 3; ++k) {
-            corners[k] = positions[interior + tree_.triangles()[t][k]];
+            corners[k] = tree_.positions()[tree_.wedge_of_leaf(tree_.triangles()[t][k])];
             expect(contains(tree_.bounding_sphere(), corners[k], 0), "the bounding sphere does not contain a corner.");
         }
         Normal normal(corners);
         for (const Index leaf : tree_.triangles()[t]) {
-            NodeId node = tree_.parents()[interior + leaf];
+            NodeId node = tree_.parents()[tree_.place_of_leaf(leaf)];
             while (node != vdtree::no_node && tree_.support_spheres()[node].radius == 0) node = tree_.parents()[node];
             if (node == vdtree::no_node) continue; // everything is at one point
             for (const glm::vec3 corner : corners)

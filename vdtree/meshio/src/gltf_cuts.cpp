@@ -43,7 +43,7 @@ Result<void> check(const fs::path& file, const LevelCuts& levels) {
 bool is_whole(const Cut& cut) {
     const VertexTree& tree = cut.tree();
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf)
-        if (!tree.is_leaf(cut.proxy_of_leaf(leaf))) return false;
+        if (!tree.is_place(cut.proxy_of_leaf(leaf))) return false;
     return true;
 }
 
@@ -300,7 +300,7 @@ private:
     struct Look {
         std::int32_t mesh;
         const void* tree;
-        std::vector<NodeId> vertices;
+        std::vector<WedgeId> vertices;
         auto operator<=>(const Look&) const = default;
     };
 
@@ -313,7 +313,7 @@ private:
         // is folded.
         const bool is_all = is_whole(cut);
         Look look{levels.mesh, is_all ? nullptr : cut.tree().positions().data(), {}};
-        if (!is_all) look.vertices = extracted.nodes;
+        if (!is_all) look.vertices = extracted.wedges;
         const auto [known, is_new] = written_as_.try_emplace(std::move(look));
         if (!is_new) return of_cut->second = known->second;
         const std::uint64_t before = file_.bytes();

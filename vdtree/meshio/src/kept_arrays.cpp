@@ -35,24 +35,23 @@ private:
 
 class ArraysOfCut {
 public:
-    ArraysOfCut(const Cut& cut, const ExtractedMesh& extracted)
-        : tree_(cut.tree()), extracted_(extracted), supports_(supports_of(cut, extracted)) {
+    ArraysOfCut(const VertexTree& tree, const LeafRuns& leaves, const ExtractedMesh& extracted)
+        : tree_(tree), leaves_(leaves), extracted_(extracted) {
         find_nearest();
     }
 
-    Result<VertexArray> gather(const VertexArray& array) const {
-        if (const auto sound = check_supports(tree_, supports_, array.size()); !sound) return sound.error();
+    VertexArray gather(const VertexArray& array) const {
         VertexArray out{array.name, array.type, array.components, array.role, {}};
         const std::size_t bytes = array.tuple_bytes();
-        out.values.resize(supports_.size() * bytes);
-        for (std::size_t v = 0; v < supports_.size(); ++v) {
+        out.values.resize(nearest_.size() * bytes);
+        for (std::size_t v = 0; v < nearest_.size(); ++v) {
+            const Index first = leaves_.begin(extracted_.wedges[v]), end = leaves_.end(extracted_.wedges[v]);
             std::byte* const to = out.values.data() + v * bytes;
-            std::memcpy(to, array.values.data() + tree_.source_vertices()[nearest_[v]] * bytes, bytes);
-            if (supports_[v].end - supports_[v].first < 2 || is_integer(array.type)) continue;
+            std::memcpy(to, array.values.data() + nearest_[v] * bytes, bytes);
+            if (end - first < 2 || is_integer(array.type)) continue;
             for (std::uint32_t c = 0; c < array.components; ++c) {
                 FiniteMean mean;
-                for (Index leaf = supports_[v].first; leaf < supports_[v].end; ++leaf)
-                    mean.add(array.number(tree_.source_vertices()[leaf], c));
+                for (Index rank = first; rank < end; ++rank) mean.add(array.number(source(rank), c));
                 if (!mean.is_there()) continue;
                 if (array.type == ValueType::float64) store(to, c, mean.value());
                 else store(to, c, static_cast<float>(mean.value()));
@@ -67,29 +66,30 @@ private:
         std::memcpy(tuple + component * sizeof value, &value, sizeof value);
     }
 
-    // By vertex of the cut, the leaf that stands for it where one has to.
+    Index source(Index rank) const { return tree_.source_vertices()[leaves_.leaf(rank)]; }
+
     void find_nearest() {
-        nearest_.resize(supports_.size());
-        for (std::size_t v = 0; v < supports_.size(); ++v) {
-            const glm::dvec3 place(tree_.positions()[extracted_.nodes[v]]);
+        nearest_.resize(extracted_.wedges.size());
+        for (std::size_t v = 0; v < nearest_.size(); ++v) {
+            const WedgeId wedge = extracted_.wedges[v];
+            const glm::dvec3 place(tree_.positions()[wedge]);
             double least = std::numeric_limits<double>::infinity();
-            nearest_[v] = supports_[v].first;
-            for (Index leaf = supports_[v].first; leaf < supports_[v].end; ++leaf) {
-                const glm::dvec3 apart = glm::dvec3(tree_.positions()[tree_.interior_count() + leaf]) - place;
+            nearest_[v] = source(leaves_.begin(wedge));
+            for (Index rank = leaves_.begin(wedge); rank < leaves_.end(wedge); ++rank) {
+                const glm::vec3 leaf = tree_.positions()[tree_.wedge_of_leaf(leaves_.leaf(rank))];
+                const glm::dvec3 apart = glm::dvec3(leaf) - place;
                 const double distance = glm::dot(apart, apart);
-                const bool is_first =
-                    distance == least && tree_.source_vertices()[leaf] < tree_.source_vertices()[nearest_[v]];
-                if (!(distance < least) && !is_first) continue;
+                if (!(distance < least || (distance == least && source(rank) < nearest_[v]))) continue;
                 least = distance;
-                nearest_[v] = leaf;
+                nearest_[v] = source(rank);
             }
         }
     }
 
     const VertexTree& tree_;
+    const LeafRuns& leaves_;
     const ExtractedMesh& extracted_;
-    std::vector<LeafRange> supports_; // by vertex of the cut, like the next
-    std::vector<Index> nearest_;
+    std::vector<Index> nearest_; // by vertex of the cut: of the input's, the one that stands for it where one has to
 };
 
 } // namespace
@@ -132,17 +132,15 @@ bool is_colour_name(std::string_view name) {
 
 Result<std::vector<VertexArray>> arrays_of_cut(const Cut& cut, const ExtractedMesh& extracted,
                                                std::span<const VertexArray> arrays) {
-    const ArraysOfCut source(cut, extracted);
+    std::size_t vertices = cut.tree().source_vertex_count();
+    for (const VertexArray& array : arrays)
+        if (array.role == VertexArray::Role::value && array.size() != vertices) vertices = array.size();
+    const auto leaves = leaves_of_wedges(cut.tree(), vertices);
+    if (!leaves) return leaves.error();
+    const ArraysOfCut source(cut.tree(), *leaves, extracted);
     std::vector<VertexArray> out;
-    for (const VertexArray& array : arrays) {
-        if (array.role != VertexArray::Role::value) {
-            out.push_back(array);
-            continue;
-        }
-        auto gathered = source.gather(array);
-        if (!gathered) return gathered.error();
-        out.push_back(std::move(*gathered));
-    }
+    for (const VertexArray& array : arrays)
+        out.push_back(array.role == VertexArray::Role::value ? source.gather(array) : array);
     return out;
 }
 

@@ -1,9 +1,11 @@
 #include "restore.h"
 
+#include <limits>
 #include <map>
-#include <tuple>
 
 #include <glm/matrix.hpp>
+
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "gltf_document.h"
 #include "mesh_readers.h"
@@ -19,17 +21,12 @@ constexpr double least_determinant = 1e-12;
 
 class Restorer {
 public:
-    Restorer(const Cut& cut, const ExtractedMesh& extracted, const SourceDocument& document,
-             const std::vector<std::string>& uvs)
-        : tree_(cut.tree()), extracted_(extracted), document_(document), uvs_(uvs),
-          supports_(supports_of(cut, extracted)) {
-        find_kinds();
-    }
+    Restorer(const VertexTree& tree, const LeafRuns& leaves, const ExtractedMesh& extracted,
+             const SourceDocument& document, const std::vector<std::string>& uvs)
+        : tree_(tree), leaves_(leaves), extracted_(extracted), document_(document), uvs_(uvs),
+          numbers_(extracted.wedges.size(), none) {}
 
-    Result<std::vector<RestoredPart>> run() {
-        const std::size_t vertices =
-            extracted_.source_triangles.size() == extracted_.mesh.triangles.size() ? document_.vertex_parts.size() : 0;
-        if (const auto sound = check_supports(tree_, supports_, vertices); !sound) return sound.error();
+    std::vector<RestoredPart> run() {
         std::map<std::uint32_t, RestoredPart> parts;
         std::size_t run = 0;
         const auto& runs = document_.runs;
@@ -38,7 +35,6 @@ public:
             parts[runs[run].part].triangles.push_back(extracted_.mesh.triangles[t]);
         }
         std::vector<RestoredPart> out;
-        numbers_.assign(extracted_.nodes.size(), no_node);
         for (auto& [number, part] : parts) {
             part.part = number;
             fill(part);
@@ -48,19 +44,7 @@ public:
     }
 
 private:
-    // Parts of one kind have the same attributes, drawn in the same way.
-    void find_kinds() {
-        std::map<std::tuple<std::uint32_t, std::string, std::array<double, 10>>, std::uint32_t> kinds;
-        for (std::size_t i = 0; i < document_.parts.size(); ++i) {
-            const Part& part = document_.parts[i];
-            const UvMap& uv = part.drawn_uv;
-            const glm::dvec4 colour(part.colour);
-            const std::array drawing{uv.linear[0][0], uv.linear[0][1], uv.linear[1][0], uv.linear[1][1], uv.offset.x,
-                                     uv.offset.y,     colour.r,        colour.g,        colour.b,        colour.a};
-            const auto next = static_cast<std::uint32_t>(kinds.size());
-            kinds_.push_back(kinds.try_emplace({part.channels, uvs_[i], drawing}, next).first->second);
-        }
-    }
+    static constexpr Index none = std::numeric_limits<Index>::max();
 
     void fill(RestoredPart& out) {
         const Part& part = document_.parts[out.part];
@@ -69,7 +53,7 @@ private:
         for (Triangle& triangle : out.triangles) {
             for (Index& corner : triangle) {
                 Index& number = numbers_[corner];
-                if (number == no_node) {
+                if (number == none) {
                     number = static_cast<Index>(out.vertices.size());
                     out.vertices.push_back(corner);
                 }
@@ -80,53 +64,56 @@ private:
         out.uvs = uvs_[out.part];
         out.channels.resize(document_.channels.size());
         for (const Index v : out.vertices) {
-            numbers_[v] = no_node;
+            numbers_[v] = none;
             const glm::dvec3 p = extracted_.mesh.positions[v];
             out.positions.emplace_back(frame.from_world * glm::dvec4(p, 1.0));
-            gather(v, out.part);
             for (std::size_t c = 0; c < out.channels.size(); ++c)
-                if (part.channels >> c & 1) append(out.channels[c], document_.channels[c], v, out, frame);
+                if (part.channels >> c & 1) append(out.channels[c], c, v, out, frame);
         }
     }
 
-    // What speaks for a vertex in a part.
-    void gather(Index vertex, std::uint32_t part) {
-        const LeafRange support = supports_[vertex];
-        const auto all = tree_.source_vertices().subspan(support.first, support.end - support.first);
-        like_.clear();
-        for (const Index source : all)
-            if (kinds_[document_.vertex_parts[source]] == kinds_[part]) like_.push_back(source);
-        is_pure_ = like_.size() == all.size();
-        if (like_.empty()) like_.assign(all.begin(), all.end());
+    // Leaves of one wedge have one material, and so they are drawn in one way. But some may lack an attribute that others
+    // have.
+    bool has(Index source, std::size_t channel) const {
+        return document_.parts[document_.vertex_parts[source]].channels >> channel & 1;
     }
 
-    void append(std::vector<float>& to, const SourceDocument::Channel& channel, Index vertex, const RestoredPart& of,
+    void append(std::vector<float>& to, std::size_t number, Index vertex, const RestoredPart& of,
                 const NodeFrame& frame) const {
         const Part& part = document_.parts[of.part];
+        const SourceDocument::Channel& channel = document_.channels[number];
         const std::size_t size = channel.components;
         const bool is_normal = channel.name == "NORMAL" && size == 3;
-        if (tree_.is_leaf(extracted_.nodes[vertex]) && (frame.has_inverse || !is_normal)) { // as it was
-            for (std::size_t k = 0; k < size; ++k) to.push_back(channel.values[like_[0] * size + k]);
+        const WedgeId wedge = extracted_.wedges[vertex];
+        const Index first = leaves_.begin(wedge), end = leaves_.end(wedge);
+        const auto source = [&](Index rank) { return tree_.source_vertices()[leaves_.leaf(rank)]; };
+        if (wedge >= tree_.interior_wedge_count() && (frame.has_inverse || !is_normal)) { // as it was
+            for (std::size_t k = 0; k < size; ++k) to.push_back(channel.values[source(first) * size + k]);
             return;
         }
         std::array<double, 4> values{};
-        for (std::size_t k = 0; k < size; ++k) {
-            for (const Index source : like_) values[k] += static_cast<double>(channel.values[source * size + k]);
-            values[k] /= static_cast<double>(std::max<std::size_t>(like_.size(), 1));
+        Index count = 0;
+        for (Index rank = first; rank < end; ++rank) {
+            if (!has(source(rank), number)) continue;
+            ++count;
+            for (std::size_t k = 0; k < size; ++k)
+                values[k] += static_cast<double>(channel.values[source(rank) * size + k]);
         }
+        for (double& value : values) value /= std::max<Index>(count, 1);
+        const bool have_all = count == end - first;
         const Mesh& mesh = extracted_.mesh;
         if (is_normal) {
             const glm::dvec3 n = frame.normal_from_world * glm::dvec3(mesh.normals[vertex]);
             const double length = glm::length(n);
             for (int k = 0; k < 3; ++k) values[static_cast<std::size_t>(k)] = length > 0 ? n[k] / length : 0.0;
-        } else if (channel.name == of.uvs && is_pure_ && size == 2 && !mesh.uvs.empty()) {
+        } else if (channel.name == of.uvs && have_all && size == 2 && !mesh.uvs.empty()) {
             const double determinant = glm::determinant(part.drawn_uv.linear);
             if (determinant != 0 && std::isfinite(1 / determinant)) {
                 const glm::dvec2 uv =
                     glm::inverse(part.drawn_uv.linear) * (glm::dvec2(mesh.uvs[vertex]) - part.drawn_uv.offset);
                 values[0] = uv.x, values[1] = uv.y;
             }
-        } else if (channel.name == "COLOR_0" && is_pure_ && size >= 3 && !mesh.colours.empty()) {
+        } else if (channel.name == "COLOR_0" && have_all && size >= 3 && !mesh.colours.empty()) {
             for (int k = 0; k < static_cast<int>(size); ++k)
                 if (part.colour[k] > 0)
                     values[static_cast<std::size_t>(k)] =
@@ -136,40 +123,21 @@ private:
     }
 
     const VertexTree& tree_;
+    const LeafRuns& leaves_;
     const ExtractedMesh& extracted_;
     const SourceDocument& document_;
     const std::vector<std::string>& uvs_; // by part
-    std::vector<LeafRange> supports_;     // by vertex of the extracted mesh
-    std::vector<std::uint32_t> kinds_;    // by part
     std::vector<Index> numbers_;          // by vertex of the extracted mesh: its number in the part at hand
-    std::vector<Index> like_;             // what speaks for the vertex at hand
-    bool is_pure_ = false;                // all that it stands for
 };
 
 } // namespace
 
-std::vector<LeafRange> supports_of(const Cut& cut, const ExtractedMesh& extracted) {
-    const VertexTree& tree = cut.tree();
-    std::vector<Index> vertex_of_node(tree.node_count(), no_node);
-    for (std::size_t v = 0; v < extracted.nodes.size(); ++v) vertex_of_node[extracted.nodes[v]] = static_cast<Index>(v);
-    std::vector<LeafRange> supports(extracted.nodes.size());
-    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-        const Index vertex = vertex_of_node[cut.proxy_of_leaf(leaf)];
-        if (vertex == no_node) continue;
-        LeafRange& support = supports[vertex];
-        if (support.end == 0) support.first = leaf;
-        support.end = leaf + 1;
-    }
-    return supports;
-}
-
-Result<void> check_supports(const VertexTree& tree, std::span<const LeafRange> supports, std::size_t vertices) {
-    for (const LeafRange& support : supports)
-        for (Index leaf = support.first; leaf < support.end; ++leaf)
-            if (tree.source_vertices()[leaf] >= vertices)
-                return Error{ErrorCode::malformed_data,
-                             "The source document is not that of the tree's mesh. Build the tree again."};
-    return {};
+Result<LeafRuns> leaves_of_wedges(const VertexTree& tree, std::size_t vertices) {
+    if (const auto sound = SoundTree::of(tree); !sound) return sound.error();
+    if (tree.source_vertex_count() != vertices)
+        return Error{ErrorCode::malformed_data,
+                     "The source document is not that of the tree's mesh. Build the tree again."};
+    return LeafRuns(links_of(*tree.data().geometry));
 }
 
 NormalMatrix normal_matrix_of(const glm::dmat3& m) {
@@ -218,7 +186,10 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document) {
 
 Result<std::vector<RestoredPart>> restore(const Cut& cut, const ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs) {
-    return Restorer(cut, extracted, document, uvs).run();
+    const bool has_sources = extracted.source_triangles.size() == extracted.mesh.triangles.size();
+    const auto leaves = leaves_of_wedges(cut.tree(), has_sources ? document.vertex_parts.size() : 0);
+    if (!leaves) return leaves.error();
+    return Restorer(cut.tree(), *leaves, extracted, document, uvs).run();
 }
 
 } // namespace unseen::meshio

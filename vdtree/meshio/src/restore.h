@@ -5,18 +5,13 @@
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>
+#include <unseen/vdtree/internal/leaf_runs.h>
 
 namespace unseen::meshio {
 
-// The leaves that a vertex of an extracted cut stands for: its own, or all below its node.
-struct LeafRange {
-    vdtree::Index first = 0, end = 0;
-};
-// By vertex. Cost: the tree's leaves.
-std::vector<LeafRange> supports_of(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted);
-
-// Fails if the vertices of the input that they stand for are not all below a number.
-Result<void> check_supports(const vdtree::VertexTree& tree, std::span<const LeafRange> supports, std::size_t vertices);
+// The leaves that each wedge stands for. Fails for a damaged tree, and unless its mesh had that many vertices. The tree
+// must outlive the result. Cost: that of SoundTree::of(), and the wedges.
+Result<vdtree::LeafRuns> leaves_of_wedges(const vdtree::VertexTree& tree, std::size_t vertices);
 
 struct RestoredPart {
     std::uint32_t part = 0;
@@ -33,7 +28,7 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document);
 
 // Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of
 // proxies follow from the mesh that was drawn, and else are the means of the vertices that they stand for, of those
-// with the same attributes. `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other.
+// that have the attribute. `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other.
 // Cost: the cut's triangles, and the tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs);

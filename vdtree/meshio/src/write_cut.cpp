@@ -126,7 +126,7 @@ private:
             std::size_t components = 0;
             const std::vector<float>* values = channel("COLOR_0", restored, components);
             if (!values) continue;
-            colours.resize(extracted_.nodes.size(), none);
+            colours.resize(extracted_.wedges.size(), none);
             for (std::size_t i = 0; i < restored.vertices.size(); ++i) {
                 glm::vec4& colour = colours[restored.vertices[i]] = missing_colour;
                 for (std::size_t k = 0; k < components; ++k)
@@ -135,7 +135,7 @@ private:
         }
         const bool has_alpha =
             std::any_of(colours.begin(), colours.end(), [&](glm::vec4 c) { return c != none && c.a != 1; });
-        for (std::size_t v = 0; v < extracted_.nodes.size(); ++v) {
+        for (std::size_t v = 0; v < extracted_.wedges.size(); ++v) {
             out_.text("v");
             for (int k = 0; k < 3; ++k) { // floats in as few digits as theirs
                 const double x = extracted_.mesh.positions[v][k];

@@ -30,7 +30,7 @@ struct Soup {
 template <class M>
 struct Made {
     M mesh;
-    std::vector<vdtree::Index> sources; // by vertex: the soup's vertex, or the tree's node
+    std::vector<vdtree::Index> sources; // by vertex: the soup's vertex, or the tree's wedge
     // Halfedges can only hold a manifold surface. This many triangles did not fit and have vertices of their own, at the
     // same positions. Only triangles that use a vertex twice are left out.
     std::size_t loose_triangles = 0;
@@ -179,13 +179,13 @@ Result<vdtree::VertexTree> build_tree(const Result<S>& soup, const vdtree::Build
     return vdtree::build_tree(soup->mesh.view(), build);
 }
 
-// The cut as a mesh of the other library, made by `from_mesh(soup)`; its sources become the tree's nodes.
+// The cut as a mesh of the other library, made by `from_mesh(soup)`; its sources become the tree's wedges.
 template <class FromMesh>
 auto extract_mesh(const vdtree::Cut& cut, const FromMesh& from_mesh) {
     const vdtree::ExtractedMesh extracted = vdtree::extract_with_sources(cut);
     auto made = from_mesh(extracted.mesh.view());
     if (made)
-        for (vdtree::Index& source : made->sources) source = extracted.nodes[source];
+        for (vdtree::Index& source : made->sources) source = extracted.wedges[source];
     return made;
 }
 

@@ -1,6 +1,8 @@
 // OpenMesh's decimater as a clusterer: its halfedge collapses, with any of its modules, become a tree's merges.
 #pragma once
 
+#include <numeric>
+
 #include <glm/common.hpp>
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
@@ -12,8 +14,8 @@
 
 namespace unseen::openmesh {
 
-// The mesh to decimate: one vertex for each place (coincident vertices are one), with status and face normals, in double
-// precision, scaled to the unit box. So lengths in modules, such as ModQuadric's error, are shares of the largest side.
+// The mesh to decimate: one vertex for each distinct position, with status and face normals, in double precision, scaled
+// to the unit box. So lengths in modules, such as ModQuadric's error, are shares of the largest side.
 struct ClusterTraits : OpenMesh::DefaultTraits {
     using Point = OpenMesh::Vec3d;
     using Normal = OpenMesh::Vec3d;
@@ -60,20 +62,23 @@ private:
     bool cancelled_ = false;
 };
 
-// One clustering: the mesh with one vertex for each place, decimated, and the merges that it leads to.
+// One clustering: the mesh, decimated, and the merges that it leads to.
 class DecimaterClustering {
 public:
     explicit DecimaterClustering(const vdtree::ClusterInput& input)
-        : input_(input), place_of_(input.mesh.positions.size()) {
-        out_.parents.resize(input.mesh.positions.size());
+        : input_(input), cluster_of_(input.mesh.positions.size()), is_removed_(cluster_of_.size(), 0) {
+        out_.parents.resize(cluster_of_.size());
+        std::iota(cluster_of_.begin(), cluster_of_.end(), Index{0});
         glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
         for (const glm::dvec3& p : input.mesh.positions) low = glm::min(low, p), high = glm::max(high, p);
         const glm::dvec3 sides = high - low;
         const double side = std::max({sides.x, sides.y, sides.z});
         low_ = low;
         size_ = side > 0 ? side : 1;
-        add_vertices();
-        merge_coincident();
+        for (const glm::dvec3& position : input.mesh.positions) {
+            const glm::dvec3 p = (position - low_) / size_;
+            mesh_.add_vertex(ClusterMesh::Point(p.x, p.y, p.z));
+        }
     }
 
     // Fails on triangles that OpenMesh's halfedges cannot hold.
@@ -81,10 +86,8 @@ public:
         std::size_t refused = 0;
         const QuietErrors quiet;
         for (const vdtree::Triangle& t : input_.mesh.triangles) {
-            const auto handle = [&](Index v) { return ClusterMesh::VertexHandle(static_cast<int>(place_of_[v])); };
-            const auto a = handle(t[0]), b = handle(t[1]), c = handle(t[2]);
-            if (a == b || b == c || c == a) continue;
-            refused += !mesh_.add_face(a, b, c).is_valid();
+            const auto handle = [](Index v) { return ClusterMesh::VertexHandle(static_cast<int>(v)); };
+            refused += !mesh_.add_face(handle(t[0]), handle(t[1]), handle(t[2])).is_valid();
         }
         if (refused > 0)
             return Error{ErrorCode::unsupported,
@@ -111,7 +114,7 @@ public:
             return Error{ErrorCode::invalid_argument,
                          "OpenMesh's decimater needs exactly one module that gives priorities, such as ModQuadricT; "
                          "make the others binary (set_binary(true))."};
-        ProgressObserver observer(progress, vertex_of_place_.size());
+        ProgressObserver observer(progress, cluster_of_.size());
         decimater.set_observer(&observer);
         decimater.decimate(0);
         if (observer.abort()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
@@ -123,10 +126,7 @@ public:
         std::vector<Index> left;
         for (std::size_t place = 0; place < is_removed_.size(); ++place)
             if (!is_removed_[place]) left.push_back(static_cast<Index>(place));
-        if (left.size() == 1 && out_.positions.empty()) { // one vertex alone: it still needs a root
-            const Index root = make_cluster(position(left[0]));
-            out_.parents[cluster_of_[left[0]]] = root;
-        } else if (left.size() > 1) {
+        if (left.size() > 1) {
             const auto rest = cluster_rest(left);
             if (!rest) return rest.error();
             // Clusters of the rest follow those made so far.
@@ -152,29 +152,7 @@ private:
         return static_cast<Index>(out_.parents.size() - 1);
     }
 
-    void add_vertices() {
-        for (std::size_t v = 0; v < place_of_.size(); ++v) {
-            if (input_.coincident[v] != v) {
-                place_of_[v] = place_of_[input_.coincident[v]];
-                ++vertices_there_[place_of_[v]];
-                continue;
-            }
-            place_of_[v] = static_cast<Index>(vertex_of_place_.size());
-            vertex_of_place_.push_back(static_cast<Index>(v));
-            vertices_there_.push_back(1);
-            const glm::dvec3 p = (input_.mesh.positions[v] - low_) / size_;
-            mesh_.add_vertex(ClusterMesh::Point(p.x, p.y, p.z));
-        }
-        is_removed_.assign(vertex_of_place_.size(), 0);
-    }
-    void merge_coincident() {
-        for (std::size_t place = 0; place < vertex_of_place_.size(); ++place)
-            cluster_of_.push_back(vertices_there_[place] == 1 ? vertex_of_place_[place]
-                                                              : make_cluster(position(place)));
-        for (std::size_t v = 0; v < place_of_.size(); ++v)
-            if (vertices_there_[place_of_[v]] > 1) out_.parents[v] = cluster_of_[place_of_[v]];
-    }
-    const glm::dvec3& position(std::size_t place) const { return input_.mesh.positions[vertex_of_place_[place]]; }
+    const glm::dvec3& position(std::size_t place) const { return input_.mesh.positions[place]; }
 
     // Merges places that no collapse has removed, by Unseen's own clusterers.
     Result<vdtree::Clustering> cluster_rest(std::span<const Index> left) const {
@@ -182,17 +160,14 @@ private:
         std::vector<float> luminance;
         std::vector<glm::vec3> normals;
         std::vector<double> areas;
-        std::vector<Index> coincident, number(vertex_of_place_.size(), 0);
+        std::vector<Index> places, number(cluster_of_.size(), 0);
         for (const Index place : left) {
-            const Index v = vertex_of_place_[place];
             number[place] = static_cast<Index>(rest.positions.size());
-            coincident.push_back(number[place]);
-            rest.positions.push_back(input_.mesh.positions[v]);
-            if (!input_.mesh.colours.empty()) rest.colours.push_back(input_.mesh.colours[v]);
-            if (!input_.mesh.uvs.empty()) rest.uvs.push_back(input_.mesh.uvs[v]);
-            luminance.push_back(input_.luminance[v]);
-            normals.push_back(input_.normals[v]);
-            areas.push_back(input_.areas[v]);
+            places.push_back(number[place]);
+            rest.positions.push_back(position(place));
+            luminance.push_back(input_.luminance[place]);
+            normals.push_back(input_.normals[place]);
+            areas.push_back(input_.areas[place]);
         }
         for (const auto f : mesh_.all_faces()) {
             if (mesh_.status(f).deleted()) continue;
@@ -201,7 +176,8 @@ private:
             for (auto v = mesh_.cfv_iter(f); v.is_valid() && k < 3; ++v)
                 t[k++] = number[static_cast<std::size_t>(v->idx())];
         }
-        const vdtree::ClusterInput input{rest.view(), luminance, normals, areas, coincident};
+        const vdtree::LeafView leaves{rest.triangles, places, luminance, normals, {}, {}};
+        const vdtree::ClusterInput input{rest.view(), luminance, normals, areas, leaves};
         return rest.triangles.empty() ? vdtree::cluster_octree(input) : vdtree::cluster_quadric(input);
     }
 
@@ -221,8 +197,6 @@ private:
     glm::dvec3 low_;
     double size_ = 1; // of the unit box
     ClusterMesh mesh_;
-    std::vector<Index> place_of_;                         // by vertex
-    std::vector<Index> vertex_of_place_, vertices_there_; // by place: the first vertex, and how many
     vdtree::Clustering out_;
     std::vector<Index> cluster_of_;        // by place: its cluster so far
     std::vector<std::uint8_t> is_removed_; // by place
@@ -243,7 +217,7 @@ private:
 //     };
 //     const auto tree = vdtree::build_tree(mesh.view(), clusterer);
 //
-// Fails if the surface, with equal positions merged, is not manifold with consistent orientation, as OpenMesh's halfedges
+// Fails if the surface, with equal positions united, is not manifold with consistent orientation, as OpenMesh's halfedges
 // need. Fails unless exactly one of the modules gives priorities.
 template <class AddModules>
 requires std::is_invocable_v<AddModules&, ClusterDecimater&> Result<vdtree::Clustering>

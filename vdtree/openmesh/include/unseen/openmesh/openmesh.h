@@ -173,7 +173,7 @@ Result<vdtree::VertexTree> build_tree(const M& mesh, const vdtree::BuildOptions&
     return adapters::build_tree(to_mesh(mesh, options), build);
 }
 
-// The cut as a mesh; `sources` are the tree's nodes.
+// The cut as a mesh; `sources` are the tree's wedges.
 template <class M>
 Result<Made<M>> extract_mesh(const vdtree::Cut& cut, const Options& options = {}) {
     return adapters::extract_mesh(cut, [&](const vdtree::MeshView& soup) { return from_mesh<M>(soup, options); });
