@@ -50,6 +50,7 @@ struct AccuracySubject {
     double build_s = 0, measure_s = 0;      // of its trees, and of what their folds change; from files 0
     double seconds = 0;                     // for the ways to fold, at most
     std::size_t nodes = 0;                  // whose bounds are looked at
+    std::string pictures = {};              // a folder for what an axis draws of it; empty: not wanted
     std::vector<std::string> left_out = {}; // by an axis: names of points and why, as sentences
 };
 
@@ -62,6 +63,7 @@ AccuracyPoints level_points(AccuracySubject& subject);
 AccuracyPoints cut_points(AccuracySubject& subject);
 AccuracyPoints node_test_points(AccuracySubject& subject);
 AccuracyPoints tree_points(AccuracySubject& subject);
+AccuracyPoints corner_points(AccuracySubject& subject); // and a picture of them
 AccuracyPoints gaze_age_points(AccuracySubject& subject);
 AccuracyPoints measurement_points(AccuracySubject& subject);
 // For no model.

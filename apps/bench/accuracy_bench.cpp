@@ -95,6 +95,15 @@ const AxisMeasure all_axes[] = {
        "V, drawn in the default view", "bytes a triangle", "us a frame, followed at 1 px"}},
      Of::meshes,
      tree_points},
+    {{"corners",
+      "seams and hard edges",
+      "What static levels look like where charts of textures meet and normals are split, from six sides.",
+      {"triangles", "visible pixels, of all sides and the larger count of two judges", "V",
+       "area of the triangles in the texture, of the whole model's",
+       "corners' normals > 20 degrees off their face, share",
+       "mean distance of vertices from the surface, millionths of the extent"}},
+     Of::meshes,
+     corner_points},
     {{"gaze",
       "age of a gaze",
       "What shows when the cut is made for where the viewer looked some frames ago, and what a margin for that costs. "
@@ -130,7 +139,8 @@ AccuracySubject load_subject(const std::string& file, const render::Context& con
             .build_s = build_s,
             .measure_s = seconds_since(start),
             .seconds = options.seconds,
-            .nodes = options.quick ? 500u : 2000u};
+            .nodes = options.quick ? 500u : 2000u,
+            .pictures = options.plots};
 }
 
 // What was asked for and not measured.
@@ -298,6 +308,8 @@ BenchReport bench_accuracy(const AccuracyOptions& options) {
     for (const AxisMeasure& axis : all_axes)
         if (options.only.empty() || std::ranges::find(options.only, axis.key) != options.only.end())
             wanted.push_back(&axis);
+    const auto is_of_corners = [](const AxisMeasure* axis) { return axis->measure == &corner_points; };
+    const auto is_of_others = [&](const AxisMeasure* axis) { return axis->of != Of::nothing && !is_of_corners(axis); };
     std::vector<std::string> models = options.inputs.empty() ? installed_meshes() : options.inputs;
     const BenchFolder folder;
     if (options.inputs.empty() || options.has_scenes) {
@@ -305,6 +317,10 @@ BenchReport bench_accuracy(const AccuracyOptions& options) {
         const std::vector<std::string> scenes = make_scenes(folder, scene_triangles);
         models.insert(models.end(), scenes.begin(), scenes.end());
     }
+    if (options.inputs.empty() && std::ranges::none_of(wanted, is_of_others)) models.clear();
+    const std::size_t others = models.size();
+    if (options.inputs.empty() && std::ranges::any_of(wanted, is_of_corners))
+        for (std::string& file : make_corner_models(folder)) models.push_back(std::move(file));
     const render::Context context = require(render::Context::headless());
     AccuracyPoints points;
     std::vector<AccuracyGap> gaps;
@@ -314,12 +330,13 @@ BenchReport bench_accuracy(const AccuracyOptions& options) {
     ProgressBar bar("Measuring");
     const double steps = static_cast<double>(models.size() * (wanted.size() + 1));
     double step = 0;
-    for (const std::string& file : models) {
+    for (std::size_t i = 0; i < models.size(); ++i) {
         bar(step++ / steps, "loading");
-        AccuracySubject subject = load_subject(file, context, options);
+        AccuracySubject subject = load_subject(models[i], context, options);
         for (const AxisMeasure* axis : wanted) {
             bar(step++ / steps, axis->name.c_str());
-            if (!axis->takes(subject.is_scene)) continue;
+            const bool has_own_models = options.inputs.empty(); // this axis, and the others
+            if (!axis->takes(subject.is_scene) || (has_own_models && is_of_corners(axis) != (i >= others))) continue;
             add(points, *axis, &subject);
             for (std::string& what : std::exchange(subject.left_out, {}))
                 gaps.push_back({axis, subject.name, std::move(what)});

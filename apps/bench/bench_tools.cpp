@@ -8,6 +8,8 @@
 #include <numbers>
 
 #include <scene_parts.h>
+#include <seamed_mesh.h>
+#include <unseen/vdtree/tree_io.h>
 
 #include "make_scene.h"
 #include "terminal.h"
@@ -16,6 +18,9 @@ namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Beside the programs that were built, of the npm package @webxr-input-profiles/assets.
+constexpr const char* controller_profiles = "npm/node_modules/@webxr-input-profiles/assets/dist/profiles";
 
 // The file of this program.
 fs::path own_executable() {
@@ -154,6 +159,32 @@ std::vector<std::string> make_scenes(const BenchFolder& folder, std::uint64_t tr
                       {SceneKind::treasure, "treasure"},
                       {SceneKind::house, "house"},
                       {SceneKind::forest, "forest"}});
+}
+
+std::vector<std::string> make_corner_models(const BenchFolder& folder) {
+    std::vector<std::string> files;
+    for (const auto& [name, make] : {std::pair{corner_models[0], &helmet},
+                                     {corner_models[1], &charted_ball},
+                                     {corner_models[2], &gear},
+                                     {corner_models[3], &hard_boxes}}) {
+        files.push_back((folder / (name + std::string(".vdt"))).string());
+        require(vdtree::write_tree(files.back(), require(vdtree::build_tree(make().view()))));
+    }
+    for (const auto& [name, profile] :
+         {std::pair{corner_models[4], "htc-vive/none.glb"}, {corner_models[5], "oculus-touch-v3/left.glb"}}) {
+        const fs::path file = find_in_checkout(fs::path(controller_profiles) / profile);
+        if (file.empty()) {
+            print_note("'" + std::string(name) + "' is not there: the test viewers_lod fetches it.");
+            continue;
+        }
+        files.push_back((folder / (name + std::string(".glb"))).string());
+        std::error_code failed;
+        fs::copy_file(file, files.back(), fs::copy_options::overwrite_existing, failed);
+        if (failed)
+            throw BenchFailure{
+                {ErrorCode::io_failure, "Cannot copy '" + file.string() + "': " + failed.message() + "."}};
+    }
+    return files;
 }
 
 std::vector<std::string> make_scenes_to_select_in(const BenchFolder& folder, const std::vector<std::string>& statues) {

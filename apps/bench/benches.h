@@ -47,7 +47,8 @@ BenchReport bench_perception(const PerceptionOptions& options);
 BenchReport bench_libraries(const BenchOptions& options);
 
 // Levels of detail beside those of meshoptimizer's simplification, of the same numbers of triangles, at the distances at
-// which engines switch: what people would see, from the sides that the levels were looked at from.
+// which engines switch: what people would see, from the sides that the levels were looked at from. Inputs: meshes or
+// trees; if empty corner_models.
 BenchReport bench_lod(const BenchOptions& options);
 
 // Varies one factor of the fold model at a time. Counts the triangles that the test by errors keeps in all views of a
@@ -91,7 +92,7 @@ struct SelectionOptions : BenchOptions {
 BenchReport bench_selection(const SelectionOptions& options);
 
 // What accuracy costs: error against cost for the choices that the program makes, each by something else than what is
-// varied. Cost: a minute or two a model.
+// varied. The axis of corners has models of its own, corner_models, unless there are inputs. Cost: a minute or two a model.
 struct AccuracyOptions : BenchOptions { // inputs: meshes, trees and scenes; if empty what is installed, and made scenes
     bool has_scenes = false;            // the made ones, too, if there are models
     std::vector<std::string> only = {}; // keys of axes; empty: all
@@ -102,6 +103,7 @@ struct AccuracyOptions : BenchOptions { // inputs: meshes, trees and scenes; if 
 };
 std::vector<std::string> accuracy_axis_keys();
 std::string accuracy_picture_name(const std::string& key); // accuracy_KEY.png
+std::string corner_sheet_name(const std::string& subject); // corners_SUBJECT.png: a sheet of the axis of corners
 BenchReport bench_accuracy(const AccuracyOptions& options);
 
 } // namespace unseen::app

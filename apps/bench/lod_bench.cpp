@@ -103,7 +103,9 @@ BenchReport bench_lod(const BenchOptions& options) {
                                  {"meshoptimizer: triangles", "peer_triangles"},
                                  {"visible pixels", "peer_visible_pixels"},
                                  {"largest V", "peer_v"}}};
-    for (const std::string& model : options.inputs) add_model(context, model, table);
+    const BenchFolder folder;
+    for (const std::string& model : options.inputs.empty() ? make_corner_models(folder) : options.inputs)
+        add_model(context, model, table);
     table.notes.push_back("pixels that either judge sees, of all " + std::to_string(session::usual_lod_directions) +
                           " sides together");
     if (!has_meshoptimizer()) table.notes.push_back("this build is without meshoptimizer");

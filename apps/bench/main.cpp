@@ -201,7 +201,10 @@ void add_accuracy_options(CLI::App& verb, AccuracyOptions& o) {
         ->type_name("MODEL");
     verb.add_flag("--scenes", o.has_scenes, "Besides MODEL, the scenes of 'unseen make scene'");
     verb.add_option("--csv", o.csv, "One line a point")->type_name("FILE.csv");
-    verb.add_option("--plots", o.plots, "A folder for a plot of each axis, accuracy_AXIS.png")->type_name("FOLDER");
+    verb.add_option("--plots", o.plots,
+                    "A folder for a plot of each axis, accuracy_AXIS.png, and for pictures of the axis corners, "
+                    "corners_MODEL.png")
+        ->type_name("FOLDER");
     const std::vector<std::string> keys = accuracy_axis_keys();
     add_value(verb, "--only", o.only, one_of(keys), "AXIS",
               "These axes alone, of " + listed(keys) + "; may be given again (default: all)");
@@ -213,8 +216,14 @@ void add_accuracy_options(CLI::App& verb, AccuracyOptions& o) {
     verb.callback([&o, keys] {
         o.outputs = {o.csv};
         if (o.plots.empty()) return;
-        for (const std::string& key : o.only.empty() ? keys : o.only)
-            o.outputs.push_back((std::filesystem::path(o.plots) / accuracy_picture_name(key)).string());
+        const auto add = [&](const std::string& name) {
+            o.outputs.push_back((std::filesystem::path(o.plots) / name).string());
+        };
+        for (const std::string& key : o.only.empty() ? keys : o.only) add(accuracy_picture_name(key));
+        if (!o.only.empty() && std::ranges::find(o.only, "corners") == o.only.end()) return;
+        for (const std::string& file : o.inputs) add(corner_sheet_name(std::filesystem::path(file).stem().string()));
+        if (o.inputs.empty())
+            for (const char* const model : corner_models) add(corner_sheet_name(model));
     });
 }
 
@@ -233,9 +242,11 @@ std::vector<Command> verbs(CLI::App& app) {
             "  unseen-bench perception --only far,hard",
             bench_perception, add_perception_options),
         bench_verb(app, "lod", "What levels of detail show at their distances, beside meshoptimizer's",
-                   "Examples:\n  unseen-bench lod bunny.ply horse.ply --markdown", bench_lod,
+                   "Examples:\n  unseen-bench lod\n  unseen-bench lod bunny.ply horse.ply --markdown", bench_lod,
                    [](CLI::App& verb, BenchOptions& o) {
-                       verb.add_option("MODEL", o.inputs, "Meshes or trees")->required()->type_name("TREE.vdt|MESH");
+                       verb.add_option("MODEL", o.inputs,
+                                       "Meshes or trees (default: models with seams or hard edges, made and installed)")
+                           ->type_name("TREE.vdt|MESH");
                    }),
         bench_verb(app, "fit",
                    "What other values of the fold model's factors keep and show, on meshes that are no evidence",

@@ -21,6 +21,7 @@ BenchReport bench_selection(const SelectionOptions&) { return no_pictures(); }
 BenchReport bench_accuracy(const AccuracyOptions&) { return no_pictures(); }
 std::vector<std::string> accuracy_axis_keys() { return {}; }
 std::string accuracy_picture_name(const std::string&) { return {}; }
+std::string corner_sheet_name(const std::string&) { return {}; }
 std::vector<std::string> fit_factors() { return {}; }
 
 } // namespace unseen::app
