@@ -123,6 +123,46 @@ TEST_F(AccuracyBenchTest, ScenesHaveLevels) {
     EXPECT_EQ(sound_axes(outcome.json()), std::set<std::string>{"levels"});
 }
 
+// A cube whose sides are grids with a normal each: nothing of it shows, bends or moves down to a tenth.
+TEST_F(AccuracyBenchTest, HardEdgesStayHard) {
+    constexpr int cells = 8;
+    std::ostringstream obj;
+    int vertices = 0;
+    for (int side = 0; side < 6; ++side) {
+        glm::dvec3 axes[3] = {};
+        for (int i = 0; i < 3; ++i) axes[i][(side / 2 + i) % 3] = i == 0 && side % 2 ? -1 : 1;
+        if (side % 2) std::swap(axes[1], axes[2]);
+        obj << "vn " << axes[0].x << ' ' << axes[0].y << ' ' << axes[0].z << '\n';
+        for (int i = 0; i <= cells; ++i)
+            for (int j = 0; j <= cells; ++j) {
+                const glm::dvec3 p = axes[0] + (2.0 * i / cells - 1) * axes[1] + (2.0 * j / cells - 1) * axes[2];
+                obj << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+            }
+        for (int i = 0; i < cells; ++i)
+            for (int j = 0; j < cells; ++j) {
+                obj << 'f';
+                for (const auto& [down, across] : {std::pair{i, j}, {i + 1, j}, {i + 1, j + 1}, {i, j + 1}})
+                    obj << ' ' << vertices + 1 + down * (cells + 1) + across << "//" << side + 1;
+                obj << '\n';
+            }
+        vertices += (cells + 1) * (cells + 1);
+    }
+    std::ofstream(path("box.obj")) << obj.str();
+    const Outcome outcome =
+        bench({"accuracy", "box.obj", "--only", "corners", "--window", "96", "--plots", "plots", "--json", "-"});
+    if (outcome.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json report = outcome.json();
+    for (const std::string share : {"half", "30%", "a tenth"}) {
+        const Json values = named(report["points"], "ours, " + share)["values"];
+        EXPECT_LE(values[0], 6 * 2 * cells * cells / 2) << share;
+        EXPECT_EQ(values[1], 0) << share << ": pixels";
+        EXPECT_EQ(values[4], 0) << share << ": corners whose normals are off their face";
+        EXPECT_LT(values[5], 1) << share << ": millionths";
+    }
+    EXPECT_TRUE(std::filesystem::exists(path("plots/corners_box.png")));
+}
+
 TEST_F(AccuracyBenchTest, NamesTheAxesThatThereAre) {
     const Outcome outcome = bench({"accuracy", "--only", "colour"});
     EXPECT_EQ(outcome.status, 2);

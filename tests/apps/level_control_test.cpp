@@ -108,6 +108,15 @@ TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
     EXPECT_EQ(level_chain(small, small.default_view(), {})->size(), 1);
 }
 
+// What folds within planes shows from nowhere.
+TEST(LevelChain, FlatSidesAreALevelThatBeginsAtOnce) {
+    Session session = *Session::create(Scene::of(support::measured(support::built(shapes::cube(16)))));
+    const auto chain = require(level_chain(session, session.default_view(), {}));
+    ASSERT_GT(chain->size(), 1);
+    EXPECT_EQ(chain->unseen_from(1), 0);
+    EXPECT_EQ(chain->triangles(1), 12u);
+}
+
 // How visible a level is, over how visible the one before was: alike from level to level, and more so than where
 // triangles shrink by one factor.
 TEST_F(LevelControlTest, LevelsAreEven) {

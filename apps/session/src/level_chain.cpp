@@ -89,8 +89,9 @@ double LevelChain::distance_of(vdtree::Index triangles) const {
 
 void LevelChain::add(double distance) {
     const vdtree::Index triangles = cut_at(distance).triangle_count();
-    if (triangles > 0 && triangles < levels_.back().triangles && distance > levels_.back().distance)
-        levels_.push_back({triangles, distance});
+    // The first one may be seen from nowhere: folds within a plane.
+    const bool is_farther = distance > levels_.back().distance || (levels_.size() == 1 && distance == 0);
+    if (triangles > 0 && triangles < levels_.back().triangles && is_farther) levels_.push_back({triangles, distance});
 }
 
 Result<LevelChain> LevelChain::create(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,

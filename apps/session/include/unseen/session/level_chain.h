@@ -34,8 +34,8 @@ public:
 
     int size() const noexcept { return static_cast<int>(levels_.size()); } // 1 or more
     vdtree::Index triangles(int level) const noexcept { return levels_[static_cast<std::size_t>(level)].triangles; }
-    // The distance from which nobody sees the level, mesh units; 0 for the full mesh, infinite if the criterion calls
-    // the level visible from everywhere.
+    // The distance from which nobody sees the level, mesh units; 0 for the full mesh, and for a level that only folds what
+    // shows nowhere; infinite if the criterion calls the level visible from everywhere.
     double unseen_from(int level) const noexcept;
 
     // Computed in each call, in the time of a cut.
