@@ -15,17 +15,17 @@ namespace {
 using vdtree::Index;
 using vdtree::Mesh;
 
-struct Corner {
+struct SeamedCorner {
     glm::dvec3 place;
     glm::dvec2 uv = glm::dvec2(0);
 };
 
 // A mesh put together of triangles. At one place, corners of one group share a normal; different groups meet in a hard
 // edge. Places are the same if their coordinates are equal.
-class Draft {
+class SeamedDraft {
 public:
     // `towards`: the side that it faces.
-    void triangle(std::array<Corner, 3> corners, int group, glm::dvec3 towards) {
+    void triangle(std::array<SeamedCorner, 3> corners, int group, glm::dvec3 towards) {
         glm::dvec3 normal =
             glm::cross(corners[1].place - corners[0].place, corners[2].place - corners[0].place); // twice the area
         if (!(glm::length(normal) > 0)) return;
@@ -46,7 +46,8 @@ public:
             groups_.push_back(group);
         }
     }
-    void quad(const Corner& a, const Corner& b, const Corner& c, const Corner& d, int group, glm::dvec3 towards) {
+    void quad(const SeamedCorner& a, const SeamedCorner& b, const SeamedCorner& c, const SeamedCorner& d, int group,
+              glm::dvec3 towards) {
         triangle({a, b, c}, group, towards);
         triangle({a, c, d}, group, towards);
     }
@@ -78,13 +79,13 @@ private:
 
 // ---- the atlas: 4 x 4 fields with a chart each
 
-constexpr int fields = 4;
+constexpr int atlas_fields = 4;
 
 // u and v within the field's chart, 0..1.
 glm::dvec2 in_field(int field, double u, double v) {
     constexpr double margin = 1.0 / 16; // of the field, so that mip levels do not mix charts
     const glm::dvec2 inside = margin + (1 - 2 * margin) * glm::dvec2(u, v);
-    return (glm::dvec2(field % fields, field / fields) + inside) / double(fields);
+    return (glm::dvec2(field % atlas_fields, field / atlas_fields) + inside) / double(atlas_fields);
 }
 
 // Panels with dark joints and light edges on a tone of the field's own, slightly mottled.
@@ -95,7 +96,7 @@ vdtree::Texture painted_fields() {
     vdtree::Texture texture{side, side, vdtree::Wrap::repeat, vdtree::Wrap::repeat, {}};
     for (std::uint32_t y = 0; y < side; ++y)
         for (std::uint32_t x = 0; x < side; ++x) {
-            const std::uint32_t field = y / (side / fields) * fields + x / (side / fields);
+            const std::uint32_t field = y / (side / atlas_fields) * atlas_fields + x / (side / atlas_fields);
             const std::uint32_t across = x % panel, down = (y + (x / panel % 2) * panel / 2) % panel;
             const bool is_joint = across < joint || down < joint,
                        is_edge = !is_joint && (across < 2 * joint || down < 2 * joint);
@@ -114,13 +115,13 @@ constexpr int shell_cells = 32; // along each side of the cube that the shell is
 // The cells of the front that the visor takes.
 constexpr int visor_left = 8, visor_right = 24, visor_low = 12, visor_high = 22;
 
-enum class Layer { outer, visor, inner };
+enum class ShellLayer { outer, visor, inner };
 
-glm::dvec3 of_shell(glm::dvec3 cube, Layer layer) {
+glm::dvec3 of_shell(glm::dvec3 cube, ShellLayer layer) {
     const glm::dvec3 d = glm::normalize(cube);
     constexpr double crest_half_width = 0.25, crest_height = 0.08;
-    double radius = layer == Layer::visor ? 0.93 : 0.86;
-    if (layer == Layer::outer) {
+    double radius = layer == ShellLayer::visor ? 0.93 : 0.86;
+    if (layer == ShellLayer::outer) {
         radius = 1 + 0.012 * std::sin(9 * d.x + 1) * std::sin(8 * d.y) * std::cos(7 * d.z);
         radius += crest_height * std::max(0.0, 1 - std::abs(cube.x) / crest_half_width);
     }
@@ -138,42 +139,42 @@ glm::dvec3 on_cube(int a, double side, int row, int column) {
 
 bool is_front(int a, double side) { return a == 2 && side > 0; }
 
-void add_shell(Draft& draft, int a, double side, int field) {
+void add_shell(SeamedDraft& draft, int a, double side, int field) {
     enum Group { shell, crest_left, crest_right, visor, inner };
     for (int i = 0; i < shell_cells; ++i)
         for (int j = 0; j < shell_cells; ++j) {
             const bool is_visor =
                 is_front(a, side) && i >= visor_low && i < visor_high && j >= visor_left && j < visor_right;
-            const auto corner = [&](int row, int column, Layer layer, int in) {
-                return Corner{of_shell(on_cube(a, side, row, column), layer),
-                              in_field(in, double(column) / shell_cells, double(row) / shell_cells)};
+            const auto corner = [&](int row, int column, ShellLayer layer, int in) {
+                return SeamedCorner{of_shell(on_cube(a, side, row, column), layer),
+                                    in_field(in, double(column) / shell_cells, double(row) / shell_cells)};
             };
-            const auto quad = [&](Layer layer, int in, Group group, double outward) {
-                const Corner first = corner(i, j, layer, in);
+            const auto quad = [&](ShellLayer layer, int in, Group group, double outward) {
+                const SeamedCorner first = corner(i, j, layer, in);
                 draft.quad(first, corner(i, j + 1, layer, in), corner(i + 1, j + 1, layer, in),
                            corner(i + 1, j, layer, in), group, outward * first.place);
             };
             const double x = (on_cube(a, side, i, j).x + on_cube(a, side, i + 1, j + 1).x) / 2; // of its middle
             const Group outside = std::abs(x) > 0.25 ? shell : x < 0 ? crest_left : crest_right;
-            if (is_visor) quad(Layer::visor, 10, visor, 1);
-            else quad(Layer::outer, field, outside, 1);
-            quad(Layer::inner, field + 5, inner, -1);
+            if (is_visor) quad(ShellLayer::visor, 10, visor, 1);
+            else quad(ShellLayer::outer, field, outside, 1);
+            quad(ShellLayer::inner, field + 5, inner, -1);
         }
 }
 
 // From one layer to another along a line of cells; `share` of the chart's length that is behind and is there.
-void add_wall(Draft& draft, glm::dvec3 from, glm::dvec3 to, std::array<Layer, 2> layers, int field, int group,
-              std::array<double, 2> share, glm::dvec3 towards) {
+void add_wall(SeamedDraft& draft, glm::dvec3 from, glm::dvec3 to, std::array<ShellLayer, 2> layers, int field,
+              int group, std::array<double, 2> share, glm::dvec3 towards) {
     const auto corner = [&](glm::dvec3 cube, std::size_t layer, double along) {
-        return Corner{of_shell(cube, layers[layer]), in_field(field, along, double(layer) / 4)};
+        return SeamedCorner{of_shell(cube, layers[layer]), in_field(field, along, double(layer) / 4)};
     };
     draft.quad(corner(from, 0, share[0]), corner(to, 0, share[0] + share[1]), corner(to, 1, share[0] + share[1]),
                corner(from, 1, share[0]), group, towards);
 }
 
-void add_visor_walls(Draft& draft) {
+void add_visor_walls(SeamedDraft& draft) {
     const glm::dvec3 middle =
-        of_shell(on_cube(2, 1, (visor_low + visor_high) / 2, (visor_left + visor_right) / 2), Layer::visor);
+        of_shell(on_cube(2, 1, (visor_low + visor_high) / 2, (visor_left + visor_right) / 2), ShellLayer::visor);
     constexpr int first_group = 5, field = 11;
     constexpr int wide = visor_right - visor_left, high = visor_high - visor_low, around = 2 * (wide + high);
     for (int i = 0; i < around; ++i) {
@@ -185,12 +186,12 @@ void add_visor_walls(Draft& draft) {
             return on_cube(2, 1, visor_high - (step - 2 * wide - high), visor_left);
         };
         const int group = first_group + (i < wide ? 0 : i < wide + high ? 1 : i < 2 * wide + high ? 2 : 3);
-        add_wall(draft, at(i), at(i + 1), {Layer::outer, Layer::visor}, field, group,
-                 {double(i) / around, 1.0 / around}, middle - of_shell(at(i), Layer::outer));
+        add_wall(draft, at(i), at(i + 1), {ShellLayer::outer, ShellLayer::visor}, field, group,
+                 {double(i) / around, 1.0 / around}, middle - of_shell(at(i), ShellLayer::outer));
     }
 }
 
-void add_rim(Draft& draft) {
+void add_rim(SeamedDraft& draft) {
     constexpr int group = 9, field = 12, around = 4 * shell_cells;
     const auto at = [](int step) { // once around the neck
         const int side = step / shell_cells % 4;
@@ -201,14 +202,14 @@ void add_rim(Draft& draft) {
                            : glm::dvec3(-1, -1, along);
     };
     for (int i = 0; i < around; ++i)
-        add_wall(draft, at(i), at(i + 1), {Layer::outer, Layer::inner}, field, group,
+        add_wall(draft, at(i), at(i + 1), {ShellLayer::outer, ShellLayer::inner}, field, group,
                  {double(i) / around, 1.0 / around}, {0, -1, 0});
 }
 
 } // namespace
 
 Mesh helmet() {
-    Draft draft;
+    SeamedDraft draft;
     int field = 0;
     for (int a = 0; a < 3; ++a)
         for (const double side : {-1.0, 1.0})
@@ -220,7 +221,7 @@ Mesh helmet() {
 
 Mesh charted_ball() {
     constexpr int rows = 48, columns = 96, base = 40; // from this row on
-    Draft draft;
+    SeamedDraft draft;
     const auto place = [](int i, int j) {
         const double theta = std::numbers::pi * i / rows, phi = 2 * std::numbers::pi * (j % columns) / columns;
         const double across = i % rows == 0 ? 0 : std::sin(theta);
@@ -229,10 +230,10 @@ Mesh charted_ball() {
     };
     const auto outward = [](glm::dvec3 p) { return p; };
     const auto around = [&](int i, int j) { // three fields wide
-        return Corner{place(i, j), {0.02 + 0.71 * j / columns, 0.02 + 0.71 * i / base}};
+        return SeamedCorner{place(i, j), {0.02 + 0.71 * j / columns, 0.02 + 0.71 * i / base}};
     };
     for (int j = 0; j < columns; ++j) { // each triangle at the pole has its own middle
-        Corner pole = around(0, j);
+        SeamedCorner pole = around(0, j);
         pole.uv.x += 0.71 / (2 * columns);
         draft.triangle({pole, around(1, j), around(1, j + 1)}, 0, pole.place);
     }
@@ -242,7 +243,7 @@ Mesh charted_ball() {
         rows - base, columns, 0,
         [&](int i, int j) {
             const glm::dvec3 p = place(base + i, j);
-            return Corner{p, in_field(15, 0.5 + 0.9 * p.x, 0.5 + 0.9 * p.z)};
+            return SeamedCorner{p, in_field(15, 0.5 + 0.9 * p.x, 0.5 + 0.9 * p.z)};
         },
         outward);
     return std::move(draft).mesh(painted_fields());
@@ -268,9 +269,9 @@ Mesh gear() {
         const glm::dvec2 out = outline(step), in = bore * glm::normalize(out);
         return share == 1 ? out : in + share * (out - in);
     };
-    const auto corner = [](glm::dvec2 p, double y) { return Corner{{p.x, y, -p.y}, {}}; };
+    const auto corner = [](glm::dvec2 p, double y) { return SeamedCorner{{p.x, y, -p.y}, {}}; };
     const auto level = [&](int row) { return half_height * (2.0 * row / high - 1); };
-    Draft draft;
+    SeamedDraft draft;
     constexpr int top = 0, bottom = 1, hole = 2, first_piece = 3;
     for (const double y : {-half_height, half_height})
         draft.net(
@@ -297,7 +298,7 @@ Mesh hard_boxes() {
                          {{1.1, 0.2, 0.5}, {0.2, 0.2, 0.2}, 0.9},
                          {{-1.2, 0.5, -0.2}, {0.15, 0.5, 0.3}, -0.3},
                          {{0.3, 0.25, 1.1}, {0.5, 0.25, 0.1}, 0.2}};
-    Draft draft;
+    SeamedDraft draft;
     int group = 0;
     for (const Box& box : boxes)
         for (int a = 0; a < 3; ++a)
@@ -311,7 +312,7 @@ Mesh hard_boxes() {
                     p[a] = side;
                     p[(a + 1) % 3] = 2.0 * j / cells - 1;
                     p[(a + 2) % 3] = 2.0 * i / cells - 1;
-                    return Corner{box.middle + placed(p * box.half), {}};
+                    return SeamedCorner{box.middle + placed(p * box.half), {}};
                 };
                 glm::dvec3 outward(0);
                 outward[a] = side;
