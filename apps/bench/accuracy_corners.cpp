@@ -120,6 +120,7 @@ private:
             v = std::max({v, seen.v, seen.second_v});
         }
         const auto triangles = static_cast<double>(simple.triangles.size());
+        const bool is_stuck = triangles > 1.1 * share.of_triangles * static_cast<double>(mesh_.triangles.size());
         if (is_in_the_sheet(share))
             show(whose + ", " + share.name,
                  grouped(simple.triangles.size()) + " triangles, " + grouped(static_cast<std::uint64_t>(pixels)) +
@@ -129,7 +130,8 @@ private:
             .name = whose + ", " + share.name,
             .values = {triangles, pixels, v,
                        mesh_.uvs.empty() ? std::numeric_limits<double>::quiet_NaN() : uv_area(simple) / uv_area(mesh_),
-                       bent_corners(simple), 1e6 * mean_surface_distance(mesh_, simple)}};
+                       bent_corners(simple), 1e6 * mean_surface_distance(mesh_, simple)},
+            .note = is_stuck ? "stops there" : ""};
     }
 
     // A column of the sheet.
@@ -138,7 +140,7 @@ private:
         if (subject_.pictures.empty()) return;
         vdtree::View window = subject_.view;
         window.width = window.height = 360;
-        const vdtree::View near = subject_.session.frame({0.6, 0.5, 0.62}, 0.95, window);
+        const vdtree::View near = subject_.session.frame({0.45, 0.35, 0.82}, 0.95, window);
         PictureColumn& column = columns_.emplace_back(PictureColumn{name, verdict});
         for (const bool has_edges : {false, true}) {
             render::DrawOptions drawing = judges_[0].drawing();

@@ -171,7 +171,7 @@ std::vector<std::string> make_corner_models(const BenchFolder& folder) {
         require(vdtree::write_tree(files.back(), require(vdtree::build_tree(make().view()))));
     }
     for (const auto& [name, profile] :
-         {std::pair{corner_models[4], "htc-vive/none.glb"}, {corner_models[5], "oculus-touch-v3/left.glb"}}) {
+         {std::pair{corner_models[4], "htc-vive/none.glb"}, {corner_models[5], "oculus-touch/left.glb"}}) {
         const fs::path file = find_in_checkout(fs::path(controller_profiles) / profile);
         if (file.empty()) {
             print_note("'" + std::string(name) + "' is not there: the test viewers_lod fetches it.");

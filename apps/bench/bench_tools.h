@@ -137,7 +137,7 @@ private:
 // museum.glb, treasure.glb, house.glb and forest.glb of `unseen make scene`, of about so many triangles each.
 std::vector<std::string> make_scenes(const BenchFolder& folder, std::uint64_t triangles);
 // Models with seams or hard edges: made ones, as trees, and those of corner_models that the test viewers_lod has installed.
-inline constexpr std::array corner_models = {"helmet", "ball", "gear", "boxes", "htc-vive", "oculus-touch-v3"};
+inline constexpr std::array corner_models = {"helmet", "ball", "gear", "boxes", "htc-vive", "oculus-touch"};
 std::vector<std::string> make_corner_models(const BenchFolder& folder);
 // spheres.glb, bunnies.glb and models.glb, with these statues.
 std::vector<std::string> make_scenes_to_select_in(const BenchFolder& folder, const std::vector<std::string>& statues);
