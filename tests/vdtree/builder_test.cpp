@@ -771,7 +771,6 @@ TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
         {"fan", shapes::non_manifold_fan(4), Closedness::open},
         {"one triangle turned", one_turned, Closedness::open},
         {"one triangle missing", one_missing, Closedness::open},
-        {"nothing but a point", shapes::all_coincident(4), Closedness::open},
     };
     for (const auto& [what, mesh, closedness] : expected) {
         EXPECT_EQ(require(build_tree(mesh.view()))->closedness(), closedness) << what;
@@ -787,21 +786,16 @@ TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
     }
 }
 
-TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
+// Two vertices at each position of the seam, of one colour or of two.
+TEST(BuildTree, KeepsTheSidesOfASeamApart) {
     for (const bool colours_differ : {false, true}) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto tree =
-                require(build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind, .prelit = true}));
+            const Mesh mesh = shapes::seam(colours_differ);
+            const auto tree = require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true}));
             EXPECT_TRUE(tree->is_prelit());
-            int merges = 0;
-            for (NodeId node = 0; node < tree->interior_count(); ++node) {
-                if (tree->support_spheres()[node].radius > 0) continue;
-                ++merges;
-                const LuminanceRange ring = tree->ring_luminance()[node];
-                EXPECT_NEAR(ring.hi - ring.lo, colours_differ ? 0.5f : 0.0f, luminance_rounding);
-                if (!colours_differ) EXPECT_EQ(ring.hi, ring.lo);
-            }
-            EXPECT_EQ(merges, 2);
+            EXPECT_EQ(tree->has_seams(), colours_differ);
+            EXPECT_EQ(tree->place_count(), mesh.positions.size() - 2);
+            EXPECT_EQ(tree->leaf_count(), mesh.positions.size() - (colours_differ ? 0 : 2));
         }
     }
 }

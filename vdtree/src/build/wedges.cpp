@@ -110,8 +110,8 @@ public:
                 const LeafMesh& mesh, const Ancestors& ancestors)
         : shape_(shape), parts_(parts), positions_(positions), mesh_(mesh), interior_(shape.interior()),
           splits_(!mesh.first_leaf.empty() || !mesh.materials.empty()) {
-        measure();
         list_triangles();
+        measure();
         if (splits_) find_meetings(ancestors);
         counts_.assign(interior_, 1);
         values_at_.resize(interior_);
