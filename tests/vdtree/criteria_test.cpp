@@ -168,7 +168,11 @@ TEST(Extent, IsTheSizeOfTheProjectedSphere) {
 }
 
 TEST(Extent, IsZeroForAPoint) {
-    const VertexTree tree = built(shapes::seam(false));
+    Mesh mesh = shapes::cube(1);
+    const Index first = static_cast<Index>(mesh.positions.size());
+    for (int k = 0; k < 3; ++k) mesh.positions.push_back(glm::dvec3(0.5) + 1e-10 * glm::dvec3(k, k * k, 0));
+    mesh.triangles.push_back({first, first + 1, first + 2}); // one point in floats
+    const VertexTree tree = built(mesh);
     const auto costs = costs_of(extent_criterion, tree, {.eye = {0, 0, 5}}, 1);
     int points = 0;
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
@@ -176,7 +180,7 @@ TEST(Extent, IsZeroForAPoint) {
         EXPECT_EQ(costs[node], 0);
         ++points;
     }
-    EXPECT_EQ(points, 2);
+    EXPECT_GT(points, 0);
 }
 
 TEST(Displacement, IsNotExceededByAnyVertex) {

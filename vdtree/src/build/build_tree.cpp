@@ -238,7 +238,8 @@ private:
         prelit_ = options_.prelit && (!source_.colours.empty() || is_textured());
         surface_ = analyse_surface(places_->mesh());
         const bool turns = surface_.closedness == Closedness::closed_inward && own_normals_agree(source_);
-        places_->find_leaves(surface_.normals, turns ? -1.0f : 1.0f);
+        places_->find_leaves({surface_.closedness == Closedness::closed_inward ? -1.0f : 1.0f, turns ? -1.0f : 1.0f},
+                             options_.crease);
         uvs_ = select(source_.uvs, places_->sources());
         colours_ = select(source_.colours, places_->sources());
     }

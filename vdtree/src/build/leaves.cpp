@@ -4,11 +4,8 @@
 #include <numeric>
 #include <tuple>
 
-#include <glm/geometric.hpp>
-
 #include "build/surface.h"
 #include <unseen/vdtree/internal/parallel.h>
-#include <unseen/vdtree/internal/vectors.h>
 
 namespace unseen::vdtree {
 
@@ -74,18 +71,24 @@ void PlaceMesh::find_materials() {
     if (std::ranges::none_of(triangle_materials_, is_other)) triangle_materials_.clear();
 }
 
-glm::vec3 PlaceMesh::own_normal(Index vertex, Index place, std::span<const glm::vec3> fallback, float sign) const {
+CornerNormals PlaceMesh::corner_normals(Signs signs, std::optional<float> crease) const {
+    std::vector<glm::vec3> own;
     if (!source_.normals.empty()) {
-        const glm::vec3 n = source_.normals[vertex];
-        const float sum = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-        if (sum > 0 && std::isfinite(sum)) return sign * glm::vec3(unit(glm::dvec3(n)));
+        own.reserve(3 * mesh_.triangles.size());
+        for (Index t = 0; t < mesh_.triangles.size(); ++t)
+            for (const Index v : source_corners(t)) own.push_back(source_.normals[v]);
     }
-    return fallback[place];
+    std::vector<Index> smoothing;
+    if (!source_.smoothing.empty())
+        for (Index t = 0; t < mesh_.triangles.size(); ++t) smoothing.push_back(source_.smoothing[source_triangle(t)]);
+    return find_corner_normals({mesh_.positions, mesh_.triangles, own, smoothing, crease, signs.face, signs.own});
 }
 
-void PlaceMesh::find_leaves(std::span<const glm::vec3> fallback, float sign) {
+void PlaceMesh::find_leaves(Signs signs, std::optional<float> crease) {
     const Index places = static_cast<Index>(mesh_.positions.size());
-    if (is_split_ || !triangle_materials_.empty()) gather_leaves(fallback, sign);
+    CornerNormals found = corner_normals(signs, crease);
+    creases_ = found.creases;
+    if (is_split_ || !triangle_materials_.empty() || found.has_creases) gather_leaves(found);
     if (sources_.size() > places) return;
     // One leaf a place, which has its number.
     first_leaf_ = {};
@@ -96,9 +99,7 @@ void PlaceMesh::find_leaves(std::span<const glm::vec3> fallback, float sign) {
     sources_.resize(places);
     for (Index t = 0; t < mesh_.triangles.size(); ++t)
         for (std::size_t k = 0; k < 3; ++k) sources_[mesh_.triangles[t][k]] = source_corners(t)[k];
-    normals_.resize(places);
-    parallel_loop(Index{0}, places,
-                  [&](Index place) { normals_[place] = own_normal(sources_[place], place, fallback, sign); });
+    normals_ = std::move(found.normals);
 }
 
 namespace {
@@ -123,7 +124,7 @@ struct CornersByPlace {
 
 } // namespace
 
-void PlaceMesh::gather_leaves(std::span<const glm::vec3> fallback, float sign) {
+void PlaceMesh::gather_leaves(const CornerNormals& found) {
     const Index places = static_cast<Index>(mesh_.positions.size());
     CornersByPlace by_place(mesh_.triangles, places);
     const auto vertex_of = [&](Index corner) { return source_corners(corner / 3)[corner % 3]; };
@@ -131,13 +132,12 @@ void PlaceMesh::gather_leaves(std::span<const glm::vec3> fallback, float sign) {
         return triangle_materials_.empty() ? 0 : triangle_materials_[corner / 3];
     };
     // Corners with equal keys share a leaf.
-    using Key = std::tuple<Index, float, float, float, float, float, float, float, float, float>;
-    const auto key_of = [&](Index corner, Index place) {
+    using Key = std::tuple<Index, Index, float, float, float, float, float, float>;
+    const auto key_of = [&](Index corner) {
         const Index v = vertex_of(corner);
-        const glm::vec3 n = own_normal(v, place, fallback, sign);
         const glm::vec2 uv = source_.uvs.empty() ? glm::vec2(0) : source_.uvs[v];
         const glm::vec4 c = source_.colours.empty() ? glm::vec4(0) : source_.colours[v];
-        return Key(material_of(corner), uv.x, uv.y, n.x, n.y, n.z, c.r, c.g, c.b, c.a);
+        return Key(material_of(corner), found.number[corner], uv.x, uv.y, c.r, c.g, c.b, c.a);
     };
     struct Leaf {
         Index vertex, corner; // the first ones
@@ -152,7 +152,7 @@ void PlaceMesh::gather_leaves(std::span<const glm::vec3> fallback, float sign) {
         for (Index place = range.begin(); place < range.end(); ++place) {
             const Index start = by_place.start[place];
             keys.clear();
-            for (const Index corner : by_place.at(place)) keys.emplace_back(key_of(corner, place), corner);
+            for (const Index corner : by_place.at(place)) keys.emplace_back(key_of(corner), corner);
             std::ranges::sort(keys);
             order.clear();
             std::vector<Index>& of_corner = local;
@@ -191,7 +191,7 @@ void PlaceMesh::gather_leaves(std::span<const glm::vec3> fallback, float sign) {
             const Leaf& first = first_corners[by_place.start[place] + leaf - counts[place]];
             places_[leaf] = place;
             sources_[leaf] = first.vertex;
-            normals_[leaf] = own_normal(first.vertex, place, fallback, sign);
+            normals_[leaf] = found.normals[found.number[first.corner]];
             if (!materials_.empty()) materials_[leaf] = material_of(first.corner);
         }
     }

@@ -3,6 +3,8 @@
 
 #include <unseen/vdtree/builder.h>
 
+#include "build/creases.h"
+
 namespace unseen::vdtree {
 
 // Triangles with two corners at one position are left out, and so are vertices that no other triangle uses.
@@ -16,9 +18,14 @@ public:
     Index source_triangle(Index t) const { return kept_.empty() ? t : kept_[t]; }
     std::uint64_t dropped() const { return dropped_; }
 
-    // ---- leaves, place by place. To be called once the places' own normals are known, which stand in for missing ones:
-    // `fallback`, by place; `sign`: -1 turns the mesh's own around.
-    void find_leaves(std::span<const glm::vec3> fallback, float sign);
+    // ---- leaves, place by place; to be found once it is known which way the surface faces. `signs`: -1 turns normals
+    // that are computed, or the mesh's own, around.
+    struct Signs {
+        float face = 1, own = 1;
+    };
+    void find_leaves() { find_leaves(Signs{}, {}); }
+    void find_leaves(Signs signs, std::optional<float> crease);
+    const Creases& creases() const { return creases_; }
 
     Index leaf_count() const { return static_cast<Index>(sources_.size()); }
     bool has_seams() const { return !first_leaf_.empty(); }
@@ -33,9 +40,9 @@ private:
     void keep_triangles(std::span<const Index> coincident);
     void number_places(std::span<const Index> coincident);
     void find_materials();
+    CornerNormals corner_normals(Signs signs, std::optional<float> crease) const;
     const Triangle& source_corners(Index t) const { return source_.triangles[source_triangle(t)]; }
-    glm::vec3 own_normal(Index vertex, Index place, std::span<const glm::vec3> fallback, float sign) const;
-    void gather_leaves(std::span<const glm::vec3> fallback, float sign);
+    void gather_leaves(const CornerNormals& found);
 
     const MeshView& source_;
     std::uint64_t dropped_ = 0;
@@ -48,6 +55,7 @@ private:
     std::vector<Index> first_leaf_, sources_, places_, materials_;
     std::vector<Index> triangle_materials_; // empty: one for all
     std::vector<glm::vec3> normals_;
+    Creases creases_;
     std::vector<Triangle> leaf_triangles_;
 };
 
