@@ -20,10 +20,10 @@ constexpr float near_share =
     0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
-constexpr Index at_once = 16;                 // triangles looked at together,
-constexpr std::size_t most_candidates = 512;  // unless so many are near any of them
-constexpr std::size_t most_listed = 100;      // triangles around a triangle's corners; amid more, pairs are looked at
-constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
+constexpr Index at_once = 16;                // triangles looked at together,
+constexpr std::size_t most_candidates = 512; // unless so many are near any of them
+constexpr std::size_t most_listed = 100;     // triangles around a triangle's corners; amid more, pairs are looked at
+constexpr std::size_t most_looks = 16000;    // at triangles around corners, for one triangle; amid more, it touches one
 constexpr std::size_t most_boxes =
     std::size_t{1} << 32; // for all triangles together, in trees so flat that nodes have very many: some seconds
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -96,7 +96,8 @@ float sine_between(const Corners& a, const Corners& b) {
 
 // Which of them is in front makes no difference: they face alike, and look alike.
 constexpr float alike_cosine = 0.9f;
-constexpr float alike_luminance = 0.01f; // relative, 0..1; of the means
+constexpr float alike_luminance = 0.01f;   // relative, 0..1; of the means
+constexpr std::size_t most_luminances = 4; // measured at once
 bool face_alike(const Corners& a, const Corners& b) {
     const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
     return glm::dot(m, n) > alike_cosine * glm::length(m) * glm::length(n);
@@ -105,6 +106,7 @@ bool face_alike(const Corners& a, const Corners& b) {
 struct Box {
     glm::vec3 lo = glm::vec3(infinity), hi = glm::vec3(-infinity);
 
+    void include(const glm::vec3& p) { lo = glm::min(lo, p), hi = glm::max(hi, p); }
     void include(const Box& other) { lo = glm::min(lo, other.lo), hi = glm::max(hi, other.hi); }
     Box wider(float by) const { return {lo - by, hi + by}; }
     bool meets(const Box& other) const {
@@ -120,10 +122,12 @@ public:
         : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
           boxes_(interior_), mesh_(tree_),
-          boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
+          boxes_a_triangle_(std::max(most_looks, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         is_textured_ = !trees.front().texture().empty();
-        for (const SoundTree& tree : trees)
+        for (const SoundTree& tree : trees) {
             luminances_.push_back(tree.luminance().subspan(tree.interior_wedge_count()));
+            ring_luminances_.push_back(tree.ring_luminance());
+        }
         positions_.resize(tree_.place_count());
         for (Index place = 0; place < positions_.size(); ++place)
             positions_[place] = tree_.position(interior_ + place) * scale_;
@@ -132,6 +136,7 @@ public:
                 boxes_[node].include(box_of(corners(t)));
             if (node > 0) boxes_[tree_.parents()[node]].include(boxes_[node]);
         }
+        find_hubs();
     }
 
     std::vector<Contact> run(MeasuringProgress& progress) const {
@@ -146,6 +151,71 @@ public:
     }
 
 private:
+    // A place of more triangles than are listed. All of them are near each other, and neighbours.
+    bool is_hub(Index place) const { return mesh_.around(place).size() > most_listed; }
+
+    // What vanishes at a node or below it, apart by hubs.
+    struct Parts {
+        Box without, with;                                              // triangles without a hub, and with one
+        Index hub = no_hub;                                             // the hub of the latter,
+        static constexpr Index no_hub = no_node, several = no_node - 1; // or this
+
+        void include(Index other) { hub = hub == no_hub || hub == other ? other : several; }
+        void include(const Parts& other) {
+            without.include(other.without);
+            with.include(other.with);
+            if (other.hub != no_hub) include(other.hub);
+        }
+    };
+    void find_hubs() {
+        Index place = 0;
+        while (place < tree_.place_count() && !is_hub(place)) ++place;
+        if (place == tree_.place_count()) return;
+        hub_at_.assign(tree_.place_count(), Parts::no_hub);
+        for (Index t = 0; t < triangles_.size(); ++t) note_hubs(mesh_.corners(t));
+        std::sort(hub_edges_.begin(), hub_edges_.end());
+        hub_edges_.erase(std::unique(hub_edges_.begin(), hub_edges_.end()), hub_edges_.end());
+        parts_.resize(interior_);
+        for (NodeId node = interior_; node-- > 0;) {
+            Parts& parts = parts_[node];
+            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) {
+                const Index hub = first_hub(t);
+                (hub == Parts::no_hub ? parts.without : parts.with).include(box_of(corners(t)));
+                if (hub != Parts::no_hub && !has_corner(t, parts.hub)) parts.include(hub);
+            }
+            if (node > 0) parts_[tree_.parents()[node]].include(parts);
+        }
+    }
+    void note_hubs(const Triangle& corners) {
+        for (const Index hub : corners) {
+            if (!is_hub(hub)) continue;
+            for (const Index place : corners) {
+                if (place == hub) continue;
+                if (is_hub(place)) hub_edges_.emplace_back(place, hub);
+                else hub_at_[place] = hub_at_[place] == Parts::no_hub || hub_at_[place] == hub ? hub : Parts::several;
+            }
+        }
+    }
+    bool has_corner(Index triangle, Index place) const {
+        const Triangle& t = mesh_.corners(triangle);
+        return t[0] == place || t[1] == place || t[2] == place;
+    }
+    // Of a triangle's hubs, that of the lowest number.
+    Index first_hub(Index triangle) const {
+        Index first = Parts::no_hub;
+        for (const Index corner : mesh_.corners(triangle))
+            if (is_hub(corner)) first = std::min(first, corner);
+        return first;
+    }
+    Index hub_of(Index triangle) const { return parts_.empty() ? Parts::no_hub : first_hub(triangle); }
+    // Whether triangles at a node or below it, except for those around the hub, may meet a box.
+    bool may_meet(const Box& box, NodeId node, Index hub) const {
+        if (!box.meets(boxes_[node])) return false;
+        if (hub == Parts::no_hub) return true;
+        const Parts& parts = parts_[node];
+        return box.meets(parts.without) || (parts.hub != hub && box.meets(parts.with));
+    }
+
     std::vector<Contact> by_triangle(MeasuringProgress& progress) const {
         std::vector<Contact> contacts(triangles_.size());
         parallel_loop_over(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
@@ -168,27 +238,54 @@ private:
         if (is_textured_) return false; // whatever their vertices do
         const Triangle &s = triangles_[a], &t = triangles_[b];
         return std::all_of(luminances_.begin(), luminances_.end(), [&](std::span<const Unorm16> luminance) {
-            const auto mean = [&](const Triangle& of) {
-                return (luminance[of[0]] + luminance[of[1]] + luminance[of[2]]) / 3;
-            };
-            return std::abs(mean(s) - mean(t)) <= alike_luminance;
+            return std::abs(mean(luminance, s) - mean(luminance, t)) <= alike_luminance;
         });
     }
+    static float mean(std::span<const Unorm16> luminance, const Triangle& of) {
+        return (luminance[of[0]] + luminance[of[1]] + luminance[of[2]]) / 3;
+    }
+
     static Box box_of(const Corners& c) {
         return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))};
     }
 
-    // The corners of triangles around a triangle's corners; none where there are very many.
-    void find_neighbours(const Triangle& triangle, std::vector<Index>& neighbours) const {
-        neighbours.clear();
+    // What is near a triangle because it is a neighbour, or a neighbour's neighbour: triangles with a corner that is
+    // listed, and with one that is a hub or shares a triangle with one. Not listed amid many triangles.
+    struct Neighbours {
+        std::vector<Index> corners, hubs;
+        bool are_listed = false;
+    };
+    void find_neighbours(const Triangle& triangle, Neighbours& found) const {
+        found.corners.clear(), found.hubs.clear();
         std::size_t count = 0;
-        for (const Index place : triangle) count += mesh_.around(place).size();
-        if (count > most_listed) return;
-        for (const Index place : triangle)
+        for (const Index place : triangle) {
+            if (is_hub(place)) found.hubs.push_back(place);
+            else count += mesh_.around(place).size();
+        }
+        found.are_listed = count <= most_listed;
+        if (!found.are_listed) return;
+        for (const Index place : triangle) {
+            if (is_hub(place)) continue;
             for (const Index t : mesh_.around(place))
                 for (const Index corner : mesh_.corners(t))
-                    if (std::find(neighbours.begin(), neighbours.end(), corner) == neighbours.end())
-                        neighbours.push_back(corner);
+                    if (std::find(found.corners.begin(), found.corners.end(), corner) == found.corners.end())
+                        found.corners.push_back(corner);
+        }
+    }
+    bool is_neighbour(const Neighbours& listed, const Triangle& other) const {
+        return std::any_of(other.begin(), other.end(), [&](Index corner) {
+            const auto is_near_hub = [&](Index hub) { return corner == hub || touches_hub(corner, hub); };
+            return std::find(listed.corners.begin(), listed.corners.end(), corner) != listed.corners.end() ||
+                   std::any_of(listed.hubs.begin(), listed.hubs.end(), is_near_hub);
+        });
+    }
+
+    // Whether a place shares a triangle with a hub.
+    bool touches_hub(Index place, Index hub) const {
+        if (is_hub(place)) return std::binary_search(hub_edges_.begin(), hub_edges_.end(), std::pair(place, hub));
+        if (hub_at_[place] != Parts::several) return hub_at_[place] == hub;
+        const std::span<const Index> around = mesh_.around(place);
+        return std::any_of(around.begin(), around.end(), [&](Index t) { return has_corner(t, hub); });
     }
 
     // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
@@ -197,17 +294,60 @@ private:
             if (place == b[0] || place == b[1] || place == b[2]) return true;
         for (const Index place : a) {
             for (const Index other : b) {
-                const bool is_less = mesh_.around(place).size() < mesh_.around(other).size();
-                const Index wanted = is_less ? other : place;
-                for (const Index t : mesh_.around(is_less ? place : other)) {
+                if (is_hub(place) || is_hub(other)) {
+                    const bool is_first = is_hub(place);
+                    if (touches_hub(is_first ? other : place, is_first ? place : other)) return true;
+                    continue;
+                }
+                for (const Index t : mesh_.around(place)) {
                     ++looked_at;
-                    if (const Triangle& at = mesh_.corners(t); at[0] == wanted || at[1] == wanted || at[2] == wanted)
-                        return true;
-                    if (looked_at > most_triangles) return false;
+                    if (has_corner(t, other)) return true;
+                    if (looked_at > most_looks) return false;
                 }
             }
         }
         return false;
+    }
+
+    // What triangles that are looked at together are like.
+    struct Looks {
+        Box normals;
+        std::array<LuminanceRange, most_luminances> means; // by tree
+        bool is_known = true;
+    };
+    void include(Index triangle, Looks& looks) const {
+        const Corners c = corners(triangle);
+        const glm::vec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const float length = glm::length(normal);
+        looks.is_known = looks.is_known && length > 0 && !is_textured_ && luminances_.size() <= most_luminances;
+        if (!looks.is_known) return;
+        const bool is_first = looks.normals.lo.x > looks.normals.hi.x;
+        looks.normals.include(normal / length);
+        for (std::size_t i = 0; i < luminances_.size(); ++i) {
+            const float own = mean(luminances_[i], triangles_[triangle]);
+            LuminanceRange& range = looks.means[i];
+            range =
+                is_first ? LuminanceRange{own, own} : LuminanceRange{std::min(range.lo, own), std::max(range.hi, own)};
+        }
+    }
+    // Whether all triangles that vanish at a node or below it face and look like these, for sure.
+    bool are_all_alike(const Looks& looks, NodeId node) const {
+        if (!looks.is_known) return false;
+        const NormalSlabs& slabs = tree_.bounds()[node].slabs;
+        float least_cosine = 0;
+        for (int k = 0; k < 3; ++k) {
+            const float lo = slabs.lo[static_cast<std::size_t>(k)] / 127.0f,
+                        hi = slabs.hi[static_cast<std::size_t>(k)] / 127.0f, a = looks.normals.lo[k],
+                        b = looks.normals.hi[k];
+            least_cosine += std::min({a * lo, a * hi, b * lo, b * hi});
+        }
+        constexpr float rounding = 1e-5f;
+        if (!(least_cosine > alike_cosine + rounding)) return false;
+        for (std::size_t i = 0; i < luminances_.size(); ++i) {
+            const LuminanceRange its = ring_luminances_[i][node], own = looks.means[i];
+            if (!(std::max(its.hi - own.lo, own.hi - its.lo) <= alike_luminance - rounding)) return false;
+        }
+        return true;
     }
 
     struct Candidate {
@@ -216,7 +356,7 @@ private:
     };
     struct Scratch {
         std::vector<NodeId> waiting;
-        std::vector<Index> neighbours; // corners; none: not listed
+        Neighbours neighbours;
         std::vector<Candidate> candidates;
     };
 
@@ -229,23 +369,30 @@ private:
     // Consecutive triangles are near each other, but for some: then one walk down the tree serves all of them.
     void find(Index begin, Index end, std::span<Contact> contacts, Scratch& scratch) const {
         Box around;
+        Looks looks;
+        Index hub = hub_of(begin);
         for (Index t = begin; t < end; ++t) {
+            if (hub != Parts::no_hub && !has_corner(t, hub)) hub = Parts::no_hub;
             const Corners own = corners(t);
-            if (const float near = nearness(own); near > 0) around.include(box_of(own).wider(near));
+            if (const float near = nearness(own); near > 0) around.include(box_of(own).wider(near)), include(t, looks);
         }
-        const bool is_for_all = look_around(around, most_candidates, scratch);
+        const bool is_for_all = look_around(around, looks, hub, most_candidates, scratch);
         for (Index t = begin; t < end; ++t) {
             const Corners own = corners(t);
             const float near = nearness(own);
             if (!(near > 0)) continue;
             const Box own_around = box_of(own).wider(near);
-            const bool is_sparse = is_for_all || look_around(own_around, triangles_.size(), scratch);
+            Looks own_looks;
+            if (!is_for_all) include(t, own_looks);
+            const bool is_sparse =
+                is_for_all || look_around(own_around, own_looks, hub_of(t), triangles_.size(), scratch);
             contacts[t] = is_sparse ? find(t, near, own_around, scratch) : Contact{0, 0};
         }
     }
 
-    // Makes candidates of the triangles whose boxes meet one. False amid too many.
-    bool look_around(const Box& around, std::size_t most, Scratch& scratch) const {
+    // Makes candidates of the triangles whose boxes meet one, but for those around a hub, and whole subtrees of those
+    // that are alike. False amid too many.
+    bool look_around(const Box& around, const Looks& looks, Index hub, std::size_t most, Scratch& scratch) const {
         scratch.candidates.clear();
         int nodes = 0;
         std::size_t boxes = 0;
@@ -256,11 +403,13 @@ private:
             if (++nodes > most_nodes) return false;
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) {
                 if (++boxes > boxes_a_triangle_) return false;
+                if (hub != Parts::no_hub && has_corner(t, hub)) continue;
                 if (const Box box = box_of(corners(t)); around.meets(box)) scratch.candidates.push_back({box, t});
             }
             if (scratch.candidates.size() > most) return false;
             tree_.for_each_child(node, [&](NodeId child) {
-                if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
+                if (child < interior_ && may_meet(around, child, hub) && !are_all_alike(looks, child))
+                    scratch.waiting.push_back(child);
             });
         }
         return true;
@@ -269,19 +418,17 @@ private:
     // Among the candidates.
     Contact find(Index triangle, float near, const Box& around, Scratch& scratch) const {
         const Corners own = corners(triangle);
-        std::vector<Index>& neighbours = scratch.neighbours;
+        Neighbours& neighbours = scratch.neighbours;
         find_neighbours(mesh_.corners(triangle), neighbours);
         std::size_t looked_at = 0;
-        const auto is_neighbour = [&](const Triangle& other) {
-            if (neighbours.empty()) return are_neighbours(mesh_.corners(triangle), other, looked_at);
-            return std::any_of(neighbours.begin(), neighbours.end(), [&](Index place) {
-                return place == other[0] || place == other[1] || place == other[2];
-            });
+        const auto is_near_by = [&](const Triangle& other) {
+            return neighbours.are_listed ? is_neighbour(neighbours, other)
+                                         : are_neighbours(mesh_.corners(triangle), other, looked_at);
         };
         Contact contact;
         for (const auto& [box, other] : scratch.candidates) {
-            if (!around.meets(box) || is_neighbour(mesh_.corners(other))) continue;
-            if (looked_at > most_triangles) return {0, 0};
+            if (!around.meets(box) || is_near_by(mesh_.corners(other))) continue;
+            if (looked_at > most_looks) return {0, 0};
             const Corners its = corners(other);
             if (face_alike(own, its) && look_alike(triangle, other)) continue;
             const glm::vec3 way = way_between(own, its);
@@ -293,13 +440,18 @@ private:
 
     const SoundTree& tree_;
     NodeId interior_;
-    std::span<const Triangle> triangles_;              // over leaves
-    float scale_;                                      // in which they are measured
-    std::vector<glm::vec3> positions_;                 // of places
-    std::vector<std::span<const Unorm16>> luminances_; // of leaves, by tree
+    std::span<const Triangle> triangles_;                       // over leaves
+    float scale_;                                               // in which they are measured
+    std::vector<glm::vec3> positions_;                          // of places
+    std::vector<std::span<const Unorm16>> luminances_;          // of leaves, by tree
+    std::vector<std::span<const PackedRange>> ring_luminances_; // by interior node, likewise
     bool is_textured_ = false;
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
+    // Empty without hubs.
+    std::vector<Parts> parts_;  // likewise
+    std::vector<Index> hub_at_; // by place: that it shares a triangle with
+    std::vector<std::pair<Index, Index>> hub_edges_;
     PlaceTriangles mesh_;
     std::size_t boxes_a_triangle_; // at most
 };

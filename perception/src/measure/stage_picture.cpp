@@ -139,7 +139,12 @@ UNSEEN_INLINE void draw_rows(const Shown<lights>& t, const ShownTexture* texture
             if (seen == 0) continue;
         }
         const Rows<Floats> rows(t, first);
+        const auto has_samples = rows.first < rows.end; // slivers have none in most rows
+        bool has_any = false;
+        for (std::size_t i = 0; i < width; ++i) has_any |= has_samples[i] != 0;
+        if (!has_any) continue;
         for (std::size_t i = 0; i < end - first; ++i) {
+            if (!has_samples[i]) continue;
             for (std::uint64_t left = seen; left != 0;) { // neighbouring tiles together
                 const auto from = static_cast<std::size_t>(std::countr_zero(left)),
                            to = from + static_cast<std::size_t>(std::countr_one(left >> from));
