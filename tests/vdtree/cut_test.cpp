@@ -6,6 +6,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "testing.h"
+#include "textures.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree::cut_test {
@@ -167,6 +168,133 @@ TEST(Cut, UnfoldAncestorsUnfoldsNothingElse) {
             above[up] = true;
         for (NodeId n = 0; n < tree.interior_count(); ++n) ASSERT_EQ(cut.is_unfolded(n), above[n]);
     }
+}
+
+// ---- seams, hard edges and triangles turned over, in any cut
+
+struct AnyMesh {
+    const char* name;
+    Mesh mesh;
+    bool is_closed;
+};
+
+std::vector<AnyMesh> any_meshes() {
+    const Texture checks = textures::checkerboard(16, 16, 4, 0, 255);
+    Mesh hard_box = shapes::unwelded(shapes::cube(8)); // flat faces with normals of their own
+    hard_box.normals.resize(hard_box.positions.size());
+    for (const Triangle& t : hard_box.triangles) {
+        const auto p = [&](std::size_t k) { return hard_box.positions[t[k]]; };
+        for (const Index v : t) hard_box.normals[v] = glm::vec3(glm::normalize(glm::cross(p(1) - p(0), p(2) - p(0))));
+    }
+    return {{"bumpy sphere", shapes::bumpy_sphere(4), true},
+            {"spiky star", shapes::spiky_star(3), true},
+            {"torus", shapes::torus(40, 20), true},
+            {"cube with creases", shapes::cube(8), true},
+            {"hard box", hard_box, true},
+            {"two parts", shapes::two_parts(), true},
+            {"textured sphere", textures::textured_sphere(3, checks), true},
+            {"sphere with a seam", textures::with_seams(textures::textured_sphere(3, checks)), true},
+            {"materials", shapes::with_attributes(shapes::bumpy_sphere(3)), true},
+            {"grid", shapes::grid(24), false},
+            {"grid with a seam", textures::with_seams(textures::textured_grid(16, checks), 4), false}};
+}
+
+// Random cuts: of costs that grow with the size of the node, jittered by e^+-2.
+void make_noisy_cut(Cut& cut, std::mt19937_64& random) {
+    const VertexTree& tree = cut.tree();
+    std::vector<float> costs(tree.interior_count());
+    const double limit = tree.support_spheres()[0].radius * std::exp(-4 * shapes::random_between(random, 0, 1));
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        costs[node] = static_cast<float>(tree.support_spheres()[node].radius / limit *
+                                         std::exp(shapes::random_between(random, -2, 2)));
+        tree.for_each_child(node, [&](NodeId child) {
+            if (!tree.is_place(child)) costs[node] = std::max(costs[node], costs[child]);
+        });
+    }
+    cut.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> found) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) found[i] = costs[nodes[i]];
+    });
+}
+
+std::vector<NodeId> nodes_of_wedges(const VertexTree& tree) {
+    std::vector<NodeId> nodes(tree.wedge_count());
+    for (NodeId node = 0; node < tree.node_count(); ++node)
+        for (WedgeId w = tree.first_wedge(node); w < tree.wedge_end(node); ++w) nodes[w] = node;
+    return nodes;
+}
+
+TEST(AnyCut, OfAClosedMeshHasNoBorder) {
+    std::mt19937_64 random(31);
+    for (const AnyMesh& any : any_meshes()) {
+        if (!any.is_closed) continue;
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const VertexTree tree = built(any.mesh, kind);
+            ASSERT_NE(tree.closedness(), Closedness::open) << any.name;
+            const std::vector<NodeId> node_of = nodes_of_wedges(tree);
+            Cut cut(tree);
+            for (int trial = 0; trial < 6; ++trial) {
+                make_noisy_cut(cut, random);
+                std::map<std::pair<NodeId, NodeId>, int> sides;
+                const auto indices = cut.indices();
+                for (std::size_t i = 0; i < indices.size(); i += 3)
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        const NodeId a = node_of[indices[i + k]], b = node_of[indices[i + (k + 1) % 3]];
+                        ++sides[{a, b}], --sides[{b, a}];
+                    }
+                for (const auto& [side, balance] : sides) ASSERT_EQ(balance, 0) << any.name << ", trial " << trial;
+            }
+        }
+    }
+}
+
+TEST(AnyCut, KeepsTheSidesOfSeamsApartAndMaterialsPure) {
+    std::mt19937_64 random(32);
+    for (const AnyMesh& any : any_meshes()) {
+        const VertexTree tree = built(any.mesh);
+        Cut cut(tree);
+        for (int trial = 0; trial < 4; ++trial) {
+            make_noisy_cut(cut, random);
+            EXPECT_EQ(support::fault_in_cut(cut), "") << any.name;
+        }
+    }
+}
+
+TEST(UnfoldTurned, LeavesNoTriangleTurnedOver) {
+    std::mt19937_64 random(33);
+    std::uint64_t found = 0;
+    for (const AnyMesh& any : any_meshes()) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const VertexTree tree = built(any.mesh, kind);
+            const auto turned = [&](const Cut& cut) {
+                std::uint64_t count = 0;
+                for (const Triangle& t : support::sound(tree).triangles()) {
+                    glm::dvec3 now[3], before[3];
+                    NodeId nodes[3];
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        nodes[k] = cut.proxy_of_leaf(t[k]);
+                        now[k] = glm::dvec3(tree.position(nodes[k]));
+                        before[k] = glm::dvec3(tree.position(tree.place_of_leaf(t[k])));
+                    }
+                    if (nodes[0] == nodes[1] || nodes[1] == nodes[2] || nodes[2] == nodes[0]) continue;
+                    count += glm::dot(glm::cross(now[1] - now[0], now[2] - now[0]),
+                                      glm::cross(before[1] - before[0], before[2] - before[0])) < 0;
+                }
+                return count;
+            };
+            Cut cut(tree);
+            for (int trial = 0; trial < 6; ++trial) {
+                make_noisy_cut(cut, random);
+                const std::uint64_t before = turned(cut);
+                const Index triangles = cut.triangle_count(), unfolded = cut.unfold_turned();
+                found += before;
+                EXPECT_EQ(turned(cut), 0u) << any.name << ", trial " << trial;
+                EXPECT_EQ(unfolded == 0, triangles == cut.triangle_count());
+                EXPECT_EQ(support::fault_in_cut(cut), "") << any.name;
+                EXPECT_EQ(cut.unfold_turned(), 0u) << "nothing is left to do";
+            }
+        }
+    }
+    EXPECT_GT(found, 20u) << "of these there are some to find";
 }
 
 TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {

@@ -80,6 +80,9 @@ public:
     bool fold_subtree(NodeId node);     // folds the node and everything below it
     void unfold_all();
     void fold_all();
+    // Unfolds the coarsest corner of every triangle that faces away from where it faced in the mesh, or is mirrored in the
+    // texture, until there is none; returns how many nodes. Cost: a few nanoseconds a triangle of the cut, two to six times.
+    Index unfold_turned();
 
     // Makes the criterion's cut, whatever the state before.
     //   Without a budget, nodes of cost 1 and less fold, top-down: a node below a folded one is folded.
