@@ -128,6 +128,7 @@ public:
     Subdivider(Mesh mesh, const SubdivideOptions& options)
         : mesh_(std::move(mesh)), options_(options), stays_in_floats_(are_floats(mesh_)),
           normals_(vertex_normals(mesh_)) {
+        mesh_.further.clear(); // new vertices have none
         mesh_.normals = {};
     }
 

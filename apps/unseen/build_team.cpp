@@ -84,6 +84,7 @@ std::uint64_t fingerprint(const vdtree::MeshView& mesh, const vdtree::BuildOptio
     hash.add(mesh.colours);
     hash.add(mesh.uvs);
     hash.add(mesh.smoothing);
+    hash.add(mesh.further);
     hash.add_word(static_cast<std::uint64_t>(options.clusterer));
     hash.add_word(std::bit_cast<std::uint32_t>(options.crease.value_or(-1.0f))); // never negative
     return hash.value();

@@ -1,12 +1,16 @@
 // Every format and feature of the mesh readers on files small enough to check by eye, and what the writers give back.
 #include <unseen/meshio/mesh_file.h>
 
+#include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 #include "read_bytes.h"
+#include "shapes.h"
+#include "temp_folder.h"
 
 #include <stop_token>
 
@@ -532,12 +536,71 @@ TEST(Stl, IsWeldedWherePositionsAreEqual) {
     EXPECT_EQ(alone.mesh.normals.size(), 3u); // nothing to weld: nothing is lost
 }
 
+// Lines of a keyword.
+std::size_t lines_with(const std::string& text, const std::string& keyword) {
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = text.find("\n" + keyword + " ", at)) != std::string::npos; ++at) ++count;
+    return count + text.starts_with(keyword + " ");
+}
+
+// The corners as a set of triangles, whatever the order of the vertices.
+std::multiset<std::string> corner_values(const Mesh& mesh) {
+    std::multiset<std::string> found;
+    for (const Triangle& t : mesh.triangles) {
+        std::ostringstream values;
+        for (const Index v : t) {
+            const glm::dvec3 p = mesh.positions[v];
+            const glm::vec3 n = mesh.normals[v];
+            const glm::vec2 uv = mesh.uvs[v];
+            values << p.x << ' ' << p.y << ' ' << p.z << ' ' << n.x << ' ' << n.y << ' ' << n.z << ' ' << uv.x << ' '
+                   << uv.y << '\n';
+        }
+        found.insert(values.str());
+    }
+    return found;
+}
+
+TEST(Obj, SidesOfSeamsShareTheirPositions) {
+    const support::TempFolder folder;
+    Mesh mesh; // a box with normals and coordinates by face
+    for (const Triangle& t : shapes::cube(1).triangles) {
+        const Mesh cube = shapes::cube(1);
+        const glm::dvec3 a = cube.positions[t[0]],
+                         n = glm::normalize(glm::cross(cube.positions[t[1]] - a, cube.positions[t[2]] - a));
+        for (const Index v : t) {
+            mesh.positions.push_back(cube.positions[v]);
+            mesh.normals.emplace_back(n);
+            const glm::dvec3 p = cube.positions[v];
+            mesh.uvs.emplace_back(n.x != 0 ? p.y : p.x, n.z != 0 ? p.y : p.z);
+        }
+        const auto last = static_cast<Index>(mesh.positions.size());
+        mesh.triangles.push_back({last - 3, last - 2, last - 1});
+    }
+    const auto tree = require(build_tree(mesh.view()));
+    EXPECT_EQ(tree->leaf_count(), 24u);
+    Cut cut(*tree);
+    cut.unfold_all();
+    ASSERT_TRUE(meshio::write_cut(folder / "box.obj", cut));
+    const std::string text = support::read_bytes(folder / "box.obj");
+    EXPECT_EQ(lines_with(text, "v"), 8u);
+    EXPECT_EQ(lines_with(text, "vt"), 4u);
+    EXPECT_EQ(lines_with(text, "vn"), 6u);
+    const auto again = require(meshio::read_mesh(folder / "box.obj"));
+    EXPECT_EQ(again->mesh.positions.size(), 24u);
+    EXPECT_EQ(corner_values(again->mesh), corner_values(extract_mesh(cut)));
+
+    // Vertices of a mesh that just lie at one place stay apart.
+    ASSERT_TRUE(meshio::write_mesh(folder / "soup.obj", mesh.view()));
+    EXPECT_EQ(lines_with(support::read_bytes(folder / "soup.obj"), "v"), 36u);
+}
+
 TEST(Obj, UnweldedMeshesAreHintedAt) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
     const auto notes = read(vertices + "f 1 2 3\nf 4 5 6\n", "a.obj").notes;
     ASSERT_EQ(notes.size(), 1u);
     EXPECT_THAT(notes[0], HasSubstr("vertices of its own"));
-    EXPECT_TRUE(read(vertices + "f 1 2 3\nf 2 5 3\n", "a.obj").notes.empty());
+    EXPECT_THAT(read(vertices + "f 1 2 3\nf 2 5 3\n", "a.obj").notes,
+                ElementsAre("2 vertices belong to no face; trees leave them out."));
     EXPECT_TRUE(
         read("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 1 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n", "a.obj").notes.empty());
 }

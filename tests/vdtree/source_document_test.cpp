@@ -30,6 +30,7 @@ meshio::ReadResult read_scene(const support::TempFolder& folder, meshio::ReadOpt
     document.vertex_parts.assign(read->mesh.positions.size(), 0);
     for (std::size_t t = 0; t < read->mesh.triangles.size(); ++t)
         for (const Index v : read->mesh.triangles[t]) document.vertex_parts[v] = part_of(document, t);
+    read->mesh.further = meshio::further_values(document);
     return std::move(*read);
 }
 
@@ -78,6 +79,18 @@ TEST(SourceDocuments, GoWithTreesToFilesAndBack) {
         EXPECT_EQ(in.images, out.images);
         EXPECT_TRUE(in.triangles == out.triangles);
     }
+}
+
+TEST(SourceDocuments, KnowWhichVerticesHaveTheSameValues) {
+    SourceDocument document{.format = SourceDocument::Format::obj, .parts = {{.channels = 1}, {.channels = 3}}};
+    document.channels = {{"NORMAL", 3, {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 1, 0}},
+                         {"TEXCOORD_1", 2, std::vector<float>(10)}};
+    document.vertex_parts = {0, 1, 0, 1, 0};
+    EXPECT_THAT(meshio::further_values(document), ElementsAre(0, 1, 0, 1, 4)) << "vertices 0 and 2 lack the second";
+    document.channels[1].values[7] = 0.5f;
+    EXPECT_THAT(meshio::further_values(document), ElementsAre(0, 1, 0, 3, 4));
+    document.channels.clear();
+    EXPECT_THAT(meshio::further_values(document), IsEmpty());
 }
 
 TEST(SourceDocuments, OfTrianglesThatAreDroppedStayInStep) {

@@ -44,9 +44,37 @@ const VertexArray& named(const std::vector<VertexArray>& arrays, const std::stri
 }
 
 VertexTree tree_with(Mesh mesh, std::vector<VertexArray> arrays) {
-    mesh.document = meshio::pack({.format = SourceDocument::Format::table, .arrays = std::move(arrays)});
+    const SourceDocument document{.format = SourceDocument::Format::table, .arrays = std::move(arrays)};
+    mesh.further = meshio::further_values(document);
+    if (mesh.further.size() != mesh.positions.size()) mesh.further.clear();
+    mesh.document = meshio::pack(document);
     return std::move(*require(build_tree(mesh.view())));
 }
+
+glm::dvec3 face_normal(const Mesh& mesh, const Triangle& t) {
+    const glm::dvec3 a = mesh.positions[t[0]];
+    return glm::normalize(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
+}
+
+// A cube whose sides have vertices of their own, and what each vertex's side is called.
+struct SidedCube {
+    Mesh mesh;
+    std::vector<double> sides;
+
+    explicit SidedCube(int n) {
+        const Mesh cube = shapes::cube(n);
+        std::map<std::pair<Index, double>, Index> numbers;
+        for (Triangle t : cube.triangles) {
+            const double side = glm::dot(face_normal(cube, t), glm::dvec3(1, 2, 4));
+            for (Index& v : t) {
+                const auto [entry, is_new] = numbers.try_emplace({v, side}, static_cast<Index>(sides.size()));
+                if (is_new) mesh.positions.push_back(cube.positions[v]), sides.push_back(side);
+                v = entry->second;
+            }
+            mesh.triangles.push_back(t);
+        }
+    }
+};
 
 Cut full_cut(const VertexTree& tree) {
     Cut cut(tree);
@@ -306,7 +334,10 @@ void expect_own_values(const Mesh& mesh) {
     EXPECT_GT(unfinite, 20);
 }
 
-TEST(VertexValues, OfCutsAreThoseOfTheirVertices) { expect_own_values(shapes::bumpy_sphere(2)); }
+TEST(VertexValues, OfCutsAreThoseOfTheirVertices) {
+    expect_own_values(shapes::bumpy_sphere(2));
+    expect_own_values(SidedCube(6).mesh);
+}
 
 TEST(VertexValues, MeansStayWithinTheValues) {
     const Mesh mesh = shapes::icosphere(2);
@@ -346,6 +377,7 @@ std::map<std::array<double, 3>, std::string> by_place(const meshio::ReadResult& 
 meshio::ReadResult read_file(const std::filesystem::path& file) { return std::move(*require(meshio::read_mesh(file))); }
 
 VertexTree tree_of(meshio::ReadResult read) {
+    read.mesh.further = meshio::further_values(*read.document);
     read.mesh.document = meshio::pack(*read.document);
     return std::move(*require(build_tree(read.mesh.view())));
 }

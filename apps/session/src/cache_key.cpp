@@ -175,7 +175,7 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
     hash.add("a mesh alone");
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     add_all(mesh.positions), add_all(mesh.triangles), add_all(mesh.normals), add_all(mesh.colours), add_all(mesh.uvs);
-    add_all(mesh.texture.texels), add_all(mesh.document), add_all(mesh.smoothing);
+    add_all(mesh.texture.texels), add_all(mesh.document), add_all(mesh.smoothing), add_all(mesh.further);
     for (const vdtree::MeshRange& range : mesh.ranges) {
         const std::uint64_t place[] = {static_cast<std::uint64_t>(range.kind), range.first_triangle,
                                        range.triangle_count};

@@ -371,6 +371,7 @@ void keep_document(meshio::ReadResult& read) {
         for (std::size_t t = document.runs[i].first_triangle; t < end; ++t)
             for (const Index v : read.mesh.triangles[t]) document.vertex_parts[v] = document.runs[i].part;
     }
+    read.mesh.further = meshio::further_values(document);
     read.mesh.document = meshio::pack(document);
     read.document.reset();
 }

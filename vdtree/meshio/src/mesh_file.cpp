@@ -159,6 +159,18 @@ void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
                            "and takes less memory where they are welded before.");
 }
 
+// Trees have none of them. A glTF primitive often uses a few of the vertices that several share.
+void tell_of_points(ReadResult& result) {
+    if (result.document && result.document->format == SourceDocument::Format::gltf) return;
+    std::vector<bool> is_used(result.mesh.positions.size(), false);
+    for (const Triangle& t : result.mesh.triangles)
+        for (const Index v : t) is_used[v] = true;
+    const auto unused = std::ranges::count(is_used, false);
+    if (unused > 0)
+        result.notes.push_back(std::to_string(unused) + (unused == 1 ? " vertex belongs" : " vertices belong") +
+                               " to no face; trees leave " + (unused == 1 ? "it" : "them") + " out.");
+}
+
 } // namespace
 
 const Format* format_named(const std::filesystem::path& file) {
@@ -190,6 +202,7 @@ ReadResult finish_reading(const MeshSource& source, ReadResult result) {
              " triangles use a vertex twice, so none is left; give a file with proper faces.");
     check_normals(result);
     hint_at_unwelded(source, result);
+    tell_of_points(result);
     return result;
 }
 

@@ -3,10 +3,12 @@
 
 #include "gltf_writer.h"
 #include "kept_arrays.h"
+#include "obj_lines.h"
 #include "ply_slots.h"
 #include "value_types.h"
 
 #include <map>
+#include <numeric>
 #include <set>
 
 #include <glm/common.hpp>
@@ -163,38 +165,22 @@ Result<void> write_ply_to(FileOutput& out, const MeshView& mesh, const PlyColumn
 
 // ---- OBJ ----
 
-void write_obj_corner(FileOutput& out, const MeshView& mesh, Index vertex) {
-    const std::uint64_t number = std::uint64_t{vertex} + 1;
-    out.text(" ");
-    out.number(number);
-    if (!mesh.uvs.empty() || !mesh.normals.empty()) out.text("/");
-    if (!mesh.uvs.empty()) out.number(number);
-    if (mesh.normals.empty()) return;
-    out.text("/");
-    out.number(number);
-}
-
-void write_obj_vertices(FileOutput& out, const MeshView& mesh) {
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+void write_obj_to(FileOutput& out, const MeshView& mesh, std::span<const Index> places) {
+    std::vector<Index> own;
+    if (places.empty()) {
+        own.resize(mesh.positions.size());
+        std::iota(own.begin(), own.end(), Index{0});
+        places = own;
+    }
+    const ObjLines positions(places, mesh.colours), uvs(mesh.uvs), normals(mesh.normals);
+    positions.for_each([&](std::size_t i) {
         out.text("v");
         out.numbers(mesh.positions[i], 3);
         if (!mesh.colours.empty()) out.numbers(encoded(mesh.colours[i]), 3);
         out.text("\n");
-    }
-    for (const glm::vec2& uv : mesh.uvs) {
-        out.text("vt");
-        out.numbers(uv, 2);
-        out.text("\n");
-    }
-    for (const glm::vec3& normal : mesh.normals) {
-        out.text("vn");
-        out.numbers(normal, 3);
-        out.text("\n");
-    }
-}
-
-void write_obj_to(FileOutput& out, const MeshView& mesh) {
-    write_obj_vertices(out, mesh);
+    });
+    uvs.write(out, "vt", mesh.uvs, 2);
+    normals.write(out, "vn", mesh.normals, 3);
     // By triangle and keyword: the name that holds from there on. A range that starts where another ends wins.
     std::map<std::uint64_t, std::map<std::string_view, std::string>> names;
     for (const MeshRange& range : mesh.ranges) {
@@ -208,7 +194,9 @@ void write_obj_to(FileOutput& out, const MeshView& mesh) {
         if (next != names.end() && next->first == i)
             for (const auto& [keyword, name] : next++->second) out.text(text_of(keyword, " ", name, "\n"));
         out.text("f");
-        for (const Index corner : mesh.triangles[i]) write_obj_corner(out, mesh, corner);
+        for (const Index corner : mesh.triangles[i])
+            write_obj_corner(out, positions.number(corner), uvs.empty() ? 0 : uvs.number(corner),
+                             normals.empty() ? 0 : normals.number(corner));
         out.text("\n");
     }
 }
@@ -282,7 +270,7 @@ Result<void> write_ply(const MeshToWrite& to) {
 }
 
 Result<void> write_obj(const MeshToWrite& to) {
-    return write_file(to.file, [&](FileOutput& out) { write_obj_to(out, to.mesh); });
+    return write_file(to.file, [&](FileOutput& out) { write_obj_to(out, to.mesh, to.places); });
 }
 
 Result<void> write_gltf(const MeshToWrite& to) {
@@ -380,7 +368,7 @@ Result<void> write_off(const MeshToWrite& to) {
 }
 
 Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::span<const VertexArray> arrays,
-                             std::vector<Message>& notes, const Progress& progress) {
+                             std::vector<Message>& notes, const Progress& progress, std::span<const Index> places) {
     const Format* format = format_named(file);
     if (format == nullptr) {
         std::string endings;
@@ -390,7 +378,7 @@ Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::sp
     if (const Result<void> valid = validate(mesh); !valid) return cannot_write(file, valid.error().message);
     if (const auto names = names_of(arrays); !names.empty() && !format->holds_values)
         notes.push_back("values of vertices were left out: " + listed(names) + "; .ply and .vtp hold them.");
-    return format->write({file, mesh, arrays, notes, progress});
+    return format->write({file, mesh, arrays, notes, progress, places});
 }
 
 Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {

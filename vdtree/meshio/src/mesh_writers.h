@@ -17,6 +17,7 @@ struct MeshToWrite {
     std::span<const VertexArray> arrays;
     std::vector<Message>& notes;
     const Progress& progress;
+    std::span<const Index> places = {}; // by vertex, if given: those of one number are at one position, sides of a seam
 };
 Result<void> write_ply(const MeshToWrite& mesh);
 Result<void> write_obj(const MeshToWrite& mesh);
@@ -42,7 +43,7 @@ const Format* format_named(const std::filesystem::path& file);
 // write_mesh() with arrays.
 Result<void> write_mesh_with(const std::filesystem::path& file, const vdtree::MeshView& mesh,
                              std::span<const VertexArray> arrays, std::vector<Message>& notes,
-                             const Progress& progress = {});
+                             const Progress& progress = {}, std::span<const vdtree::Index> places = {});
 
 // Runs write(FileOutput&), then renames the file.
 template <class Write>

@@ -140,6 +140,19 @@ Result<LeafRuns> leaves_of_wedges(const VertexTree& tree, std::size_t vertices) 
     return LeafRuns(links_of(*tree.data().geometry));
 }
 
+std::vector<NodeId> nodes_of(const VertexTree& tree, const ExtractedMesh& extracted) {
+    std::vector<NodeId> nodes(extracted.wedges.begin(), extracted.wedges.end());
+    for (NodeId& node : nodes) {
+        NodeId low = 0;
+        for (NodeId end = tree.node_count(); tree.has_seams() && end - low > 1;) {
+            const NodeId middle = low + (end - low) / 2;
+            (tree.first_wedge(middle) <= node ? low : end) = middle;
+        }
+        if (tree.has_seams()) node = low;
+    }
+    return nodes;
+}
+
 NormalMatrix normal_matrix_of(const glm::dmat3& m) {
     const glm::dmat3 cofactors(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
     const bool is_mirrored = glm::dot(m[0], cofactors[0]) < 0;

@@ -13,6 +13,9 @@ namespace unseen::meshio {
 // must outlive the result. Cost: that of SoundTree::of(), and the wedges.
 Result<vdtree::LeafRuns> leaves_of_wedges(const vdtree::VertexTree& tree, std::size_t vertices);
 
+// By vertex of the extracted mesh, the node that it stands for: sides of a seam have one. Cost: a search for each.
+std::vector<vdtree::NodeId> nodes_of(const vdtree::VertexTree& tree, const vdtree::ExtractedMesh& extracted);
+
 struct RestoredPart {
     std::uint32_t part = 0;
     std::vector<vdtree::Triangle> triangles;  // over the following

@@ -6,6 +6,7 @@
 
 #include "mesh_readers.h"
 #include "value_types.h"
+#include "weld.h"
 
 namespace unseen::meshio {
 
@@ -209,6 +210,42 @@ std::string fault_in(const SourceDocument& document) {
 }
 
 } // namespace
+
+std::vector<std::uint32_t> further_values(const SourceDocument& document) {
+    // By bits, so that NaN is equal to itself.
+    std::vector<std::span<const std::byte>> columns; // all values of one kind, and the bytes that each vertex has
+    std::vector<std::size_t> widths;
+    const auto add = [&](std::span<const std::byte> values, std::size_t width) {
+        if (!values.empty()) columns.push_back(values), widths.push_back(width);
+    };
+    for (const auto& array : document.arrays) add(array.values, array.tuple_bytes());
+    for (const auto& channel : document.channels)
+        add(std::as_bytes(std::span(channel.values)), channel.components * sizeof(float));
+    if (columns.empty()) return {};
+    const auto channels_of = [&](std::size_t v) {
+        return document.vertex_parts.empty() ? 0 : document.parts[document.vertex_parts[v]].channels;
+    };
+    const auto value = [&](std::size_t column, std::size_t v) {
+        return columns[column].subspan(v * widths[column], widths[column]);
+    };
+    return find_first_same(
+        columns[0].size() / widths[0],
+        [&](SeededHash& hash, std::size_t v) {
+            hash.add(channels_of(v));
+            for (std::size_t c = 0; c < columns.size(); ++c)
+                for (auto left = value(c, v); !left.empty();
+                     left = left.subspan(std::min<std::size_t>(left.size(), 8))) {
+                    std::uint64_t word = 0;
+                    std::memcpy(&word, left.data(), std::min<std::size_t>(left.size(), sizeof word));
+                    hash.add(word);
+                }
+        },
+        [&](std::size_t a, std::size_t b) {
+            for (std::size_t c = 0; c < columns.size(); ++c)
+                if (std::memcmp(value(c, a).data(), value(c, b).data(), widths[c]) != 0) return false;
+            return channels_of(a) == channels_of(b);
+        });
+}
 
 std::vector<std::byte> pack(const SourceDocument& document) {
     std::size_t room = 0; // so that tables are not copied while they grow

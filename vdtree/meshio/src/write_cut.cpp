@@ -8,6 +8,7 @@
 
 #include "kept_arrays.h"
 #include "mesh_writers.h"
+#include "obj_lines.h"
 #include "restore.h"
 
 namespace unseen::meshio {
@@ -76,55 +77,80 @@ namespace {
 
 class ObjWriter {
 public:
-    ObjWriter(FileOutput& out, const ExtractedMesh& extracted, const SourceDocument& document,
+    ObjWriter(FileOutput& out, const VertexTree& tree, const ExtractedMesh& extracted, const SourceDocument& document,
               const std::vector<RestoredPart>& parts)
-        : out_(out), extracted_(extracted), document_(document), parts_(parts) {}
+        : out_(out), tree_(tree), extracted_(extracted), document_(document), parts_(parts) {}
 
     void write() {
         for (const File& file : document_.files)
             if (file.use == File::Use::library) out_.text("mtllib " + one_line(file.uri) + "\n");
-        write_positions();
+        const std::vector<glm::vec4> colours = colours_of_vertices();
+        const ObjLines positions(nodes_of(tree_, extracted_), colours);
+        write_positions(positions, colours);
+        std::vector<glm::vec2> uvs;
+        std::vector<glm::vec3> normals;
+        for (const RestoredPart& restored : parts_) {
+            append(uvs, restored.uvs, restored);
+            append(normals, "NORMAL", restored);
+        }
+        const ObjLines uv_lines{std::span<const glm::vec2>(uvs)}, normal_lines{std::span<const glm::vec3>(normals)};
+        uv_lines.write(out_, "vt", uvs, 2);
+        normal_lines.write(out_, "vn", normals, 3);
+        write_faces(positions, uv_lines, normal_lines);
+    }
+
+private:
+    void write_faces(const ObjLines& positions, const ObjLines& uvs, const ObjLines& normals) {
         const SourceDocument::Part* before = nullptr;
+        std::size_t first_uv = 0, first_normal = 0;
         for (const RestoredPart& restored : parts_) {
             const SourceDocument::Part& part = document_.parts[restored.part];
-            const std::uint64_t first_uv = write_vectors("vt", restored.uvs, restored, uvs_);
-            const std::uint64_t first_normal = write_vectors("vn", "NORMAL", restored, normals_);
             write_name("o", part.object, before ? before->object : std::string());
             write_name("g", part.group, before ? before->group : std::string());
             write_name("usemtl", part.material, before ? before->material : std::string());
             before = &part;
+            const bool has_uvs = channel(restored.uvs, 2, restored), has_normals = channel("NORMAL", 3, restored);
             for (const Triangle& triangle : restored.triangles) {
                 out_.text("f");
-                for (const Index corner : triangle) {
-                    out_.text(" ");
-                    out_.number(std::uint64_t{restored.vertices[corner]} + 1);
-                    if (first_uv || first_normal) out_.text("/");
-                    if (first_uv) out_.number(first_uv + corner);
-                    if (first_normal) out_.text("/");
-                    if (first_normal) out_.number(first_normal + corner);
-                }
+                for (const Index corner : triangle)
+                    write_obj_corner(out_, positions.number(restored.vertices[corner]),
+                                     has_uvs ? uvs.number(first_uv + corner) : 0,
+                                     has_normals ? normals.number(first_normal + corner) : 0);
                 out_.text("\n");
             }
+            if (has_uvs) first_uv += restored.vertices.size();
+            if (has_normals) first_normal += restored.vertices.size();
         }
     }
 
-private:
-    const std::vector<float>* channel(const std::string& name, const RestoredPart& restored,
-                                      std::size_t& components) const {
+    // Of so many components at least; null: the part has it not.
+    const std::vector<float>* channel(const std::string& name, std::size_t least, const RestoredPart& restored,
+                                      std::size_t* components = nullptr) const {
         for (std::size_t c = 0; c < restored.channels.size(); ++c) {
-            if (document_.channels[c].name != name || restored.channels[c].empty()) continue;
-            components = document_.channels[c].components;
+            const SourceDocument::Channel& channel = document_.channels[c];
+            if (channel.name != name || channel.components < least || restored.channels[c].empty()) continue;
+            if (components) *components = channel.components;
             return &restored.channels[c];
         }
         return nullptr;
     }
 
-    void write_positions() {
-        constexpr glm::vec4 none(-1);
+    template <class Vector>
+    void append(std::vector<Vector>& to, const std::string& name, const RestoredPart& restored) const {
+        std::size_t components = 0;
+        const std::vector<float>* values = channel(name, Vector::length(), restored, &components);
+        for (std::size_t i = 0; values && i < values->size(); i += components) {
+            Vector& value = to.emplace_back();
+            for (int k = 0; k < Vector::length(); ++k) value[k] = (*values)[i + static_cast<std::size_t>(k)];
+        }
+    }
+
+    // Empty: there are none. A vertex without one has none.
+    std::vector<glm::vec4> colours_of_vertices() const {
         std::vector<glm::vec4> colours;
         for (const RestoredPart& restored : parts_) {
             std::size_t components = 0;
-            const std::vector<float>* values = channel("COLOR_0", restored, components);
+            const std::vector<float>* values = channel("COLOR_0", 1, restored, &components);
             if (!values) continue;
             colours.resize(extracted_.wedges.size(), none);
             for (std::size_t i = 0; i < restored.vertices.size(); ++i) {
@@ -133,9 +159,13 @@ private:
                     colour[static_cast<int>(k)] = (*values)[i * components + k];
             }
         }
+        return colours;
+    }
+
+    void write_positions(const ObjLines& positions, const std::vector<glm::vec4>& colours) {
         const bool has_alpha =
             std::any_of(colours.begin(), colours.end(), [&](glm::vec4 c) { return c != none && c.a != 1; });
-        for (std::size_t v = 0; v < extracted_.wedges.size(); ++v) {
+        positions.for_each([&](std::size_t v) {
             out_.text("v");
             for (int k = 0; k < 3; ++k) { // floats in as few digits as theirs
                 const double x = extracted_.mesh.positions[v][k];
@@ -148,32 +178,20 @@ private:
                 out_.number(k < 3 ? linear_to_srgb(colours[v][k]) : colours[v].a);
             }
             out_.text("\n");
-        }
-    }
-
-    // The number of the first, or 0: there are none.
-    std::uint64_t write_vectors(const char* keyword, const std::string& name, const RestoredPart& restored,
-                                std::uint64_t& count) {
-        std::size_t components = 0;
-        const std::vector<float>* values = channel(name, restored, components);
-        if (!values) return 0;
-        for (std::size_t i = 0; i < values->size(); i += components) {
-            out_.text(keyword);
-            out_.numbers(&(*values)[i], static_cast<int>(components));
-            out_.text("\n");
-        }
-        return std::exchange(count, count + values->size() / components) + 1;
+        });
     }
 
     void write_name(const char* keyword, const std::string& name, const std::string& before) {
         if (name != before) out_.text(std::string(keyword) + " " + one_line(name) + "\n");
     }
 
+    static constexpr glm::vec4 none = glm::vec4(-1);
+
     FileOutput& out_;
+    const VertexTree& tree_;
     const ExtractedMesh& extracted_;
     const SourceDocument& document_;
     const std::vector<RestoredPart>& parts_;
-    std::uint64_t uvs_ = 0, normals_ = 0; // so far
 };
 
 // ---- any format
@@ -207,7 +225,7 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
         return write_mesh_with(file, extracted.mesh.view(), {}, notes);
     }
     if (const auto written = write_beside(file, document, notes); !written) return written;
-    return write_file(file, [&](FileOutput& out) { ObjWriter(out, extracted, document, *parts).write(); });
+    return write_file(file, [&](FileOutput& out) { ObjWriter(out, cut.tree(), extracted, document, *parts).write(); });
 }
 
 Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocument& document,
@@ -218,7 +236,7 @@ Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocum
     const auto arrays =
         is_held ? arrays_of_cut(cut, extracted, document.arrays) : Result<std::vector<VertexArray>>(document.arrays);
     if (!arrays) return arrays.error();
-    return write_mesh_with(file, extracted.mesh.view(), *arrays, notes);
+    return write_mesh_with(file, extracted.mesh.view(), *arrays, notes, {}, nodes_of(cut.tree(), extracted));
 }
 
 } // namespace
@@ -228,7 +246,8 @@ Result<std::vector<Message>> write_cut(const fs::path& file, const Cut& cut) {
     const auto bytes = cut.tree().document();
     Result<void> written;
     if (bytes.empty()) {
-        written = write_mesh_with(file, extract_mesh(cut).view(), {}, notes);
+        const ExtractedMesh extracted = extract_with_sources(cut);
+        written = write_mesh_with(file, extracted.mesh.view(), {}, notes, {}, nodes_of(cut.tree(), extracted));
     } else {
         written = guarded_writing([&]() -> Result<void> {
             auto document = unpack(bytes);

@@ -38,8 +38,10 @@ Result<void> validate(const MeshView& mesh) {
             if (corner >= vertices)
                 return invalid("Triangle " + std::to_string(i) + " of the mesh uses vertex " + std::to_string(corner) +
                                ", but there are only " + std::to_string(vertices) + "; correct its indices.");
-    for (const auto& [name, length] :
-         {std::pair("normals", mesh.normals.size()), {"colours", mesh.colours.size()}, {"UVs", mesh.uvs.size()}})
+    for (const auto& [name, length] : {std::pair("normals", mesh.normals.size()),
+                                       {"colours", mesh.colours.size()},
+                                       {"UVs", mesh.uvs.size()},
+                                       {"numbers of further values", mesh.further.size()}})
         if (length != 0 && length != vertices)
             return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
                            " vertices; give one for each vertex or none.");

@@ -69,6 +69,9 @@ struct MeshView {
     // By triangle, or empty: the file does not state any. Decides how computed normals are shared: triangles of one group
     // share at any angle, those of different groups never, and those of group 0 are flat.
     std::span<const Index> smoothing = {};
+    // By vertex, or empty: a number that vertices share whose values in the document are equal. Others stay apart, so that
+    // cuts can be written with these values.
+    std::span<const Index> further = {};
 };
 
 // A triangle soup that owns its arrays.
@@ -82,9 +85,10 @@ struct Mesh {
     Texture texture;
     std::vector<std::byte> document;
     std::vector<Index> smoothing;
+    std::vector<Index> further;
 
     MeshView view() const {
-        return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document, smoothing};
+        return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document, smoothing, further};
     }
 };
 

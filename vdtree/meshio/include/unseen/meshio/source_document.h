@@ -121,6 +121,10 @@ struct SourceDocument {
     std::vector<VertexArray> arrays = {};         // all as long as the mesh has vertices; names are unique
 };
 
+// MeshView::further: by vertex of the mesh, the first with the same values and attributes in the document. Empty if the
+// document has no values. The vertices' parts must be known. Cost: one pass over the values.
+std::vector<std::uint32_t> further_values(const SourceDocument& document);
+
 // As bytes that unpack() takes; docs/file-format.md describes them.
 std::vector<std::byte> pack(const SourceDocument& document);
 
