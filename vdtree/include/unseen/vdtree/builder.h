@@ -73,7 +73,8 @@ struct BuildOptions {
     bool prelit = false;
     // Where the mesh states neither normals nor smoothing groups, edges between faces at a larger angle are hard, from 0
     // (all) to 180 degrees (none). Not given: 30, or 60 if the mesh looks organic, which 30 would facet: if it has more
-    // than 2.5 times as many edges above 30 degrees as above 60.
+    // than 2.5 times as many edges above 30 degrees as above 60. Then no edge is hard if those above 60 degrees are at places
+    // with less than 0.5% of the area, as noise of scans is.
     std::optional<float> crease = {};
     int threads = 0;                  // 0: one for each core. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader dropped; added to the tree's count
