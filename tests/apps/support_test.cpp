@@ -1,11 +1,13 @@
 // Numbers, drawings, plots and scales: ink where it belongs, and none outside.
 
+#include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/number_format.h>
 
 #include "colour_bar.h"
 #include "drawing.h"
 #include "panel_plot.h"
 #include "screen_text.h"
+#include "seamed_mesh.h"
 #include "temp_folder.h"
 #include "testing.h"
 
@@ -42,6 +44,34 @@ Extent inked(const Image& image) {
                 extent = {std::min(extent.left, x), std::min(extent.top, y), std::max(extent.right, x),
                           std::max(extent.bottom, y)};
     return extent;
+}
+
+// Closed, oriented outward, with vertices that share places; no triangle lies across charts, and no normal is bent far.
+TEST(SeamedMeshes, AreWhatTheirNamesSay) {
+    for (const auto& [mesh, triangles, has_charts] : {std::tuple{helmet(), 20'840u, true},
+                                                      {charted_ball(), 9'024u, true},
+                                                      {gear(), 40'320u, false},
+                                                      {hard_boxes(), 15'360u, false}}) {
+        EXPECT_EQ(mesh.triangles.size(), triangles);
+        EXPECT_EQ(mesh.texture.texels.empty(), !has_charts) << triangles;
+        const auto tree = require(vdtree::build_tree(mesh.view()));
+        EXPECT_EQ(tree->closedness(), vdtree::Closedness::closed_outward) << triangles;
+        EXPECT_GT(tree->leaf_count(), tree->place_count()) << triangles;
+        EXPECT_EQ(tree->triangle_count(), triangles);
+        double widest = 0, least = 1; // of a triangle in the texture; the cosine between a normal and its face
+        for (const vdtree::Triangle& t : mesh.triangles) {
+            const auto p = [&](std::size_t k) { return mesh.positions[t[k]]; };
+            const glm::dvec3 face = glm::normalize(glm::cross(p(1) - p(0), p(2) - p(0)));
+            for (std::size_t k = 0; k < 3; ++k) {
+                least = std::min(least, glm::dot(face, glm::dvec3(mesh.normals[t[k]])));
+                if (!has_charts) continue;
+                const glm::dvec2 edge(mesh.uvs[t[(k + 1) % 3]] - mesh.uvs[t[k]]);
+                widest = std::max({widest, std::abs(edge.x), std::abs(edge.y)});
+            }
+        }
+        EXPECT_LT(widest, 0.05) << triangles;
+        EXPECT_GT(least, 0.8) << triangles;
+    }
 }
 
 TEST(Numbers, AreWrittenOut) {
