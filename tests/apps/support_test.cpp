@@ -69,8 +69,8 @@ TEST(SeamedMeshes, AreWhatTheirNamesSay) {
                 widest = std::max({widest, std::abs(edge.x), std::abs(edge.y)});
             }
         }
-        EXPECT_LT(widest, 0.05) << triangles;
-        EXPECT_GT(least, 0.8) << triangles;
+        EXPECT_LT(widest, 0.06) << triangles;
+        EXPECT_GT(least, 0.6) << triangles;
     }
 }
 
