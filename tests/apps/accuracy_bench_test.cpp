@@ -1,4 +1,6 @@
 // unseen-bench accuracy, on a mesh so small that the figures mean little: every axis is there, with its default.
+#include <glm/vec3.hpp>
+
 #include "run_bench.h"
 
 namespace accuracy_bench_test {
