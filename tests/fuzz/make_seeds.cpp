@@ -122,7 +122,10 @@ void make_trees(const fs::path& folder) {
                                                    {"triangle", shapes::single_triangle()},
                                                    {"attributes", shapes::with_attributes(shapes::icosphere(1))},
                                                    {"document", with_document(shapes::icosphere(1))},
-                                                   {"values", with_values(shapes::icosphere(1))}};
+                                                   {"values", with_values(shapes::icosphere(1))},
+                                                   {"box", shapes::cube(2)}, // with wedges at its edges
+                                                   {"box_document", with_document(shapes::cube(2))},
+                                                   {"box_values", with_values(shapes::cube(2))}};
     for (const auto& [name, mesh] : meshes) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);

@@ -19,12 +19,13 @@ namespace {
 
 // What a mesh's file said beyond triangles, as far as it goes without writing files.
 void restore_document(const unseen::vdtree::VertexTree& tree) {
-    const auto document = unseen::meshio::unpack(tree.document());
+    const auto document = unseen::meshio::document_of(tree);
     if (!document) return;
     unseen::vdtree::Cut cut(tree);
     cut.unfold_all();
     const auto extracted = extract_with_sources(cut);
     const std::vector<std::string> uvs(document->parts.size(), "TEXCOORD_0");
+    (void)unseen::meshio::nodes_of(tree, extracted);
     (void)unseen::meshio::restore(cut, extracted, *document, uvs).has_value();
     (void)unseen::meshio::arrays_of_cut(cut, extracted, document->arrays).has_value();
 }

@@ -8,6 +8,8 @@
 #include <unseen/vdtree/tree_io.h>
 
 #include "built.h"
+#include "kept_arrays.h"
+#include "restore.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "testing.h"
@@ -48,6 +50,7 @@ VertexTree textured() {
     mesh.texture = textures::noise(8, 8, 1);
     return built(mesh);
 }
+VertexTree edged() { return built(shapes::cube(4)); }           // which has several wedges at its edges
 VertexTree open_and_large() { return built(shapes::grid(48)); } // in several parts for several threads
 
 class DamagedTrees : public ::testing::TestWithParam<Kind> {
@@ -121,6 +124,73 @@ TEST_P(DamagedTrees, AreToldWithTheSection) {
     expect_fault("source_vertices", 1, 0xffffffff, "source vertex");
 }
 
+// Values of a table, by vertex, as writers gather them.
+void expect_values_or_error(const VertexTree& tree) {
+    Cut cut(tree);
+    cut.unfold_ancestors(tree.node_count() / 2);
+    const ExtractedMesh extracted = extract_with_sources(cut);
+    std::vector<meshio::VertexArray> arrays(1);
+    arrays[0] = {.name = "v", .values = std::vector<std::byte>(4 * std::size_t{tree.source_vertex_count()})};
+    const auto found = meshio::arrays_of_cut(cut, extracted, arrays);
+    if (found) EXPECT_EQ((*found)[0].size(), extracted.wedges.size());
+    EXPECT_EQ(meshio::nodes_of(tree, extracted).size(), extracted.wedges.size());
+}
+
+// One value of one of the arrays that hold wedges, every one in turn.
+TEST(DamagedWedges, LeadNobodyOutOfBounds) {
+    const support::TempFolder folder;
+    const auto file = folder / "tree.vdt";
+    const VertexTree tree = built(shapes::cube(2));
+    ASSERT_TRUE(tree.has_seams());
+    ASSERT_TRUE(write_tree(file, tree));
+    const TreeFile honest = TreeFile::parse(support::read_bytes(file));
+    int refused = 0, folded = 0, harmless = 0;
+    for (const char* section : {"first_wedge", "leaf_places", "wedge_ranks"}) {
+        const std::size_t count = TreeFile(honest)[section].count();
+        ASSERT_GT(count, 20u) << section;
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto was = TreeFile(honest)[section].get<std::uint32_t>(i);
+            for (const std::uint32_t now : {0u, was - 1, was + 1, was + 7, 0x7fffffffu, 0xffffffffu}) {
+                if (now == was) continue;
+                TreeFile damaged = honest;
+                damaged[section].set(i, now);
+                support::write_bytes(file, damaged.bytes());
+                for (const bool maps : {false, true}) {
+                    const auto opened = maps ? map_tree(file) : read_tree(file);
+                    if (!opened) {
+                        ++refused;
+                        EXPECT_THAT(opened.error().message, HasSubstr("Build the tree again")) << section;
+                        continue;
+                    }
+                    ASSERT_TRUE(support::use_everything(*opened)) << section << ' ' << i << ": " << now;
+                    expect_values_or_error(*opened);
+                    ++(opened->check() ? harmless : folded);
+                }
+            }
+        }
+    }
+    EXPECT_GT(refused, 100);
+    EXPECT_GT(folded, 100);
+    EXPECT_GT(harmless, 10) << "ranks in another order";
+}
+
+// Arrays that are there in part, or of another length.
+TEST(DamagedWedges, OfOtherLengthsAreRefused) {
+    const support::TempFolder folder;
+    const auto file = folder / "tree.vdt";
+    ASSERT_TRUE(write_tree(file, built(shapes::cube(2))));
+    const TreeFile honest = TreeFile::parse(support::read_bytes(file));
+    for (const char* section : {"first_wedge", "leaf_places", "wedge_ranks"})
+        for (const int bytes : {-4, 4, 0}) { // 0: none is left
+            TreeFile damaged = honest;
+            std::string& data = damaged[section].data;
+            data.resize(bytes == 0 ? 0 : data.size() + static_cast<std::size_t>(bytes));
+            support::write_bytes(file, damaged.bytes());
+            EXPECT_FALSE(read_tree(file)) << section << ' ' << bytes;
+            EXPECT_FALSE(map_tree(file)) << section << ' ' << bytes;
+        }
+}
+
 // What passes costs nothing more, and is what was written.
 TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
     const auto tree = require(mapped(honest()));
@@ -132,7 +202,7 @@ TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
 
 INSTANTIATE_TEST_SUITE_P(All, DamagedTrees,
                          ::testing::Values(Kind{"plain", plain}, Kind{"coloured", coloured}, Kind{"textured", textured},
-                                           Kind{"marked", marked}, Kind{"large", open_and_large}),
+                                           Kind{"marked", marked}, Kind{"edged", edged}, Kind{"large", open_and_large}),
                          [](const auto& kind) { return kind.param.name; });
 
 } // namespace unseen::vdtree::damaged_tree_test

@@ -92,7 +92,7 @@ public:
         SourceDocument document;
         std::vector<std::string> uvs;
         if (const auto bytes = levels.cuts[0]->tree().document(); !bytes.empty()) {
-            auto unpacked = unpack(bytes);
+            auto unpacked = document_of(levels.cuts[0]->tree());
             if (!unpacked) return unpacked.error();
             document = std::move(*unpacked);
         }
@@ -317,7 +317,7 @@ private:
         const auto [known, is_new] = written_as_.try_emplace(std::move(look));
         if (!is_new) return of_cut->second = known->second;
         const std::uint64_t before = file_.bytes();
-        const auto document = unpack(cut.tree().document());
+        const auto document = document_of(cut.tree());
         if (!document) return document.error();
         if (document->format != SourceDocument::Format::gltf) fail("it is of another format.");
         auto restored = restore(cut, extracted, *document, drawn_uvs(*document));

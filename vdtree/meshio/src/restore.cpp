@@ -68,8 +68,12 @@ private:
             const glm::dvec3 p = extracted_.mesh.positions[v];
             out.positions.emplace_back(frame.from_world * glm::dvec4(p, 1.0));
             for (std::size_t c = 0; c < out.channels.size(); ++c)
-                if (part.channels >> c & 1) append(out.channels[c], c, v, out, frame);
+                if ((part.channels >> c & 1) || is_normal(c)) append(out.channels[c], c, v, out, frame);
         }
+    }
+
+    bool is_normal(std::size_t channel) const {
+        return document_.channels[channel].name == "NORMAL" && document_.channels[channel].components == 3;
     }
 
     // Leaves of one wedge have one material, and so they are drawn in one way. But some may lack an attribute that others
@@ -83,13 +87,13 @@ private:
         const Part& part = document_.parts[of.part];
         const SourceDocument::Channel& channel = document_.channels[number];
         const std::size_t size = channel.components;
-        const bool is_normal = channel.name == "NORMAL" && size == 3;
         const WedgeId wedge = extracted_.wedges[vertex];
         const Index first = leaves_.begin(wedge), end = leaves_.end(wedge);
         const auto source = [&](Index rank) { return tree_.source_vertices()[leaves_.leaf(rank)]; };
-        if (wedge >= tree_.interior_wedge_count() && (frame.has_inverse || !is_normal)) { // as it was
-            for (std::size_t k = 0; k < size; ++k) to.push_back(channel.values[source(first) * size + k]);
-            return;
+        if (wedge >= tree_.interior_wedge_count() && (frame.has_inverse || !is_normal(number))) { // as it was
+            const auto own = std::span(channel.values).subspan(source(first) * size, size);
+            const bool is_missing = is_normal(number) && std::ranges::count(own, 0.0f) == 3;
+            if (!is_missing) return void(to.insert(to.end(), own.begin(), own.end()));
         }
         std::array<double, 4> values{};
         Index count = 0;
@@ -102,10 +106,11 @@ private:
         for (double& value : values) value /= std::max<Index>(count, 1);
         const bool have_all = count == end - first;
         const Mesh& mesh = extracted_.mesh;
-        if (is_normal) {
+        if (is_normal(number)) {
             const glm::dvec3 n = frame.normal_from_world * glm::dvec3(mesh.normals[vertex]);
             const double length = glm::length(n);
-            for (int k = 0; k < 3; ++k) values[static_cast<std::size_t>(k)] = length > 0 ? n[k] / length : 0.0;
+            for (int k = 0; k < 3; ++k) // of unit length, even where no triangle around has a normal
+                values[static_cast<std::size_t>(k)] = length > 0 ? n[k] / length : k == 2;
         } else if (channel.name == of.uvs && have_all && size == 2 && !mesh.uvs.empty()) {
             const double determinant = glm::determinant(part.drawn_uv.linear);
             if (determinant != 0 && std::isfinite(1 / determinant)) {
@@ -131,6 +136,18 @@ private:
 };
 
 } // namespace
+
+Result<SourceDocument> document_of(const VertexTree& tree) {
+    auto document = unpack(tree.document());
+    if (!document || document->format == SourceDocument::Format::table) return document;
+    auto& channels = document->channels;
+    const bool has_normals = std::ranges::any_of(
+        channels, [](const SourceDocument::Channel& c) { return c.name == "NORMAL" && c.components == 3; });
+    constexpr std::size_t most = 32; // bits of Part::channels
+    if (!has_normals && channels.size() < most)
+        channels.push_back({"NORMAL", 3, std::vector<float>(3 * document->vertex_parts.size(), 0.0f)});
+    return document;
+}
 
 Result<LeafRuns> leaves_of_wedges(const VertexTree& tree, std::size_t vertices) {
     if (const auto sound = SoundTree::of(tree); !sound) return sound.error();

@@ -9,6 +9,10 @@
 
 namespace unseen::meshio {
 
+// A tree's document. It has a channel for normals even where the file states none: cuts are written with those that they
+// are drawn with.
+Result<SourceDocument> document_of(const vdtree::VertexTree& tree);
+
 // The leaves that each wedge stands for. Fails for a damaged tree, and unless its mesh had that many vertices. The tree
 // must outlive the result. Cost: that of SoundTree::of(), and the wedges.
 Result<vdtree::LeafRuns> leaves_of_wedges(const vdtree::VertexTree& tree, std::size_t vertices);
@@ -29,10 +33,10 @@ struct RestoredPart {
 // By part of a document as it was packed: the channel of the texture coordinates that are drawn.
 std::vector<std::string> drawn_uvs(const SourceDocument& document);
 
-// Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of
-// proxies follow from the mesh that was drawn, and else are the means of the vertices that they stand for, of those
-// that have the attribute. `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other.
-// Cost: the cut's triangles, and the tree's leaves.
+// Parts of which nothing is left are left out. All have normals. Vertices of the mesh come with the values that they had;
+// normals that they had not, and normals and drawn values of proxies, follow from the mesh that was drawn. Other values of
+// proxies are the means of the vertices that they stand for, of those that have the attribute.
+// `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other. Cost: the cut's triangles, and the tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs);
 

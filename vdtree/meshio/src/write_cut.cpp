@@ -250,7 +250,7 @@ Result<std::vector<Message>> write_cut(const fs::path& file, const Cut& cut) {
         written = write_mesh_with(file, extracted.mesh.view(), {}, notes, {}, nodes_of(cut.tree(), extracted));
     } else {
         written = guarded_writing([&]() -> Result<void> {
-            auto document = unpack(bytes);
+            auto document = document_of(cut.tree());
             if (!document) return document.error();
             if (document->format == SourceDocument::Format::table) return write_table(file, cut, *document, notes);
             return write_document(file, cut, std::move(*document), notes);

@@ -352,9 +352,10 @@ private:
         uvs_ = select(std::span<const glm::vec2>(uvs_), given);
         colours_ = select(std::span<const glm::vec4>(colours_), given);
         const std::vector<Index> materials = select(places_->materials(), given);
-        WedgeArrays wedges =
-            find_wedges(nodes_.shape, *parts_, positions_,
-                        {first_leaf, triangles, order_.first_triangle, normals, uvs_, colours_, materials}, ancestors);
+        const std::vector<Index> further = select(places_->further(), given);
+        WedgeArrays wedges = find_wedges(
+            nodes_.shape, *parts_, positions_,
+            {first_leaf, triangles, order_.first_triangle, normals, uvs_, colours_, materials, further}, ancestors);
         if (!wedges.leaf_numbers.empty())
             for (Triangle& t : triangles)
                 for (Index& leaf : t) leaf = wedges.leaf_numbers[leaf];

@@ -1,5 +1,6 @@
 #include "build/leaves.h"
 
+#include <atomic>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -131,13 +132,20 @@ void PlaceMesh::gather_leaves(const CornerNormals& found) {
     const auto material_of = [&](Index corner) {
         return triangle_materials_.empty() ? 0 : triangle_materials_[corner / 3];
     };
-    // Corners with equal keys share a leaf.
-    using Key = std::tuple<Index, Index, float, float, float, float, float, float>;
+    // Corners with equal keys share a leaf. Further values come last, so that keys which differ by them alone follow each
+    // other.
+    using Key = std::tuple<Index, Index, float, float, float, float, float, float, Index>;
+    constexpr std::size_t last = std::tuple_size_v<Key> - 1;
+    const auto differ_by_last_alone = [](Key a, const Key& b) {
+        std::get<last>(a) = std::get<last>(b);
+        return a == b;
+    };
     const auto key_of = [&](Index corner) {
         const Index v = vertex_of(corner);
         const glm::vec2 uv = source_.uvs.empty() ? glm::vec2(0) : source_.uvs[v];
         const glm::vec4 c = source_.colours.empty() ? glm::vec4(0) : source_.colours[v];
-        return Key(material_of(corner), found.number[corner], uv.x, uv.y, c.r, c.g, c.b, c.a);
+        const Index further = source_.further.empty() ? 0 : source_.further[v];
+        return Key(material_of(corner), found.number[corner], uv.x, uv.y, c.r, c.g, c.b, c.a, further);
     };
     struct Leaf {
         Index vertex, corner; // the first ones
@@ -145,6 +153,7 @@ void PlaceMesh::gather_leaves(const CornerNormals& found) {
     // Within its run, each corner gets the number of its leaf at the place.
     std::vector<Index> local(by_place.corners.size()), counts(places + 1, 0);
     std::vector<Leaf> first_corners(by_place.corners.size()); // by place, where its corners are
+    std::atomic<bool> needs_further = false;
     constexpr Index grain = 1024;
     parallel_loop_over(tbb::blocked_range<Index>(0, places, grain), [&](const auto& range) {
         std::vector<std::pair<Key, Index>> keys;
@@ -158,8 +167,10 @@ void PlaceMesh::gather_leaves(const CornerNormals& found) {
             std::vector<Index>& of_corner = local;
             for (std::size_t i = 0; i < keys.size(); ++i) {
                 const Index corner = keys[i].second, v = vertex_of(corner);
-                if (i == 0 || keys[i].first != keys[i - 1].first)
+                if (i == 0 || keys[i].first != keys[i - 1].first) {
                     order.emplace_back(v, corner, static_cast<Index>(order.size()));
+                    if (i > 0 && differ_by_last_alone(keys[i].first, keys[i - 1].first)) needs_further = true;
+                }
                 auto& [vertex, first, number] = order.back();
                 if (v < vertex) vertex = v;
                 of_corner[start + i] = number;
@@ -181,6 +192,7 @@ void PlaceMesh::gather_leaves(const CornerNormals& found) {
     const Index leaves = counts.back();
     sources_.resize(leaves), normals_.resize(leaves), places_.resize(leaves);
     if (!triangle_materials_.empty()) materials_.resize(leaves);
+    if (needs_further) further_.resize(leaves);
     leaf_triangles_.resize(mesh_.triangles.size());
     for (Index place = 0; place < places; ++place) {
         for (Index i = by_place.start[place]; i < by_place.start[place + 1]; ++i) {
@@ -193,6 +205,7 @@ void PlaceMesh::gather_leaves(const CornerNormals& found) {
             sources_[leaf] = first.vertex;
             normals_[leaf] = found.normals[found.number[first.corner]];
             if (!materials_.empty()) materials_[leaf] = material_of(first.corner);
+            if (!further_.empty()) further_[leaf] = source_.further[first.vertex];
         }
     }
     first_leaf_ = std::move(counts);

@@ -33,6 +33,8 @@ public:
     std::span<const Index> sources() const { return sources_; }     // by leaf: the first of its vertices
     std::span<const glm::vec3> normals() const { return normals_; } // unit length or zero
     std::span<const Index> materials() const { return materials_; } // empty: one for all
+    // MeshView::further; empty unless leaves at one place differ by it alone.
+    std::span<const Index> further() const { return further_; }
     std::span<const Index> places() const { return places_; }
     std::span<const Triangle> triangles() const { return has_seams() ? leaf_triangles_ : mesh_.triangles; }
 
@@ -52,7 +54,7 @@ private:
     MeshView mesh_;
     bool is_split_ = false; // several vertices at one place
 
-    std::vector<Index> first_leaf_, sources_, places_, materials_;
+    std::vector<Index> first_leaf_, sources_, places_, materials_, further_;
     std::vector<Index> triangle_materials_; // empty: one for all
     std::vector<glm::vec3> normals_;
     Creases creases_;

@@ -30,8 +30,8 @@ constexpr std::size_t most_wedges_with_dead = 8;
 // Above this many, neighbours in order stand in for the nearest: looking at all pairs takes the square of the time.
 constexpr std::size_t most_compared = 64;
 
-constexpr std::size_t most_classes = 3, most_channels_of_class = 4;
-enum class Kind { normal, uv, colour };
+constexpr std::size_t most_classes = 4, most_channels_of_class = 4;
+enum class Kind { normal, uv, colour, further };
 
 // What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g, w d, and of
 // the values at the corners themselves.
@@ -140,6 +140,7 @@ private:
         classes_.push_back({Kind::normal, 3, normal_scale});
         if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, 2, texture_scale * texture_density()});
         if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, 4, colour_scale});
+        if (!mesh_.further.empty()) classes_.push_back({Kind::further, 0, 0}); // without a value at proxies
     }
 
     // The length in the unit box that one unit of texture coordinates covers, on average; 0 where they cover nothing.
@@ -166,6 +167,7 @@ private:
         switch (c.kind) {
         case Kind::normal: return {glm::dvec3(mesh_.normals[leaf]), 0};
         case Kind::uv: return {glm::dvec2(mesh_.uvs[leaf]), 0, 0};
+        case Kind::further: return {mesh_.further[leaf], 0, 0, 0};
         case Kind::colour: break;
         }
         return glm::dvec4(mesh_.colours[leaf]);
@@ -288,6 +290,7 @@ private:
     // What a class has on the triangles at a leaf.
     Component component_of(const Class& c, Index leaf) const {
         Component sum;
+        if (c.channels == 0) return {.corner_weight = 1};
         constexpr double least_area = 1e-12; // of the unit box: leaves on slivers have a mean, too
         for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) {
             const Triangle& t = mesh_.triangles[around_[i]];
@@ -604,6 +607,7 @@ private:
             switch (classes_[c].kind) {
             case Kind::normal: out_.normals[w] = PackedNormal::nearest(glm::vec3(value)); break;
             case Kind::uv: out_.uvs[w] = glm::vec2(value); break;
+            case Kind::further: break;
             case Kind::colour: out_.colours[w] = glm::vec4(glm::clamp(value, 0.0, 1.0)); break;
             }
         }

@@ -21,6 +21,7 @@ struct LeafMesh {
     std::span<const glm::vec2> uvs;     // empty if the mesh has none; likewise the next
     std::span<const glm::vec4> colours;
     std::span<const Index> materials;
+    std::span<const Index> further = {}; // numbers of values that are not drawn
 };
 
 // By wedge.
