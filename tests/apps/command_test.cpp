@@ -298,8 +298,8 @@ TEST_F(BuildTest, LeavesOutBadFacesWhereAsked) {
 
 TEST_F(BuildTest, WeldsStlUnlessAskedNotTo) {
     write_text(path("m.stl"), "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
-                              "endloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 1 0 0\nvertex 1 1 0\n"
-                              "vertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+                              "endloop\nendfacet\nfacet normal 0 1 1\nouter loop\nvertex 1 0 0\nvertex 1 1 0\n"
+                              "vertex 0 1 0\nendloop\nendfacet\nendsolid\n"); // not the normal of its face
     const Outcome welded = run({"build", "m.stl", "-o", "m.vdt"});
     EXPECT_THAT(welded.err, AllOf(HasSubstr("6 vertices"), HasSubstr("welded to 4"), HasSubstr("--no-weld")));
     EXPECT_EQ(run({"info", "m.vdt", "--json"}).json()["vertices"], 4);
