@@ -158,14 +158,17 @@ TEST(Seams, CostNothingAlongThemAndTheirTextureAcross) {
         {{{n, 4, 0}, {n, 5, 0}}, {n, 4.5, 0}},          // along the seam
         {{{n, 10, 0}, {n - 1, 10, 0}}, {n - 1, 10, 0}}, // the seam pulled to one side
     };
-    const Measured measured(seamed_sheet(n, textures::checkerboard(256, 256, 8, 0, 255)), merges, true);
-    ASSERT_EQ(measured.textures.size(), 2u);
-    EXPECT_LT(measured.textures[0].slide, 1e-4f);
-    EXPECT_LT(largest_contrast(measured.textures[0]), 1e-3f);
-    EXPECT_LT(largest_amplitude(measured.folds[0]), 1e-3f);
-    EXPECT_LT(measured.folds[0].largest_luminance, 1e-3f);
-    EXPECT_GT(largest_amplitude(measured.folds[1]), 0.1f);
-    for (const FoldRecord& fold : measured.folds) EXPECT_LT(fold.shift, 1e-5f);
+    // Without an image there may be others, such as a normal map.
+    for (const Texture& texture : {textures::checkerboard(256, 256, 8, 0, 255), Texture()}) {
+        const Measured measured(seamed_sheet(n, texture), merges, true);
+        ASSERT_EQ(measured.textures.size(), 2u);
+        EXPECT_LT(measured.textures[0].slide, 1e-4f);
+        EXPECT_LT(largest_contrast(measured.textures[0]), 1e-3f);
+        EXPECT_LT(largest_amplitude(measured.folds[0]), 1e-3f);
+        EXPECT_LT(measured.folds[0].largest_luminance, 1e-3f);
+        EXPECT_GT(largest_amplitude(measured.folds[1]), 0.05f);
+        for (const FoldRecord& fold : measured.folds) EXPECT_LT(fold.shift, 1e-5f);
+    }
 }
 
 // A disc of so many spokes, facing up.

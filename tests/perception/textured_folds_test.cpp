@@ -80,33 +80,36 @@ float largest_contrast(const VertexTree& tree) {
     return most;
 }
 
+// Of pairs of vertices away from the border, where corners are cut.
+template <class F>
+float largest_inside(const VertexTree& tree, const F& value) {
+    float most = 0;
+    const auto all = tree.attribute<FoldTexture>(texture_name);
+    const SoundTree sound = *SoundTree::of(tree);
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (sound.leaf_end()[node] - sound.first_leaf()[node] == 2 &&
+            !(tree.bounds()[sound.parents()[node]].flags & irregular_ring))
+            most = std::max(most, value(all[node]));
+    return most;
+}
+
 // On a plane an even texture slides nowhere, whatever it shows; squeezed to one side, it does.
 TEST(TexturedFolds, SlideWhereTheTextureIsUneven) {
     const Texture texture = textures::checkerboard(512, 512, 4, 0, 255);
     Mesh even = textures::textured_grid(20, texture), squeezed = even;
     for (glm::vec2& uv : squeezed.uvs) uv.x = uv.x * uv.x;
     const VertexTree of_even = measured(even), of_squeezed = measured(squeezed);
-    // Of pairs of vertices away from the border, where corners are cut.
-    const auto inside = [](const VertexTree& tree) {
-        float most = 0;
-        const auto all = tree.attribute<FoldTexture>(texture_name);
-        const SoundTree sound = *SoundTree::of(tree);
-        for (NodeId node = 0; node < tree.interior_count(); ++node)
-            if (sound.leaf_end()[node] - sound.first_leaf()[node] == 2 &&
-                !(tree.bounds()[sound.parents()[node]].flags & irregular_ring))
-                most = std::max(most, all[node].slide);
-        return most;
-    };
-    EXPECT_LT(inside(of_even), 1e-3f);
-    EXPECT_GT(inside(of_squeezed), 3e-3f);
+    const auto slide = [](const FoldTexture& t) { return t.slide; };
+    EXPECT_LT(largest_inside(of_even, slide), 1e-3f);
+    EXPECT_GT(largest_inside(of_squeezed, slide), 3e-3f);
     EXPECT_GT(largest_contrast(of_squeezed), 0.5f);
 }
 
-// A texture that is white everywhere changes nothing.
+// A texture that shows white everywhere changes nothing.
 TEST(TexturedFolds, OfAWhiteTextureAreThoseOfTheMesh) {
     Mesh mesh = shapes::bumpy_sphere(4, 0.02);
-    for (const glm::dvec3& p : mesh.positions) mesh.uvs.emplace_back(p.x, p.y);
-    mesh.texture = textures::checkerboard(16, 16, 16, 255, 255);
+    mesh.uvs.assign(mesh.positions.size(), glm::vec2(0.25f)); // in a white field
+    mesh.texture = textures::checkerboard(16, 16, 8, 255, 0);
     const VertexTree textured = measured(mesh, false), plain = *measure_folds(*textured.untextured(), 2);
     EXPECT_LT(largest_contrast(textured), 1e-5f);
     const auto before = plain.attribute<FoldRecord>(record_name), after = textured.attribute<FoldRecord>(record_name);
@@ -163,6 +166,53 @@ TEST(TexturedFolds, CountAsTheirVerticesTintThem) {
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message.find("several hues"), std::string::npos) << refused.error().message;
     EXPECT_FALSE(LitFolds::measure(of_two));
+}
+
+TEST(StandIns, HaveTheUsualContrast) {
+    const TextureDetail noise = TextureDetail::stand_in(0.4f);
+    const UvBox all = box({0, 0}, {1, 1}), small = box({0.3f, 0.3f}, {0.31f, 0.31f});
+    for (std::size_t level = 0; level < noise.level_count(); ++level) {
+        const float expected = level < measurement::stand_in_octaves ? measurement::usual_contrast : 0;
+        EXPECT_NEAR(noise.contrast(level, all), expected, 0.01f) << level;
+        EXPECT_NEAR(noise.contrast(level, small), expected, 0.01f) << level;
+    }
+    double sum = 0;
+    constexpr int count = 200;
+    for (int y = 0; y < count; ++y)
+        for (int x = 0; x < count; ++x)
+            sum += static_cast<double>(noise.at(0, (glm::vec2(x, y) + 0.5f) / static_cast<float>(count)));
+    EXPECT_NEAR(sum / (count * count), 0.4, 0.02);
+}
+
+// Coordinates without an image place others, such as a normal map: what slides, counts.
+TEST(StandIns, CountWhereNoImageIsDrawn) {
+    Mesh even = textures::textured_grid(20, textures::checkerboard(1, 1, 1, 150, 150)), squeezed = even;
+    for (glm::vec2& uv : squeezed.uvs) uv.x = uv.x * uv.x;
+    for (const bool has_image : {true, false}) { // of one colour
+        if (!has_image) even.texture = squeezed.texture = {};
+        const auto contrast = [](const FoldTexture& t) { return *std::ranges::max_element(t.contrast); };
+        EXPECT_LT(largest_inside(measured(even), contrast), 1e-3f) << has_image;
+        EXPECT_GT(largest_inside(measured(squeezed), contrast), 0.02f) << has_image;
+        EXPECT_GT(largest_contrast(measured(squeezed)), measurement::usual_contrast) << has_image;
+    }
+    // All at one place: no image shows anything.
+    for (glm::vec2& uv : squeezed.uvs) uv = glm::vec2(0.5f);
+    EXPECT_TRUE(measured(squeezed).attribute<FoldTexture>(texture_name).empty());
+}
+
+TEST(StandIns, AreKeptInFilesAndUnderLights) {
+    Mesh mesh = textures::textured_sphere(3, {});
+    const VertexTree tree = measured(mesh, false);
+    const support::TempFolder folder;
+    ASSERT_TRUE(write_tree(folder / "tree.vdt", tree));
+    const auto read = require(read_tree(folder / "tree.vdt"));
+    vdtree::View view;
+    view.eye = {0, 0, 9};
+    EXPECT_TRUE(require(error_distances(*read, view, {}))->is_monotone());
+    const auto folds = require(LitFolds::measure(tree));
+    const auto with = require(folds->with_attributes(tree));
+    EXPECT_FALSE(with->attribute<FoldTexture>("lit_texture").empty());
+    EXPECT_TRUE(require(LitFolds::of(*with))->under(tree, {.ambient = 0.5}));
 }
 
 TEST(TexturedFolds, DoNotDependOnTheThreads) {

@@ -6,6 +6,7 @@
 #include <unseen/vdtree/internal/light_bounds.h>
 
 #include "fold/fold_factors.h"
+#include "measure/measure_folds.h"
 #include "measure/pyramid.h"
 
 namespace unseen::perception {
@@ -128,7 +129,7 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
                         "again with {perception::measure_folds()}."));
     const std::size_t nodes = tree.interior_count();
     if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
-        textures.size() != (tree.texture().empty() ? 0 : nodes))
+        textures.size() != (has_detail(tree) ? nodes : 0))
         return refused("a part of it is missing.");
     FoldErrors all;
     all.stages = tree.attribute<FoldStage>(stages_name);

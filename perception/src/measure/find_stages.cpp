@@ -23,7 +23,7 @@ class OwnLight {
 public:
     static constexpr std::size_t table_count = 1;
 
-    explicit OwnLight(const VertexTree& tree) : luminance_(tree.luminance()) {}
+    OwnLight(const VertexTree& tree, const TexturedLight&) : luminance_(tree.luminance()) {}
 
     struct Seen {
         StagePicture picture;
@@ -56,8 +56,8 @@ class SingleLights {
 public:
     static constexpr std::size_t table_count = LitStages::ambient_shares.size();
 
-    explicit SingleLights(const VertexTree& tree)
-        : normals_(tree.wedge_count()), has_albedo_(!tree.colours().empty() || !tree.texture().empty()) {
+    SingleLights(const VertexTree& tree, const TexturedLight& texture)
+        : normals_(tree.wedge_count()), has_albedo_(!tree.colours().empty() || texture.texture) {
         for (WedgeId wedge = 0; wedge < tree.wedge_count(); ++wedge)
             normals_[wedge] = {glm::vec3(tree.normals()[wedge]), albedo_of(tree, wedge)};
     }
@@ -139,8 +139,8 @@ class StageFinder {
 public:
     StageFinder(const SoundTree& tree, const TexturedLight& texture, std::span<const FoldTexture> textures,
                 std::span<FoldError> errors, MeasuringProgress& progress)
-        : tree_(tree), light_(tree), texture_(texture), textures_(textures), errors_(errors), progress_(progress),
-          interior_(tree.interior_count()), parents_(tree.parents()),
+        : tree_(tree), light_(tree, texture), texture_(texture), textures_(textures), errors_(errors),
+          progress_(progress), interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (WedgeId& corner : t) corner = tree.wedge_of_leaf(corner);

@@ -27,7 +27,7 @@ constexpr float falloff_curvature = 4;
 constexpr float least_lit = 1e-5f; // what is less lit is dark: below a step of stored luminances
 
 // What is kept with a measurement: its own numbers, and all of measure_folds().
-constexpr int revision = 2; // one more where the same settings give other numbers
+constexpr int revision = 3; // one more where the same settings give other numbers
 constexpr auto settings = [] {
     std::array<float, 5 + measurement::settings.size()> all = {revision, offset, scale, LitStages::lights,
                                                                LitStages::brightest};
@@ -98,7 +98,7 @@ void include(const FoldFacing& other, FoldFacing& facing) {
 }
 
 // Whether albedo is not the same everywhere.
-bool has_albedo(const VertexTree& tree) { return !tree.colours().empty() || !tree.texture().empty(); }
+bool has_albedo(const VertexTree& tree) { return !tree.colours().empty() || has_detail(tree); }
 
 Error refused(const std::string& what) {
     return {ErrorCode::malformed_data, "What the tree's folds change under lights is damaged: " + what +
@@ -245,7 +245,7 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
     const std::size_t nodes = tree.interior_count(), stage_count = stages.size() / LitStages::ambient_shares.size();
     if (folds.size() != nodes || facing.size() != nodes || stage_of.size() != nodes ||
         stages.size() % LitStages::ambient_shares.size() != 0 || albedo.size() != (has_albedo(tree) ? nodes : 0) ||
-        textures.size() != (tree.texture().empty() ? 0 : nodes))
+        textures.size() != (has_detail(tree) ? nodes : 0))
         return refused("a part of it is missing.");
     for (const FoldStage& stage : stages)
         if (!is_sound(stage)) return refused("a contrast of a stage is negative or not finite.");
@@ -269,7 +269,7 @@ Result<LitFolds> LitFolds::of(const VertexTree& tree) {
 
 Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
     if (state_->folds.size() != tree.interior_count() || state_->albedo.empty() == has_albedo(tree) ||
-        state_->textures.empty() != tree.texture().empty())
+        state_->textures.empty() == has_detail(tree))
         return invalid_argument("What folds change under lights was measured of another tree.");
     Result<VertexTree> with = tree.share();
     add_attribute(with, lit_settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));

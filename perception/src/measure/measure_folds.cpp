@@ -48,12 +48,28 @@ std::optional<glm::vec3> common_tint(const VertexTree& tree) {
 } // namespace
 
 Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const VertexTree& tree) {
-    if (tree.texture().empty()) return std::shared_ptr<const TextureDetail>();
+    const TextureView texture = tree.texture();
+    if (texture.empty()) {
+        if (!has_detail(tree)) return std::shared_ptr<const TextureDetail>();
+        // Alone: a thread that waits here must not begin another measurement, which would wait for this.
+        static const auto stand_in = tbb::this_task_arena::isolate(
+            [] { return std::make_shared<const TextureDetail>(TextureDetail::stand_in(1)); });
+        return stand_in;
+    }
     const auto tint = common_tint(tree);
     if (!tint)
         return unsupported("What folds change of a texture over vertices of several hues is not "
                            "measured: take another fold test, or the tree without its texture.");
-    return std::make_shared<const TextureDetail>(tree.texture(), *tint);
+    if (std::ranges::all_of(texture.texels, [&](const Texel& texel) { return texel == texture.texels.front(); })) {
+        const TextureDetail even({1, 1, texture.wrap_u, texture.wrap_v, texture.texels.first(1)}, *tint);
+        return std::make_shared<const TextureDetail>(TextureDetail::stand_in(even.at(0, glm::vec2(0))));
+    }
+    return std::make_shared<const TextureDetail>(texture, *tint);
+}
+
+bool has_detail(const VertexTree& tree) {
+    const std::span<const glm::vec2> uvs = tree.uvs();
+    return !tree.texture().empty() || std::ranges::any_of(uvs, [&](const glm::vec2& uv) { return uv != uvs.front(); });
 }
 
 bool knows_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
@@ -99,7 +115,7 @@ bool measure_all(std::span<const SoundTree> trees, std::span<const TexturedLight
 // `up_to`: the share of the whole that this is.
 Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads, double up_to,
                          MeasuringProgress& progress) {
-    const bool is_textured = !trees.front().texture().empty();
+    const bool is_textured = has_detail(trees.front());
     assert(trees.size() == 1 || trees.size() == 4 || (trees.size() == 3 && !is_textured));
     Measured all;
     const float scale = unit_scale(trees.front().bounding_sphere().radius);

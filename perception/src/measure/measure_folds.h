@@ -36,7 +36,11 @@ Result<MeasuredShadings> measure_shadings(const vdtree::VertexTree& tree, std::s
 // will be. `texture`: of texture_detail_of(). Cost: some 1.5 us a node.
 Result<void> add_luminance_bias(const vdtree::VertexTree& tree, const TextureDetail* texture, MeasuredFolds& measured);
 
-// The detail of the tree's texture; null without one. Fails if knows_texture() is false.
+// Whether something lies over the surface: the texture, or other images by its coordinates, which are not known.
+bool has_detail(const vdtree::VertexTree& tree);
+
+// The detail of the tree's texture; what stands in for images where there are only coordinates, or the texture is of
+// one colour; null where there is nothing. Fails if knows_texture() is false.
 Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const vdtree::VertexTree& tree);
 
 // Nothing where there is no tree.

@@ -57,8 +57,10 @@ public:
                 2 * measurement::picture_sizes[size] * width / static_cast<float>(measurement::picture_side);
             here.level[size] = texture_.level_of(here.density.most * cell);
         }
-        const vdtree::LuminanceRange range = tree_.ring_texture()[node];
-        here.middle = (range.lo + range.hi) / 2;
+        if (!tree_.ring_texture().empty()) {
+            const vdtree::LuminanceRange range = tree_.ring_texture()[node];
+            here.middle = (range.lo + range.hi) / 2;
+        }
         here.slide = 0;
     }
 

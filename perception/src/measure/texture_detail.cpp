@@ -54,6 +54,33 @@ TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
     for (std::size_t level = 0; level < levels_.size(); ++level) find_contrasts(level);
 }
 
+TextureDetail TextureDetail::stand_in(float mean) {
+    using namespace measurement;
+    static_assert((stand_in_side & (stand_in_side - 1)) == 0);
+    TextureDetail noise(stand_in_side);
+    for (std::uint32_t side = stand_in_side; side > 0; side /= 2)
+        noise.levels_.push_back({side, side, std::vector<float>(std::size_t{side} * side, mean), {}});
+    // From each level to the next finer one: of a texel's four, two are brighter and two are darker.
+    for (std::size_t number = std::min(stand_in_octaves, noise.levels_.size() - 1); number-- > 0;) {
+        Level& level = noise.levels_[number];
+        const std::uint32_t side = level.width;
+        parallel_loop(std::uint32_t{0}, side, [&](std::uint32_t y) {
+            for (std::uint32_t x = 0; x < side; ++x) {
+                constexpr std::array<unsigned, 6> halves = {0b0011, 0b0101, 0b0110, 0b1001, 0b1010, 0b1100};
+                std::uint64_t random = ((number << 24) + (y / 2)) << 24 | (x / 2);
+                random = (random + 1) * 0x9e3779b97f4a7c15u; // SplitMix64 (Steele, Lea and Flood 2014)
+                random = (random ^ (random >> 30)) * 0xbf58476d1ce4e5b9u;
+                random = (random ^ (random >> 27)) * 0x94d049bb133111ebu;
+                const bool is_bright = (halves[(random >> 32) % 6] >> (y % 2 * 2 + x % 2)) & 1;
+                const float low = noise.bilinear(noise.levels_[number + 1], (x + 0.5) / side, (y + 0.5) / side);
+                level.means[std::size_t{y} * side + x] = low * (1 + (is_bright ? usual_contrast : -usual_contrast));
+            }
+        });
+    }
+    for (std::size_t level = 0; level < noise.levels_.size(); ++level) noise.find_contrasts(level);
+    return noise;
+}
+
 void TextureDetail::find_contrasts(std::size_t number) {
     Level& level = levels_[number];
     const Level* const next = number + 1 < levels_.size() ? &levels_[number + 1] : nullptr;

@@ -16,6 +16,10 @@ public:
     // Cost: some passes over the texels; 6 bytes of memory for each.
     explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
 
+    // In place of images that are not known, such as normal maps: noise of this mean, of measurement::usual_contrast in
+    // each octave. Cost: some passes over its texels.
+    static TextureDetail stand_in(float mean);
+
     std::size_t level_count() const { return levels_.size(); }
     glm::vec2 size() const { return glm::vec2(width_, height_); } // texels
 
@@ -44,6 +48,7 @@ private:
         std::int64_t first, last;
     };
 
+    explicit TextureDetail(std::uint32_t side) : width_(side), height_(side), wrap_u_(), wrap_v_() {}
     void find_contrasts(std::size_t level);
     float nearest_outside(const Level& level, float x, float y) const;
     float bilinear(const Level& level, double u, double v) const;

@@ -14,13 +14,14 @@ namespace unseen::perception {
 //   three points of each edge that the fold moves;
 // - pictures of the whole mesh, folded in stages (not if vertices are translucent).
 // Textured surfaces show the texture at their texture coordinates. Detail finer than the pictures' cells counts by how
-// far the fold slides it over the surface (fold_texture).
+// far the fold slides it over the surface (fold_texture). Surfaces with coordinates and no texture, or one of one colour,
+// may have other images there, such as a normal map: they show noise of a usual texture's contrast.
 //
 // A criterion decides what the numbers mean for an eye. This is a measurement, not a bound over all cuts: neighbours may
 // be folded in other ways, and there are few cells and points.
 //
 // Fails if check() does, and if knows_texture() is false. Cost: a second, and some 25 us a node, two to four times as
-// much with a texture; in parallel. No step is quadratic in the triangles around a vertex or in overlapping triangles.
+// much with texture coordinates; in parallel. No step is quadratic in the triangles around a vertex or in overlapping triangles.
 // The result does not depend on the threads (0: all cores). Progress can cancel.
 Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0,
                                          const Progress& progress = {});
