@@ -57,7 +57,7 @@ inline Triangles gathered(const Cut& cut) {
         if (cut.is_unfolded(node))
             for (Index t = support::sound(tree).first_triangle()[node];
                  t < support::sound(tree).first_triangle()[node + 1]; ++t)
-                for (const Index leaf : support::sound(tree).triangles()[t]) indices.push_back(cut.proxy_of_leaf(leaf));
+                for (const Index leaf : support::sound(tree).triangles()[t]) indices.push_back(cut.wedge_of_leaf(leaf));
     return triangles_of(indices);
 }
 

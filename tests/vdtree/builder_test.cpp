@@ -612,7 +612,7 @@ TEST(UserClustering, IsGivenPlacesAndLeaves) {
         }
         return cluster_octree(input);
     };
-    EXPECT_TRUE(build_tree(mesh.view(), look));
+    EXPECT_TRUE(build_tree(mesh.view(), look, {.crease = 180}));
     for (Index t = 0; t < 12; ++t) // a face each
         for (const Index v : mesh.triangles[t]) mesh.uvs.resize(36), mesh.uvs[v] = {static_cast<float>(t), 0};
     const auto look_at_leaves = [&](const ClusterInput& input) {
