@@ -49,9 +49,11 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
         return !std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
     };
     using vdtree::TreeGeometry;
-    if (differs(&TreeGeometry::first_wedge)) return "first_wedge";
-    if (differs(&TreeGeometry::leaf_places)) return "leaf_places";
+    if (differs(&TreeGeometry::extra_wedges)) return "extra_wedges";
+    if (differs(&TreeGeometry::leaf_ranks)) return "leaf_ranks";
     if (differs(&TreeGeometry::wedge_ranks)) return "wedge_ranks";
+    for (NodeId node = 0; node <= a.node_count(); ++node)
+        if (a.first_wedge(node) != b.first_wedge(node)) return "the wedges of node " + std::to_string(node);
     if (!same_bytes(a.positions(), b.positions())) return "positions";
     if (!same_bytes(a.luminance(), b.luminance())) return "luminance";
     if (!same_bytes(a.normals(), b.normals())) return "normals";

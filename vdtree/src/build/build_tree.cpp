@@ -353,7 +353,7 @@ private:
         colours_ = select(std::span<const glm::vec4>(colours_), given);
         const std::vector<Index> materials = select(places_->materials(), given);
         const std::vector<Index> further = select(places_->further(), given);
-        WedgeArrays wedges = find_wedges(
+        NodeWedges wedges = find_wedges(
             nodes_.shape, *parts_, positions_,
             {first_leaf, triangles, order_.first_triangle, normals, uvs_, colours_, materials, further}, ancestors);
         if (!wedges.leaf_numbers.empty())
@@ -368,22 +368,19 @@ private:
         g_->normals = std::move(wedges.normals);
         g_->uvs = std::move(wedges.uvs);
         g_->colours = std::move(wedges.colours);
-        count_leaves(wedges.links);
-        g_->first_wedge = std::move(wedges.links.first_wedge);
-        g_->leaf_places = std::move(wedges.links.leaf_places);
+        count_leaves(first_leaf);
+        g_->several = std::move(wedges.links.several);
+        g_->extra_wedges = std::move(wedges.links.extra_wedges);
+        g_->further = std::move(wedges.links.further);
+        g_->leaf_ranks = std::move(wedges.links.leaf_ranks);
         g_->wedge_ranks = std::move(wedges.links.wedge_ranks);
     }
 
     // Up to here nodes have supported ranges of places.
-    void count_leaves(const WedgeLinks<std::vector<NodeId>>& links) {
-        if (links.first_wedge.empty()) return;
-        TreeShape& shape = nodes_.shape;
-        const NodeId interior = shape.interior();
-        const auto first_leaf = [&](Index place) {
-            return links.first_wedge[interior + place] - links.first_wedge[interior];
-        };
-        for (Index& leaf : shape.first_leaf) leaf = first_leaf(leaf);
-        for (Index& leaf : shape.leaf_end) leaf = first_leaf(leaf);
+    void count_leaves(std::span<const Index> first_leaf) {
+        if (first_leaf.empty()) return;
+        for (Index& leaf : nodes_.shape.first_leaf) leaf = first_leaf[leaf];
+        for (Index& leaf : nodes_.shape.leaf_end) leaf = first_leaf[leaf];
     }
 
     void take_links() {

@@ -49,8 +49,8 @@ namespace {
 class NodeOrderer {
 public:
     NodeOrderer(const Clustering& clustering, Index vertices)
-        : parents_(clustering.parents), vertices_(vertices),
-          root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
+        : parents_(clustering.parents), vertices_(vertices), root_(static_cast<Index>(parents_.size()) - 1),
+          places_(parents_.size() - vertices) {}
 
     NodeOrder run() {
         count_up();
@@ -147,9 +147,7 @@ private:
 
 } // namespace
 
-NodeOrder order_nodes(const Clustering& clustering, Index vertices) {
-    return NodeOrderer(clustering, vertices).run();
-}
+NodeOrder order_nodes(const Clustering& clustering, Index vertices) { return NodeOrderer(clustering, vertices).run(); }
 
 TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
     const TreeShape& shape = nodes.shape;

@@ -104,6 +104,24 @@ struct Workspace {
 
 constexpr bool same_value(const glm::dvec4& a, const glm::dvec4& b) { return a == b; }
 
+// Filled once.
+class RankSet {
+public:
+    explicit RankSet(Index size) : words_(size / 32 + 1) {}
+    void insert(Index i) { words_[i / 32].bits |= 1u << (i % 32); }
+    std::vector<RankWord> take() {
+        Index before = 0;
+        for (RankWord& word : words_) {
+            word.before = before;
+            before += static_cast<Index>(std::popcount(word.bits));
+        }
+        return std::move(words_);
+    }
+
+private:
+    std::vector<RankWord> words_;
+};
+
 class WedgeFinder {
 public:
     WedgeFinder(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
@@ -119,7 +137,7 @@ public:
         spaces_.resize(parts.count());
     }
 
-    WedgeArrays run() {
+    NodeWedges run() {
         parts_.bottom_up([&] {
             const std::uint16_t number = make_workspace();
             return [this, &space = *spaces_[number], number](NodeId node) { visit(node, space, number); };
@@ -540,9 +558,9 @@ private:
 
     // Ranks follow the forest depth-first; then each node's wedges are put in the order of their ranks.
     void number_wedges() {
-        if (!has_seams()) return;
         const NodeId nodes = interior_ + shape_.leaves();
-        auto& first = out_.links.first_wedge;
+        auto& first = first_wedge_;
+        if (!has_seams()) return;
         first.assign(std::size_t{nodes} + 1, 0);
         for (NodeId node = 0; node < interior_; ++node) first[node + 1] = first[node] + counts_[node];
         for (Index place = 0; place < shape_.leaves(); ++place)
@@ -565,29 +583,45 @@ private:
         for (NodeId node = 0; node < nodes; ++node)
             std::sort(by_rank_.begin() + first[node], by_rank_.begin() + first[node + 1],
                       [&](WedgeId a, WedgeId b) { return ranks[a] < ranks[b]; });
-        out_.links.wedge_ranks.resize(wedges);
-        for (WedgeId w = 0; w < wedges; ++w) out_.links.wedge_ranks[w] = ranks[by_rank_[w]];
         out_.leaf_numbers.resize(leaf_count());
-        out_.links.leaf_places.resize(leaf_count());
         for (Index leaf = 0; leaf < leaf_count(); ++leaf)
             out_.leaf_numbers[by_rank_[first[interior_] + leaf] - first[interior_]] = leaf;
-        for (Index place = 0; place < shape_.leaves(); ++place)
-            for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf)
-                out_.links.leaf_places[leaf] = interior_ + place;
+        pack_links(ranks);
+    }
+
+    // `ranks`: by wedge before sorting.
+    void pack_links(std::span<const Index> ranks) {
+        const NodeId nodes = interior_ + shape_.leaves();
+        auto& links = out_.links;
+        const auto& first = first_wedge_;
+        RankSet several(nodes), further(first[nodes]);
+        links.extra_wedges.push_back(0);
+        for (NodeId node = 0; node < nodes; ++node) {
+            const Index count = first[node + 1] - first[node];
+            for (Index i = 1; i < count; ++i) further.insert(first[node] + i);
+            for (Index i = 0; i < count && count > 1 && node < interior_; ++i)
+                links.wedge_ranks.push_back(ranks[by_rank_[first[node] + i]]);
+            if (count == 1) continue;
+            several.insert(node);
+            links.extra_wedges.push_back(links.extra_wedges.back() + count - 1);
+        }
+        for (WedgeId w = first[interior_]; w < first[nodes]; ++w) links.leaf_ranks.push_back(ranks[by_rank_[w]]);
+        links.several = several.take();
+        links.further = further.take();
     }
 
     // ---- values
 
     void fill() {
-        const auto& links = out_.links;
         const NodeId nodes = interior_ + shape_.leaves();
-        const WedgeId wedges = links.first_wedge_of(nodes), leaves_begin = links.first_wedge_of(interior_);
+        const auto first_wedge_of = [&](NodeId node) { return first_wedge_.empty() ? node : first_wedge_[node]; };
+        const WedgeId wedges = first_wedge_of(nodes), leaves_begin = first_wedge_of(interior_);
         out_.positions.resize(wedges);
         out_.normals.resize(wedges);
         if (!mesh_.uvs.empty()) out_.uvs.resize(wedges);
         if (!mesh_.colours.empty()) out_.colours.resize(wedges);
         parallel_loop(NodeId{0}, nodes, [&](NodeId node) {
-            const WedgeId begin = links.first_wedge_of(node), end = links.first_wedge_of(node + 1);
+            const WedgeId begin = first_wedge_of(node), end = first_wedge_of(node + 1);
             for (WedgeId w = begin; w < end; ++w) {
                 out_.positions[w] = positions_[node];
                 const WedgeId given = by_rank_.empty() ? w : by_rank_[w];
@@ -643,14 +677,15 @@ private:
     std::vector<std::pair<Index, std::uint16_t>> values_at_; // where the values of its wedges begin, and in which space
     std::vector<std::unique_ptr<Index[]>> parents_below_;    // of several wedges: which of them each child's has become
 
-    std::vector<WedgeId> by_rank_; // by wedge: its number before sorting; empty: the same
-    WedgeArrays out_;
+    std::vector<WedgeId> first_wedge_; // by node, one longer; empty: the same
+    std::vector<WedgeId> by_rank_;     // by wedge: its number before sorting; empty: the same
+    NodeWedges out_;
 };
 
 } // namespace
 
-WedgeArrays find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
-                        const LeafMesh& mesh, const Ancestors& ancestors) {
+NodeWedges find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
+                       const LeafMesh& mesh, const Ancestors& ancestors) {
     return WedgeFinder(shape, parts, positions, mesh, ancestors).run();
 }
 

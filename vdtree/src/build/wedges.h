@@ -8,6 +8,7 @@
 #pragma once
 
 #include <unseen/vdtree/internal/tree_parts.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
@@ -25,8 +26,8 @@ struct LeafMesh {
 };
 
 // By wedge.
-struct WedgeArrays {
-    WedgeLinks<std::vector<NodeId>> links; // empty where every node has one wedge
+struct NodeWedges {
+    WedgeArrays<Vector> links; // empty where every node has one wedge
     std::vector<glm::vec3> positions;
     std::vector<PackedNormal> normals;
     std::vector<glm::vec2> uvs;
@@ -35,7 +36,7 @@ struct WedgeArrays {
 };
 
 // `shape` and `parts`: over places. `positions`: by node. Cost: linear but for places of very many leaves; parallel.
-WedgeArrays find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
+NodeWedges find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
                         const LeafMesh& mesh, const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

@@ -12,6 +12,7 @@
 #include "files/mapped_file.h"
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
+#include <unseen/vdtree/internal/tree_shape.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
@@ -72,8 +73,10 @@ std::uint64_t pages_of(const Section& s) { return (s.count * s.element_bytes + p
 template <class Geometry, class Luminance, class F>
 void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("parents", g.parents);
-    f("first_wedge", g.first_wedge);
-    f("leaf_places", g.leaf_places);
+    f("several", g.several);
+    f("extra_wedges", g.extra_wedges);
+    f("further", g.further);
+    f("leaf_ranks", g.leaf_ranks);
     f("wedge_ranks", g.wedge_ranks);
     f("positions", g.positions);
     f("normals", g.normals);
@@ -105,7 +108,8 @@ bool is_of_texture(std::string_view name) { return name == "texture" || name == 
 
 // Sections that are there only where they have elements.
 bool is_of_seams(std::string_view name) {
-    return name == "first_wedge" || name == "leaf_places" || name == "wedge_ranks";
+    return name == "several" || name == "extra_wedges" || name == "further" || name == "leaf_ranks" ||
+           name == "wedge_ranks";
 }
 bool is_optional(std::string_view name) { return is_of_texture(name) || is_of_seams(name) || name == "document"; }
 
@@ -474,16 +478,9 @@ private:
         const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
         if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
             return fail("The tree has no nodes or no triangles.");
-        const bool has_seams = !g.first_wedge.empty();
-        const std::size_t leaves = has_seams ? g.leaf_places.size() : nodes - interior;
-        const std::size_t wedges = g.positions.size();
-        if (has_seams && (g.first_wedge.size() != nodes + 1 || wedges >= no_node))
-            return fail("Section first_wedge has the wrong length.");
-        const std::size_t first_leaf = has_seams ? g.first_wedge[interior] : interior;
+        if (const char* fault = fault_in_wedge_counts(g)) return fail(std::string("A node ") + fault);
+        const std::size_t wedges = g.positions.size(), leaves = links_of(g).leaves();
         const std::pair<bool, const char*> checks[] = {
-            {wedges == first_leaf + leaves, "positions"},
-            {g.leaf_places.empty() == !has_seams, "leaf_places"},
-            {g.wedge_ranks.size() == (has_seams ? wedges : 0), "wedge_ranks"},
             {g.normals.size() == wedges, "normals"},
             {g.colours.empty() || g.colours.size() == wedges, "colours"},
             {g.uvs.empty() || g.uvs.size() == wedges, "uvs"},

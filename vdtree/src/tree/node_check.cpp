@@ -27,10 +27,12 @@ constexpr const char* triangles_fault = "has triangles of another node.";
 constexpr const char* corner_fault = "has a triangle with a corner out of range or twice.";
 constexpr const char* vanishing_fault = "has a triangle that does not vanish there.";
 
-// That a node has a wedge, and its wedges lie within the arrays.
-const char* fault_in_wedges(const TreeGeometry& g, const TreeLinks& tree, NodeId node) {
-    const WedgeId first = tree.first_wedge_of(node), end = tree.first_wedge_of(node + 1);
-    return first < end && end <= g.positions.size() ? nullptr : wedges_fault;
+// That the sets of nodes and of wedges agree on the node's wedges.
+const char* fault_in_wedges(const TreeLinks& tree, NodeId node) {
+    if (!tree.has_seams()) return nullptr;
+    for (WedgeId w = tree.first_wedge_of(node); w < tree.first_wedge_of(node + 1); ++w)
+        if (tree.node_of_wedge(w) != node) return wedges_fault;
+    return nullptr;
 }
 
 // Calls f for every child; null or what is wrong.
@@ -46,7 +48,7 @@ const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
         const bool inner = child < skip && g.first_leaf[child] == leaf;
         const NodeId id = inner ? child : tree.place_of_leaf(leaf);
         if (id >= g.parents.size() || g.parents[id] != node) return links_fault;
-        if (const char* fault = fault_in_wedges(g, tree, id)) return fault;
+        if (const char* fault = fault_in_wedges(tree, id)) return fault;
         if (inner) {
             if (!(leaf < g.leaf_end[child] && g.leaf_end[child] <= end && child < g.subtree_end[child] &&
                   g.subtree_end[child] <= skip))
@@ -54,11 +56,9 @@ const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
             leaf = g.leaf_end[child];
             child = g.subtree_end[child];
         } else {
-            const Index leaf_end = leaf + tree.first_wedge_of(id + 1) - tree.first_wedge_of(id);
-            if (id < interior || tree.first_wedge_of(id) != tree.wedge_of_leaf(leaf) || leaf_end > end)
-                return wedges_fault;
-            for (; leaf < leaf_end; ++leaf)
-                if (tree.place_of_leaf(leaf) != id) return wedges_fault;
+            if (id < interior || tree.first_wedge_of(id) != tree.wedge_of_leaf(leaf)) return wedges_fault;
+            leaf += tree.first_wedge_of(id + 1) - tree.first_wedge_of(id);
+            if (leaf > end) return wedges_fault;
         }
         if (const char* fault = f(id)) return fault;
     }
@@ -91,8 +91,40 @@ const char* fault_in_root(const TreeGeometry& g) noexcept {
     if (g.parents[0] != no_node || g.first_leaf[0] != 0 || g.leaf_end[0] != tree.leaves() ||
         g.subtree_end[0] != interior)
         return links_fault;
-    if (fault_in_wedges(g, tree, 0) || tree.first_wedge_of(0) != 0) return wedges_fault;
+    if (const char* fault = fault_in_wedges(tree, 0)) return fault;
     return g.first_triangle[0] == 0 && g.first_triangle[interior] == g.triangles.size() ? nullptr : triangles_fault;
+}
+
+// Counters that run on, and as many members as there should be.
+bool is_counted(std::span<const RankWord> set, std::size_t size, std::size_t members) {
+    if (set.size() != size / 32 + 1) return false;
+    std::uint64_t before = 0;
+    for (const RankWord& word : set) {
+        if (word.before != before) return false;
+        before += static_cast<std::uint64_t>(std::popcount(word.bits));
+    }
+    return before == members && set.back().bits >> (size % 32) == 0;
+}
+
+const char* fault_in_wedge_counts(const TreeGeometry& g) noexcept {
+    const std::size_t nodes = g.parents.size(), wedges = g.positions.size(), interior = g.first_leaf.size();
+    if (g.several.empty())
+        return g.extra_wedges.empty() && g.further.empty() && g.leaf_ranks.empty() && g.wedge_ranks.empty() &&
+                       wedges == nodes
+                   ? nullptr
+                   : wedges_fault;
+    if (wedges < nodes || wedges >= no_node || g.extra_wedges.empty() || g.extra_wedges[0] != 0 ||
+        g.extra_wedges[g.extra_wedges.size() - 1] != wedges - nodes)
+        return wedges_fault;
+    for (std::size_t k = 1; k < g.extra_wedges.size(); ++k)
+        if (g.extra_wedges[k] <= g.extra_wedges[k - 1]) return wedges_fault;
+    if (!is_counted(g.several, nodes, g.extra_wedges.size() - 1) || !is_counted(g.further, wedges, wedges - nodes) ||
+        is_in(g.further, 0))
+        return wedges_fault;
+    const Index k = rank_in(g.several, static_cast<Index>(interior));
+    return g.wedge_ranks.size() == g.extra_wedges[k] + k && g.leaf_ranks.size() == wedges - interior - g.extra_wedges[k]
+               ? nullptr
+               : wedges_fault;
 }
 
 const char* fault_in_links(const TreeGeometry& g, NodeId node) {
@@ -161,8 +193,8 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
     if (std::ranges::any_of(g.displacement, [](float moved) { return moved < 0; }))
         return "A displacement is negative.";
     // Everybody looks for leaves by these.
-    const std::size_t leaves = g.leaf_places.size();
-    if (std::ranges::any_of(g.wedge_ranks, [&](Index rank) { return rank >= leaves; }))
+    const auto is_outside = [&](Index rank) { return rank >= g.leaf_ranks.size(); };
+    if (std::ranges::any_of(g.leaf_ranks, is_outside) || std::ranges::any_of(g.wedge_ranks, is_outside))
         return "A wedge's rank is out of range.";
     // Users index their own arrays with these.
     if (std::ranges::any_of(g.source_vertices, [&](Index v) { return v >= g.source_vertex_count; }))

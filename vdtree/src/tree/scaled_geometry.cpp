@@ -37,7 +37,8 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
     for (NodeBounds& of_node : bounds) of_node.ring = scaled(of_node.ring, scale);
     GeometryFacts facts = g;
     facts.bounding_sphere = scaled(g.bounding_sphere, scale);
-    GeometryArrays<Array> arrays{{view_of(g.first_wedge), view_of(g.leaf_places), view_of(g.wedge_ranks)},
+    GeometryArrays<Array> arrays{{view_of(g.several), view_of(g.extra_wedges), view_of(g.further),
+                                  view_of(g.leaf_ranks), view_of(g.wedge_ranks)},
                                  view_of(g.parents),
                                  std::move(positions),
                                  view_of(g.normals),

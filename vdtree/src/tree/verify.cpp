@@ -72,7 +72,8 @@ private:
         const Unorm16 y = l_.luminance[w];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
         if (tree_.has_seams() && w > tree_.first_wedge(node))
-            expect(g_.wedge_ranks[w - 1] < g_.wedge_ranks[w], "its wedges are not in the order of their ranks.");
+            expect(links_of(g_).rank_of(w - 1) < links_of(g_).rank_of(w),
+                   "its wedges are not in the order of their ranks.");
         if (!pyramid_) return;
         const PackedRange texture = texture_of({w});
         expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");

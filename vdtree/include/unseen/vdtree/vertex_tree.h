@@ -24,6 +24,7 @@
 // number of cuts and threads may read one tree.
 #pragma once
 
+#include <bit>
 #include <compare>
 
 #include <unseen/vdtree/function_ref.h>
@@ -204,29 +205,87 @@ struct Attribute {
 
 // ---- the tree
 
-// How the wedges hang on the nodes. Empty where every node has one wedge, which then has the node's number.
-template <class Numbers>
-struct WedgeLinks {
-    Numbers first_wedge; // by node, one longer
-    Numbers leaf_places; // by leaf
-    // By wedge: the number of its first leaf in the depth-first order of the forest, in which each wedge holds a run of
-    // leaves. Those of a node ascend.
-    Numbers wedge_ranks;
+// 32 bits of a set, and how many come before them.
+struct RankWord {
+    using Component = std::uint32_t;
+    std::uint32_t bits = 0, before = 0;
+};
+// How many of the first `i` are in a set.
+inline Index rank_in(std::span<const RankWord> set, Index i) noexcept {
+    const RankWord& word = set[i / 32];
+    return word.before + static_cast<Index>(std::popcount(word.bits & ((1u << (i % 32)) - 1)));
+}
+inline bool is_in(std::span<const RankWord> set, Index i) noexcept { return set[i / 32].bits >> (i % 32) & 1; }
 
-    Index leaf_count(std::size_t places) const noexcept {
-        return static_cast<Index>(leaf_places.empty() ? places : leaf_places.size());
+// How the wedges hang on the nodes. Empty where every node has one wedge, which then has the node's number.
+template <template <class> class Storage>
+struct WedgeArrays {
+    Storage<RankWord> several; // by node, and one more: whether it has more wedges than one
+    Storage<Index>
+        extra_wedges; // by node with several wedges, one longer: how many there are beyond one, in those before
+    Storage<RankWord> further; // by wedge, and one more: whether it is not the first of its node
+    // By leaf, and by wedge of an interior node with several: the number of its first leaf in the depth-first order of the
+    // forest, in which each wedge holds a run of leaves. Those of a node ascend.
+    Storage<Index> leaf_ranks, wedge_ranks;
+};
+template <class T>
+using ConstSpan = std::span<const T>;
+
+// The same as views, with the links of the nodes that they need.
+template <class Numbers>
+struct WedgeLinks : WedgeArrays<ConstSpan> {
+    Numbers parents;    // by node
+    Numbers first_leaf; // by interior node, and so on
+    Numbers leaf_end;
+    Numbers subtree_end;
+
+    NodeId interior() const noexcept { return static_cast<NodeId>(first_leaf.size()); }
+    bool has_seams() const noexcept { return !several.empty(); }
+    Index leaves() const noexcept {
+        return static_cast<Index>(has_seams() ? leaf_ranks.size() : parents.size() - first_leaf.size());
     }
-    WedgeId first_wedge_of(NodeId node) const noexcept { return first_wedge.empty() ? node : first_wedge[node]; }
-    NodeId place_of_leaf(NodeId interior_count, Index leaf) const noexcept {
-        return leaf_places.empty() ? interior_count + leaf : leaf_places[leaf];
+    WedgeId first_wedge_of(NodeId node) const noexcept {
+        return has_seams() ? node + extra_wedges[rank_in(several, node)] : node;
+    }
+    NodeId node_of_wedge(WedgeId wedge) const noexcept {
+        return has_seams() ? wedge - rank_in(further, wedge + 1) : wedge;
+    }
+    WedgeId wedge_of_leaf(Index leaf) const noexcept { return first_wedge_of(interior()) + leaf; }
+    NodeId place_of_leaf(Index leaf) const noexcept { return node_of_wedge(wedge_of_leaf(leaf)); }
+    WedgeId wedge_at(NodeId node, Index leaf) const noexcept {
+        return has_seams() ? wedge_of_rank(node, [&] { return leaf_ranks[leaf]; }) : node;
     }
     WedgeId wedge_above(NodeId node, WedgeId below) const noexcept {
-        if (first_wedge.empty()) return node;
-        const WedgeId first = first_wedge[node];
-        WedgeId wedge = first_wedge[node + 1] - 1;
-        if (wedge == first) return wedge;
-        for (const Index rank = wedge_ranks[below]; wedge > first && wedge_ranks[wedge] > rank;) --wedge;
-        return wedge;
+        return has_seams() ? wedge_of_rank(node, [&] { return rank_of(below); }) : node;
+    }
+
+    // The first of the wedge's run.
+    Index rank_of(WedgeId wedge) const noexcept {
+        const NodeId node = node_of_wedge(wedge);
+        if (node >= interior()) return leaf_ranks[wedge - first_wedge_of(interior())];
+        if (!is_in(several, node)) return leaf_ranks[first_leaf[node]];
+        const Index k = rank_in(several, node);
+        return wedge_ranks[k + wedge - node];
+    }
+
+private:
+    template <class Rank>
+    WedgeId wedge_of_rank(NodeId node, Rank&& rank_of_leaf) const noexcept {
+        const Index k = rank_in(several, node);
+        const WedgeId first = node + extra_wedges[k];
+        if (!is_in(several, node)) return first;
+        const Index rank = rank_of_leaf(), count = extra_wedges[k + 1] - extra_wedges[k] + 1;
+        const auto at = [&](Index i) {
+            return node >= interior() ? leaf_ranks[first + i - first_wedge_of(interior())]
+                                      : wedge_ranks[k + (first - node) + i];
+        };
+        // The last one whose run has begun.
+        Index begin = 0, end = count;
+        while (end - begin > 1) {
+            const Index middle = begin + (end - begin) / 2;
+            (at(middle) <= rank ? begin : end) = middle;
+        }
+        return first + begin;
     }
 };
 
@@ -248,11 +307,12 @@ public:
     WedgeId wedge_count() const noexcept { return interior_wedge_count() + leaf_count(); }
     WedgeId interior_wedge_count() const noexcept { return links_.first_wedge_of(interior_count()); }
     Index leaf_count() const noexcept { return links_.leaves(); }
-    bool has_seams() const noexcept { return !links_.first_wedge.empty(); } // some node has more wedges than one
+    bool has_seams() const noexcept { return links_.has_seams(); } // some node has more wedges than one
     WedgeId first_wedge(NodeId node) const noexcept { return links_.first_wedge_of(node); }
     WedgeId wedge_end(NodeId node) const noexcept { return links_.first_wedge_of(node + 1); }
     WedgeId wedge_of_leaf(Index leaf) const noexcept { return links_.wedge_of_leaf(leaf); }
     NodeId place_of_leaf(Index leaf) const noexcept { return links_.place_of_leaf(leaf); }
+    NodeId node_of_wedge(WedgeId wedge) const noexcept { return links_.node_of_wedge(wedge); }
     // The wedge of a node above a leaf, or of its place, that holds the leaf. Cost: most nodes have one wedge, few more
     // than eight.
     WedgeId wedge_at(NodeId node, Index leaf) const noexcept { return links_.wedge_at(node, leaf); }
@@ -365,18 +425,10 @@ private:
     NodeChecks* checks_ = nullptr; // of data_
     // Views of data_, kept here because they are read node by node.
     struct Links : WedgeLinks<std::span<const NodeId>> {
-        std::span<const NodeId> parents, subtree_end;
-        std::span<const Index> first_leaf, leaf_end, first_triangle;
+        std::span<const Index> first_triangle;
         std::span<const Triangle> triangles;
 
-        NodeId interior() const noexcept { return static_cast<NodeId>(first_leaf.size()); }
-        Index leaves() const noexcept { return leaf_count(parents.size() - first_leaf.size()); }
         Index triangles_of(NodeId node) const noexcept { return first_triangle[node + 1] - first_triangle[node]; }
-        NodeId place_of_leaf(Index leaf) const noexcept { return WedgeLinks::place_of_leaf(interior(), leaf); }
-        WedgeId wedge_of_leaf(Index leaf) const noexcept { return first_wedge_of(interior()) + leaf; }
-        WedgeId wedge_at(NodeId node, Index leaf) const noexcept {
-            return first_wedge.empty() ? node : wedge_above(node, wedge_of_leaf(leaf));
-        }
     };
     Links links_;
 };

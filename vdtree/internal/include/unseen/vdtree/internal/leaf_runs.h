@@ -14,11 +14,11 @@ public:
     explicit LeafRuns(const TreeLinks& tree);
 
     Index begin(WedgeId wedge) const {
-        if (!tree_.first_wedge.empty()) return tree_.wedge_ranks[wedge];
+        if (tree_.has_seams()) return begins_[wedge];
         return wedge < tree_.interior() ? tree_.first_leaf[wedge] : wedge - tree_.interior();
     }
     Index end(WedgeId wedge) const {
-        if (!tree_.first_wedge.empty()) return std::min(tree_.wedge_ranks[wedge] + sizes_[wedge], tree_.leaves());
+        if (tree_.has_seams()) return std::min(begins_[wedge] + sizes_[wedge], tree_.leaves());
         return wedge < tree_.interior() ? tree_.leaf_end[wedge] : wedge - tree_.interior() + 1;
     }
     // The leaf at a place of the order.
@@ -26,7 +26,8 @@ public:
 
 private:
     TreeLinks tree_;
-    std::vector<Index> sizes_, leaves_; // by wedge; by rank
+    std::vector<Index> begins_, sizes_; // by wedge
+    std::vector<Index> leaves_;         // by rank
 };
 
 } // namespace unseen::vdtree

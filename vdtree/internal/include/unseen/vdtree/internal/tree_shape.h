@@ -8,27 +8,17 @@ namespace unseen::vdtree {
 // How the nodes hang together; numbered as in <unseen/vdtree/vertex_tree.h>: interior nodes depth-first, then the places.
 template <class Numbers>
 struct LinksIn : WedgeLinks<Numbers> {
-    Numbers parents;    // by node
-    Numbers first_leaf; // by interior node, and so on
-    Numbers leaf_end;
-    Numbers subtree_end;
-
-    NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
-    Index leaves() const { return this->leaf_count(parents.size() - first_leaf.size()); }
-    NodeId place_of_leaf(Index leaf) const { return WedgeLinks<Numbers>::place_of_leaf(interior(), leaf); }
-    WedgeId wedge_of_leaf(Index leaf) const { return this->first_wedge_of(interior()) + leaf; }
-
     // Calls on_child for each interior child, and on_leaf for each leaf of a child that is a place, in depth-first order.
     template <class Child, class Leaf>
     void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
         NodeId child = node + 1;
-        const NodeId child_end = subtree_end[node];
-        const Index end = leaf_end[node];
-        for (Index leaf = first_leaf[node]; leaf < end;) {
-            if (child < child_end && first_leaf[child] == leaf) {
+        const NodeId child_end = this->subtree_end[node];
+        const Index end = this->leaf_end[node];
+        for (Index leaf = this->first_leaf[node]; leaf < end;) {
+            if (child < child_end && this->first_leaf[child] == leaf) {
                 on_child(child);
-                leaf = leaf_end[child];
-                child = subtree_end[child];
+                leaf = this->leaf_end[child];
+                child = this->subtree_end[child];
             } else {
                 on_leaf(leaf++);
             }
@@ -40,11 +30,11 @@ struct LinksIn : WedgeLinks<Numbers> {
 using TreeLinks = LinksIn<std::span<const NodeId>>;
 template <class Arrays>
 TreeLinks links_of(const Arrays& tree) {
-    return {{tree.first_wedge, tree.leaf_places, tree.wedge_ranks},
-            tree.parents,
-            tree.first_leaf,
-            tree.leaf_end,
-            tree.subtree_end};
+    return {{{tree.several, tree.extra_wedges, tree.further, tree.leaf_ranks, tree.wedge_ranks},
+             tree.parents,
+             tree.first_leaf,
+             tree.leaf_end,
+             tree.subtree_end}};
 }
 
 // The same while the tree is being built.
