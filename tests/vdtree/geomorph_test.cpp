@@ -420,7 +420,7 @@ TEST(Geomorph, GlidesDownChainsOfAnyDepth) {
         }
         return clustering;
     };
-    const auto tree = require(build_tree(mesh.view(), chain));
+    const auto tree = require(build_tree(mesh.view(), chain, {.crease = 180}));
     Cut cut(*tree);
     Geomorph geomorph = made(*tree, 0.25, std::numeric_limits<double>::infinity());
     ASSERT_TRUE(geomorph.step(cut, 0));

@@ -394,11 +394,15 @@ std::vector<Lie> lies() {
         {"texels without a texture", [](TreeFile& f) { f["texture"].data.clear(); }},
         {"a range of a texture in reverse", set("ring_texture", 0, 0x00010002u)},
     };
+    for (const char* section : {"several", "extra_wedges", "further"})
+        for (const std::size_t at : {0u, 1u}) all.push_back({section, set(section, at, 0x7fffffffu)});
+    for (const char* section : {"leaf_ranks", "wedge_ranks"}) all.push_back({section, set(section, 0, 0xfffffff0u)});
     for (const char* section :
-         {"parents",          "positions",       "normals",       "colours",        "uvs",         "luminance",
-          "first_leaf",       "leaf_end",        "subtree_end",   "first_triangle", "bounds",      "support_spheres",
-          "mask_at",          "displacement",    "support_range", "ring_range",     "adaptation",  "triangles",
-          "source_triangles", "source_vertices", "mark",          "texels",         "ring_texture"})
+         {"parents",          "positions",       "normals",       "colours",        "uvs",          "luminance",
+          "first_leaf",       "leaf_end",        "subtree_end",   "first_triangle", "bounds",       "support_spheres",
+          "mask_at",          "displacement",    "support_range", "ring_range",     "adaptation",   "triangles",
+          "source_triangles", "source_vertices", "mark",          "texels",         "ring_texture", "several",
+          "extra_wedges",     "further",         "leaf_ranks",    "wedge_ranks"})
         all.push_back({section, drop_last(section)});
     return all;
 }

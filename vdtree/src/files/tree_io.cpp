@@ -478,7 +478,8 @@ private:
         const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
         if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
             return fail("The tree has no nodes or no triangles.");
-        if (const char* fault = fault_in_wedge_counts(g)) return fail(std::string("A node ") + fault);
+        if (const char* section = section_against_wedges(g))
+            return fail("Section " + std::string(section) + " does not fit the wedges of the other sections.");
         const std::size_t wedges = g.positions.size(), leaves = links_of(g).leaves();
         const std::pair<bool, const char*> checks[] = {
             {g.normals.size() == wedges, "normals"},

@@ -106,25 +106,23 @@ bool is_counted(std::span<const RankWord> set, std::size_t size, std::size_t mem
     return before == members && set.back().bits >> (size % 32) == 0;
 }
 
-const char* fault_in_wedge_counts(const TreeGeometry& g) noexcept {
+const char* section_against_wedges(const TreeGeometry& g) noexcept {
     const std::size_t nodes = g.parents.size(), wedges = g.positions.size(), interior = g.first_leaf.size();
-    if (g.several.empty())
-        return g.extra_wedges.empty() && g.further.empty() && g.leaf_ranks.empty() && g.wedge_ranks.empty() &&
-                       wedges == nodes
-                   ? nullptr
-                   : wedges_fault;
-    if (wedges < nodes || wedges >= no_node || g.extra_wedges.empty() || g.extra_wedges[0] != 0 ||
-        g.extra_wedges[g.extra_wedges.size() - 1] != wedges - nodes)
-        return wedges_fault;
-    for (std::size_t k = 1; k < g.extra_wedges.size(); ++k)
-        if (g.extra_wedges[k] <= g.extra_wedges[k - 1]) return wedges_fault;
-    if (!is_counted(g.several, nodes, g.extra_wedges.size() - 1) || !is_counted(g.further, wedges, wedges - nodes) ||
-        is_in(g.further, 0))
-        return wedges_fault;
+    if (g.several.empty()) {
+        if (!g.extra_wedges.empty() || !g.further.empty() || !g.leaf_ranks.empty() || !g.wedge_ranks.empty())
+            return "several";
+        return wedges == nodes ? nullptr : "positions";
+    }
+    if (wedges < nodes || wedges >= no_node) return "positions";
+    const auto& extra = g.extra_wedges;
+    if (extra.empty() || extra[0] != 0 || extra[extra.size() - 1] != wedges - nodes ||
+        std::adjacent_find(extra.begin(), extra.end(), std::greater_equal<>()) != extra.end())
+        return "extra_wedges";
+    if (!is_counted(g.several, nodes, extra.size() - 1)) return "several";
+    if (!is_counted(g.further, wedges, wedges - nodes) || is_in(g.further, 0)) return "further";
     const Index k = rank_in(g.several, static_cast<Index>(interior));
-    return g.wedge_ranks.size() == g.extra_wedges[k] + k && g.leaf_ranks.size() == wedges - interior - g.extra_wedges[k]
-               ? nullptr
-               : wedges_fault;
+    if (g.wedge_ranks.size() != extra[k] + k) return "wedge_ranks";
+    return g.leaf_ranks.size() == wedges - interior - extra[k] ? nullptr : "leaf_ranks";
 }
 
 const char* fault_in_links(const TreeGeometry& g, NodeId node) {

@@ -12,9 +12,9 @@ namespace unseen::vdtree {
 // the whole tree and every node from the root down to here is sound, children tile their parents, triangles their
 // nodes, and each number lies within its array; triangles vanish where they are said to. Any node may be asked about.
 // Cost: the number of children and triangles.
-// What is wrong with how wedges hang on nodes; null: nothing, and every number that follows from it lies within the arrays.
-// Cost: a few bits a wedge.
-const char* fault_in_wedge_counts(const TreeGeometry& geometry) noexcept;
+// The section that contradicts the others about how wedges hang on nodes; null: none does, and every number that follows
+// from them lies within the arrays. Cost: a few bits a wedge.
+const char* section_against_wedges(const TreeGeometry& geometry) noexcept;
 
 const char* fault_in_links(const TreeGeometry& g, NodeId node);
 
