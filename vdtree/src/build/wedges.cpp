@@ -155,6 +155,9 @@ private:
         const double extent = box.extent();
         centre_ = box.low + box.size() * 0.5;
         scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
+        unit_places_.resize(shape_.leaves());
+        parallel_loop(Index{0}, shape_.leaves(),
+                      [&](Index place) { unit_places_[place] = unit_position(interior_ + place); });
         classes_.push_back({Kind::normal, 3, normal_scale});
         if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, 2, texture_scale * texture_density()});
         if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, 4, colour_scale});
@@ -178,7 +181,7 @@ private:
     Index first_leaf(Index place) const { return mesh_.first_leaf.empty() ? place : mesh_.first_leaf[place]; }
     Index leaf_count() const { return first_leaf(shape_.leaves()); }
     glm::dvec3 unit_position(NodeId node) const { return (glm::dvec3(positions_[node]) - centre_) * scale_; }
-    glm::dvec3 place_of(Index leaf) const { return unit_position(place_node(leaf)); }
+    const glm::dvec3& place_of(Index leaf) const { return unit_places_[place_node(leaf) - interior_]; }
     NodeId place_node(Index leaf) const { return interior_ + (places_.empty() ? leaf : places_[leaf]); }
 
     glm::dvec4 value_of(const Class& c, Index leaf) const {
@@ -278,15 +281,15 @@ private:
             wedge.root = leaf;
             if (!mesh_.materials.empty()) wedge.material = mesh_.materials[leaf];
             if (splits_) wedge.last = last_[leaf];
+            const std::array<Component, most_classes> own = components_of(leaf);
             for (std::size_t c = 0; c < classes_.size(); ++c) {
-                const Component own = component_of(classes_[c], leaf);
                 Index& component = wedge.component[c];
                 component = shared_component(classes_[c], c, wedge, std::span(to.wedges).subspan(first_wedge));
                 if (component == none) {
                     component = static_cast<Index>(to.components.size());
-                    to.components.push_back(own);
+                    to.components.push_back(own[c]);
                 } else {
-                    to.components[component] += own;
+                    to.components[component] += own[c];
                 }
             }
             to.wedges.push_back(wedge);
@@ -305,37 +308,49 @@ private:
         return none;
     }
 
-    // What a class has on the triangles at a leaf.
-    Component component_of(const Class& c, Index leaf) const {
-        Component sum;
-        if (c.channels == 0) return {.corner_weight = 1};
+    // What the classes have on the triangles at a leaf.
+    std::array<Component, most_classes> components_of(Index leaf) const {
+        std::array<Component, most_classes> sums;
+        std::array<glm::dvec4, most_classes> own;
+        for (std::size_t c = 0; c < classes_.size(); ++c) own[c] = value_of(classes_[c], leaf);
         constexpr double least_area = 1e-12; // of the unit box: leaves on slivers have a mean, too
         for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) {
             const Triangle& t = mesh_.triangles[around_[i]];
             const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p,
                              cross = glm::cross(e, f);
             const double squared = glm::dot(cross, cross), area = std::sqrt(squared) / 6;
-            const glm::dvec4 own = value_of(c, leaf);
-            sum.corner_weight += area + least_area;
-            sum.corners += (area + least_area) * own;
             const glm::dvec3 by_e = glm::cross(f, cross) / squared, by_f = glm::cross(cross, e) / squared;
-            const glm::dvec4 s = value_of(c, t[0]), along_e = value_of(c, t[1]) - s, along_f = value_of(c, t[2]) - s;
-            std::array<glm::dvec3, most_channels_of_class> gradients{};
-            double steepest = 0;
-            for (std::size_t k = 0; k < c.channels; ++k) {
-                const int i_k = static_cast<int>(k);
-                gradients[k] = along_e[i_k] * by_e + along_f[i_k] * by_f;
-                steepest = std::max(steepest, glm::dot(gradients[k], gradients[k]));
-            }
-            const double weight = area / (1 + steepest * c.scale * c.scale);
-            if (!(weight > 0)) continue;
-            sum.weight += weight;
-            for (std::size_t k = 0; k < c.channels; ++k) {
-                const double d = s[static_cast<int>(k)] - glm::dot(gradients[k], p);
-                sum.linear[k] += weight * glm::dvec4(gradients[k], d);
+            for (std::size_t c = 0; c < classes_.size(); ++c) {
+                sums[c].corner_weight += area + least_area;
+                sums[c].corners += (area + least_area) * own[c];
+                add_linear(classes_[c], t, {p, by_e, by_f, area}, sums[c]);
             }
         }
-        return sum;
+        return sums;
+    }
+
+    // A triangle: its first corner, what a step of 1 along its first and its last side's value adds to a gradient, and a
+    // third of its area.
+    struct Plane {
+        glm::dvec3 at, by_e, by_f;
+        double area;
+    };
+    void add_linear(const Class& of, const Triangle& t, const Plane& plane, Component& sum) const {
+        if (of.channels == 0) return;
+        const glm::dvec4 s = value_of(of, t[0]), along_e = value_of(of, t[1]) - s, along_f = value_of(of, t[2]) - s;
+        std::array<glm::dvec3, most_channels_of_class> gradients;
+        double steepest = 0;
+        for (std::size_t k = 0; k < of.channels; ++k) {
+            const int channel = static_cast<int>(k);
+            gradients[k] = along_e[channel] * plane.by_e + along_f[channel] * plane.by_f;
+            steepest = std::max(steepest, glm::dot(gradients[k], gradients[k]));
+        }
+        const double weight = plane.area / (1 + steepest * of.scale * of.scale);
+        if (!(weight > 0)) return;
+        sum.weight += weight;
+        for (std::size_t k = 0; k < of.channels; ++k)
+            sum.linear[k] +=
+                weight * glm::dvec4(gradients[k], s[static_cast<int>(k)] - glm::dot(gradients[k], plane.at));
     }
 
     // Unions of leaves; parts do not touch each other's.
@@ -662,7 +677,8 @@ private:
     NodeId interior_;
     bool splits_; // nodes may have several wedges
     glm::dvec3 centre_{0};
-    double scale_ = 1; // mesh units to the unit box
+    double scale_ = 1;                    // mesh units to the unit box
+    std::vector<glm::dvec3> unit_places_; // by place
     std::vector<Class> classes_;
 
     std::vector<Index> places_;               // by leaf; empty: the same
