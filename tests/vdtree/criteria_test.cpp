@@ -682,8 +682,8 @@ TEST(Orthographic, TakesAllOutlinesForOutlines) {
                 corner[k] = glm::dvec3(tree.positions()[tree.wedge_of_leaf(support::sound(tree).triangles()[t][k])]);
             const double facing = glm::dot(glm::cross(corner[1] - corner[0], corner[2] - corner[0]), back);
             for (int k = 0; k < 3; ++k)
-                for (NodeId node = support::sound(tree)
-                                       .parents()[tree.place_of_leaf(support::sound(tree).triangles()[t][k])];
+                for (NodeId node =
+                         support::sound(tree).parents()[tree.place_of_leaf(support::sound(tree).triangles()[t][k])];
                      node != no_node; node = support::sound(tree).parents()[node])
                     sides[node] |= facing > 0 ? 1 : 2;
         }

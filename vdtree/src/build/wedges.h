@@ -37,6 +37,6 @@ struct NodeWedges {
 
 // `shape` and `parts`: over places. `positions`: by node. Cost: linear but for places of very many leaves; parallel.
 NodeWedges find_wedges(const TreeShape& shape, const TreeParts& parts, std::span<const glm::vec3> positions,
-                        const LeafMesh& mesh, const Ancestors& ancestors);
+                       const LeafMesh& mesh, const Ancestors& ancestors);
 
 } // namespace unseen::vdtree
