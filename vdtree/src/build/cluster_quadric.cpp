@@ -1,12 +1,11 @@
-// Pair contraction by quadric error over position, luminance and the mesh's own attributes (Garland and Heckbert 1997,
-// 1998).
+// Pair contraction by quadric error over position and attribute classes: normals, texture coordinates, and colours with
+// luminance (Garland and Heckbert 1997, 1998).
 //
-// The welded vertices are parted by a kd-tree, each part is contracted by itself to a small share of its vertices, and
-// the parts are joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the
-// mesh alone, so the result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses
-// its best partner, and pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the
-// hierarchy differs little from strictly greedy order, but the work is linear a round, cache-friendly, and the tree is
-// balanced.
+// The places are parted by a kd-tree, each part is contracted by itself to a small share of its places, and the parts are
+// joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the mesh alone, so the
+// result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses its best partner, and
+// pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the hierarchy differs little from
+// strictly greedy order, but the work is linear a round, cache-friendly, and the tree is balanced.
 #include <unseen/vdtree/builder.h>
 
 #include <numeric>
@@ -26,73 +25,41 @@ namespace unseen::vdtree {
 
 namespace {
 
-// The corners as vertices, some of which are at one place.
-struct LeafInput {
-    MeshView mesh;
-    std::span<const float> luminance;
-    std::span<const glm::vec3> normals;
-    std::vector<double> areas;
-    std::vector<Index> coincident; // the first leaf at the same place
-    std::span<const Index> places;
-    std::vector<glm::dvec3> positions;
-
-    explicit LeafInput(const ClusterInput& input)
-        : luminance(input.leaves.luminance), normals(input.leaves.normals), areas(input.leaves.places.size()),
-          coincident(areas.size()), places(input.leaves.places), positions(areas.size()) {
-        std::vector<Index> first(input.mesh.positions.size(), no_node), count(first.size(), 0);
-        for (Index leaf = 0; leaf < places.size(); ++leaf) {
-            Index& at = first[places[leaf]];
-            if (at == no_node) at = leaf;
-            ++count[places[leaf]];
-            coincident[leaf] = at;
-            positions[leaf] = input.mesh.positions[places[leaf]];
-        }
-        for (Index leaf = 0; leaf < places.size(); ++leaf)
-            areas[leaf] = input.areas[places[leaf]] / count[places[leaf]];
-        mesh = {.positions = positions,
-                .triangles = input.leaves.triangles,
-                .normals = input.leaves.has_own_normals ? normals : std::span<const glm::vec3>(),
-                .colours = input.leaves.colours,
-                .uvs = input.leaves.uvs};
-    }
-};
-
-// Largest number of welded vertices in a part, so that its quadrics fit a core's cache.
+// Largest number of places in a part, so that its quadrics fit a core's cache.
 constexpr Index largest_part = 1 << 15;
 // Parts, and joined parts, are contracted to at most this many clusters: one in 32 of a full part. Few enough that
 // joining costs next to nothing, many enough that those along the border of the part, which had fewer partners to
 // choose from, are a small share.
 constexpr Index part_target = largest_part / 32;
 
-// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the
-// perceptual fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as
-// far for its triangles, for on a bumpy surface luminance then drowns the shape.
+// A normal that turns by one radian counts as this share of the model's extent. Half as much lets the surface of smooth
+// models stray 10% less for their triangles, but their shading looks worse; with twice as much it strays 25% farther.
+constexpr double normal_scale = 0.005;
+// One unit of relative luminance, and a colour that goes from 0 to 1, count as these shares of the extent. From 0.01 to
+// 0.2, the triangles that the perceptual fold test leaves differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times
+// as far for its triangles, for luminance then drowns the shape.
 constexpr double luminance_scale = 0.01;
-// A normal that turns by one radian, and a colour that goes from 0 to 1, count as these shares of the extent. Less than
-// luminance, which is what is seen of both in most lights.
-constexpr double normal_scale = 0.0025;
 constexpr double colour_scale = 0.005;
 // A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on
 // the texture, and most of a displacement is seen whatever it is.
-constexpr double texture_scale = 0.1;
+constexpr double texture_scale = 0.3;
 // Attributes count as if they were within this many extents, so that stray values stay finite when squared.
 constexpr double largest_value = 1e3;
 
-// ---- numbering of the welded vertices by space
+// ---- numbering of the places by space
 
 // The begin of part `part` of `parts`.
 Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
     return static_cast<Index>(static_cast<std::uint64_t>(part) * slots / parts);
 }
 
-// Welded vertices ("slots") in an order in which every part is a range, and the mesh's vertices in the order of their
-// slots.
+// Places ("slots") in an order in which every part is a range, and the leaves in the order of their slots.
 struct SpatialNumbering {
-    std::size_t parts = 1;             // a power of two
-    std::vector<Index> vertex_of_slot; // the first of its vertices
-    std::vector<Index> first_member;   // by slot, one longer: into `members`
-    std::vector<Index> members;        // vertices, by slot
-    std::vector<Index> place;          // by vertex: where it is in `members`
+    std::size_t parts = 1;            // a power of two
+    std::vector<Index> place_of_slot; // vertex of the mesh
+    std::vector<Index> first_leaf;    // by slot, one longer: into `leaves`
+    std::vector<Index> leaves;        // by number in the order: the input's leaf
+    std::vector<Index> number;        // by the input's leaf: where it is in `leaves`
 };
 
 class KdPartition {
@@ -208,34 +175,27 @@ std::size_t part_count(std::size_t slots) {
     return parts;
 }
 
-std::size_t slot_count(std::span<const Index> coincident) {
-    std::size_t slots = 0;
-    for (std::size_t v = 0; v < coincident.size(); ++v) slots += coincident[v] == v;
-    return slots;
-}
-
-Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, std::span<const Index> coincident,
-                                         const Members& members) {
+Result<SpatialNumbering> number_by_space(const ClusterInput& input, const Members& members) {
     SpatialNumbering n;
     n.parts = members.parts;
-    const Index vertices = static_cast<Index>(positions.size());
-    for (Index v = 0; v < vertices; ++v)
-        if (coincident[v] == v) n.vertex_of_slot.push_back(v);
-    const std::size_t slots = n.vertex_of_slot.size();
-    KdPartition(positions, n.vertex_of_slot, n.parts)
+    const std::span<const Index> places = input.leaves.places;
+    const Index slots = static_cast<Index>(input.mesh.positions.size()), leaves = static_cast<Index>(places.size());
+    n.place_of_slot.resize(slots);
+    std::iota(n.place_of_slot.begin(), n.place_of_slot.end(), Index{0});
+    KdPartition(input.mesh.positions, n.place_of_slot, n.parts)
         .run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
     if (members.count() > 1)
-        if (const auto shared = share_slots(n.vertex_of_slot, members); !shared) return shared.error();
+        if (const auto shared = share_slots(n.place_of_slot, members); !shared) return shared.error();
 
-    n.first_member.assign(slots + 1, 0);
-    n.place.resize(vertices);
-    for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
-    for (Index v = 0; v < vertices; ++v) ++n.first_member[n.place[coincident[v]] + 1];
-    std::partial_sum(n.first_member.begin(), n.first_member.end(), n.first_member.begin());
-    n.members.resize(vertices);
-    std::vector<Index> next(n.first_member.begin(), n.first_member.end() - 1);
-    for (Index v = 0; v < vertices; ++v) n.members[next[n.place[coincident[v]]]++] = v;
-    for (Index i = 0; i < vertices; ++i) n.place[n.members[i]] = i;
+    n.first_leaf.assign(slots + 1, 0);
+    n.leaves.resize(leaves);
+    n.number.resize(leaves);
+    std::vector<Index> slot_of_place(slots);
+    for (Index s = 0; s < slots; ++s) slot_of_place[n.place_of_slot[s]] = s;
+    for (const Index place : places) ++n.first_leaf[slot_of_place[place] + 1];
+    std::partial_sum(n.first_leaf.begin(), n.first_leaf.end(), n.first_leaf.begin());
+    std::vector<Index> next(n.first_leaf.begin(), n.first_leaf.end() - 1);
+    for (Index leaf = 0; leaf < leaves; ++leaf) n.leaves[n.number[leaf] = next[slot_of_place[places[leaf]]]++] = leaf;
     return n;
 }
 
@@ -243,7 +203,7 @@ Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, 
 
 class PartMaker {
 public:
-    PartMaker(const LeafInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
+    PartMaker(const ClusterInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
         measure();
         list_triangles();
     }
@@ -252,56 +212,35 @@ public:
         PartMesh out;
         const Index first_slot = part_begin(part, numbering_.parts, slots()),
                     end_slot = part_begin(part + 1, numbering_.parts, slots());
-        const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
-        const auto is_own = [&](Index place) { return place >= first && place < end; };
+        const Index first = numbering_.first_leaf[first_slot], end = numbering_.first_leaf[end_slot];
+        const auto is_own = [&](Index leaf) { return leaf >= first && leaf < end; };
         const auto triangles =
             std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
 
-        std::vector<Index> ghosts; // places of other parts' vertices, by slot
+        std::vector<Index>& ghosts = out.ghost_leaves;
         for (const Index t : triangles)
-            for (const Index v : input_.mesh.triangles[t])
-                if (!is_own(numbering_.place[v])) ghosts.push_back(numbering_.place[v]);
+            for (const Index leaf : input_.leaves.triangles[t])
+                if (!is_own(numbering_.number[leaf])) ghosts.push_back(numbering_.number[leaf]);
         std::sort(ghosts.begin(), ghosts.end());
         ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
 
-        out.first_slot = first_slot;
-        out.own_slots = end_slot - first_slot;
+        out.first_slot = first_slot, out.own_slots = end_slot - first_slot;
+        out.first_leaf = first, out.own_leaves = end - first;
         out.area_scale = area_scale_;
-        out.channels = 1 + (has_normals_ ? 3 : 0) + (texture_unit_ > 0 ? 2 : 0) + (input_.mesh.colours.empty() ? 0 : 3);
-        const std::size_t vertices = end - first + ghosts.size();
-        out.channel_values.reserve(vertices * out.channels);
-        out.slot_of_vertex.reserve(vertices);
-        out.positions.reserve(out.own_slots + ghosts.size());
-        const auto push_position = [&](Index slot) {
-            out.positions.push_back((input_.mesh.positions[numbering_.vertex_of_slot[slot]] - centre_) * scale_);
-        };
-        for (Index s = first_slot; s < end_slot; ++s) {
-            push_position(s);
-            for (Index i = numbering_.first_member[s]; i < numbering_.first_member[s + 1]; ++i) {
-                out.slot_of_vertex.push_back(s - first_slot);
-                push_channels(numbering_.members[i], out.channel_values);
-            }
-        }
-        for (const Index place : ghosts) {
-            const Index slot = static_cast<Index>(
-                std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
-                numbering_.first_member.begin() - 1);
-            if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
-                out.ghost_slots.push_back(slot);
-                push_position(slot);
-            }
-            out.slot_of_vertex.push_back(static_cast<Index>(out.positions.size() - 1));
-            push_channels(numbering_.members[place], out.channel_values);
-        }
+        out.classes = classes_;
+        out.normal_class = 0;
+        out.uv_class = texture_unit_ > 0 ? 1 : most_classes;
+        out.normal_scale = static_cast<float>(normal_scale);
+        push_leaves(first_slot, out);
         out.triangles.reserve(triangles.size());
         for (const Index t : triangles) {
-            Triangle local = input_.mesh.triangles[t];
-            for (Index& v : local) {
-                const Index place = numbering_.place[v];
-                v = is_own(place) ? place - first
-                                  : end - first +
-                                        static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) -
-                                                           ghosts.begin());
+            Triangle local = input_.leaves.triangles[t];
+            for (Index& leaf : local) {
+                const Index number = numbering_.number[leaf];
+                leaf = is_own(number) ? number - first
+                                      : end - first +
+                                            static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), number) -
+                                                               ghosts.begin());
             }
             out.triangles.push_back(local);
         }
@@ -321,17 +260,49 @@ private:
         for (const double a : input_.areas) largest = std::max(largest, a);
         largest *= scale_ * scale_;
         area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
-        has_normals_ = !input_.mesh.normals.empty();
         texture_unit_ = texture_density() * texture_scale;
+        classes_.channels[classes_.count++] = 3;
+        if (texture_unit_ > 0) classes_.channels[classes_.count++] = 2;
+        if (!input_.leaves.colours.empty()) classes_.channels[classes_.count++] = 4;
+    }
+
+    // The own ones, then the ghosts, each with its slot.
+    void push_leaves(Index first_slot, PartMesh& out) const {
+        const std::size_t leaves = out.own_leaves + out.ghost_leaves.size();
+        out.channel_values.reserve(leaves * classes_.total_channels());
+        out.slot_of_leaf.reserve(leaves);
+        out.positions.reserve(out.own_slots + out.ghost_leaves.size());
+        const auto push_position = [&](Index slot) {
+            out.positions.push_back((input_.mesh.positions[numbering_.place_of_slot[slot]] - centre_) * scale_);
+        };
+        const auto push_leaf = [&](Index number) {
+            const Index leaf = numbering_.leaves[number];
+            out.slot_of_leaf.push_back(static_cast<Index>(out.positions.size() - 1));
+            push_channels(leaf, out.channel_values);
+            if (!input_.leaves.materials.empty()) out.materials.push_back(input_.leaves.materials[leaf]);
+        };
+        for (Index s = first_slot; s < first_slot + out.own_slots; ++s) {
+            push_position(s);
+            for (Index i = numbering_.first_leaf[s]; i < numbering_.first_leaf[s + 1]; ++i) push_leaf(i);
+        }
+        Index last_slot = static_cast<Index>(slots());
+        for (const Index number : out.ghost_leaves) {
+            const Index slot = static_cast<Index>(
+                std::upper_bound(numbering_.first_leaf.begin(), numbering_.first_leaf.end(), number) -
+                numbering_.first_leaf.begin() - 1);
+            if (slot != std::exchange(last_slot, slot)) push_position(slot);
+            push_leaf(number);
+        }
     }
 
     // The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
     double texture_density() const {
-        if (input_.mesh.uvs.empty()) return 0;
+        const LeafView& leaves = input_.leaves;
+        if (leaves.uvs.empty()) return 0;
         double surface = 0, texture = 0;
-        for (const Triangle& t : input_.mesh.triangles) {
-            const auto p = [&](std::size_t k) { return input_.mesh.positions[t[k]] * scale_; };
-            const auto uv = [&](std::size_t k) { return glm::dvec2(input_.mesh.uvs[t[k]]); };
+        for (const Triangle& t : leaves.triangles) {
+            const auto p = [&](std::size_t k) { return input_.mesh.positions[leaves.places[t[k]]] * scale_; };
+            const auto uv = [&](std::size_t k) { return glm::dvec2(leaves.uvs[t[k]]); };
             surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
             const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
             texture += std::abs(e.x * f.y - e.y * f.x);
@@ -345,8 +316,9 @@ private:
         first_triangle_.assign(parts + 1, 0);
         std::vector<Index> part_of(input_.mesh.positions.size());
         parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
-            for (Index i = first_place(part); i < first_place(part + 1); ++i)
-                part_of[numbering_.members[i]] = static_cast<Index>(part);
+            const Index end = part_begin(part + 1, parts, slots());
+            for (Index s = part_begin(part, parts, slots()); s < end; ++s)
+                part_of[numbering_.place_of_slot[s]] = static_cast<Index>(part);
         });
         const auto for_each_use = [&](auto&& f) {
             for (std::size_t t = 0; t < count; ++t) {
@@ -364,33 +336,30 @@ private:
         for_each_use([&](std::size_t t, Index part) { triangles_[next[part]++] = static_cast<Index>(t); });
     }
 
-    void push_channels(Index v, std::vector<float>& to) const {
+    void push_channels(Index leaf, std::vector<float>& to) const {
+        const LeafView& leaves = input_.leaves;
         const auto push = [&](double value) {
             to.push_back(static_cast<float>(std::clamp(value, -largest_value, largest_value)));
         };
-        push(input_.luminance[v] * luminance_scale);
-        if (has_normals_)
-            for (int k = 0; k < 3; ++k) push(input_.normals[v][k] * normal_scale);
+        for (int k = 0; k < 3; ++k) push(leaves.normals[leaf][k] * normal_scale);
         if (texture_unit_ > 0)
-            for (int k = 0; k < 2; ++k) push(input_.mesh.uvs[v][k] * texture_unit_);
-        if (!input_.mesh.colours.empty())
-            for (int k = 0; k < 3; ++k) push(input_.mesh.colours[v][k] * colour_scale);
+            for (int k = 0; k < 2; ++k) push(leaves.uvs[leaf][k] * texture_unit_);
+        if (leaves.colours.empty()) return; // luminance is the normal's then
+        push(leaves.luminance[leaf] * luminance_scale);
+        for (int k = 0; k < 3; ++k) push(leaves.colours[leaf][k] * colour_scale);
     }
 
-    std::size_t slots() const { return numbering_.vertex_of_slot.size(); }
-    Index first_place(std::size_t part) const {
-        return numbering_.first_member[part_begin(part, numbering_.parts, slots())];
-    }
+    std::size_t slots() const { return input_.mesh.positions.size(); }
 
-    const LeafInput& input_;
+    const ClusterInput& input_;
     const SpatialNumbering& numbering_;
     glm::dvec3 centre_{0};
-    double scale_ = 1;      // mesh units to the unit box
-    double area_scale_ = 1; // areas in the unit box to shares of the largest
-    double texture_unit_ = 0;
-    bool has_normals_ = false;
+    double scale_ = 1;        // mesh units to the unit box
+    double area_scale_ = 1;   // areas in the unit box to shares of the largest
+    double texture_unit_ = 0; // length in the unit box that one unit of texture coordinates counts as
+    AttributeClasses classes_;
     std::vector<std::size_t> first_triangle_; // by part, one longer
-    std::vector<Index> triangles_;            // those that touch a vertex of the part, by part
+    std::vector<Index> triangles_;            // those that touch a place of the part, by part
 };
 
 // ---- the whole
@@ -403,9 +372,13 @@ void exchange_record(Record& r, Message& message) {
 
 template <class Joinable, class Message>
 void exchange_joinable(Joinable& c, Message& message) {
-    message(c.first_slot), message(c.end_slot), message(c.channels);
+    message(c.first_slot), message(c.end_slot), message(c.first_leaf), message(c.end_leaf);
+    message(c.classes.count);
+    for (auto& channels : c.classes.channels) message(channels);
     message(c.live.clusters), message(c.live.places), message(c.live.references), message(c.live.quadrics);
-    message(c.pairs), message(c.outer_edges), message(c.border_slots);
+    message(c.live.several), message(c.live.components);
+    message(c.triangles), message(c.outside);
+    message(c.pairs), message(c.links_of_pairs), message(c.links), message(c.outer_edges), message(c.border_leaves);
 }
 
 // The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
@@ -515,26 +488,28 @@ private:
     std::vector<Level> levels_;
 };
 
-// Numbers the clusters: vertices, joined coincident vertices, then the merges round by round, all parts side by side.
+// Numbers the clusters: places, then the merges round by round, all parts side by side.
 class ClusteringWriter {
 public:
-    ClusteringWriter(const LeafInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
+    ClusteringWriter(const ClusterInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
         : input_(input), numbering_(numbering), maker_(maker) {}
 
     Clustering write(std::vector<Level>& levels) {
-        begin();
+        result_.parents.resize(places());
+        cluster_ = numbering_.place_of_slot;
+        made_by_joining_.resize(cluster_.size());
         for (Level& level : levels) {
             write_level(level);
             level = {};
         }
         result_.parents.back() = static_cast<Index>(result_.parents.size() - 1);
         for (Index c = 0; c < result_.deviations.size(); ++c)
-            raise(result_.parents[vertices() + c], result_.deviations[c]);
+            raise(result_.parents[places() + c], result_.deviations[c]);
         return std::move(result_);
     }
 
 private:
-    // Round by round, and in a round record by record; records of one level have no vertex in common.
+    // Round by round, and in a round record by record; records of one level have no place in common.
     void write_level(const Level& level) {
         std::size_t rounds = 0;
         for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
@@ -562,20 +537,13 @@ private:
         return number;
     }
 
-    void begin() {
-        result_.parents.resize(vertices());
-        cluster_.resize(vertices());
-        for (Index s = 0; s < vertices(); ++s) cluster_[s] = input_.places[numbering_.vertex_of_slot[s]];
-        made_by_joining_.resize(vertices());
-    }
-
     void raise(Index cluster, float deviation) {
-        float& here = result_.deviations[cluster - vertices()];
+        float& here = result_.deviations[cluster - places()];
         here = std::max(here, deviation);
     }
-    Index vertices() const { return static_cast<Index>(numbering_.vertex_of_slot.size()); }
+    Index places() const { return static_cast<Index>(input_.mesh.positions.size()); }
 
-    const LeafInput& input_;
+    const ClusterInput& input_;
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
@@ -585,14 +553,13 @@ private:
 
 } // namespace
 
-Result<Clustering> cluster_quadric(const ClusterInput& given, const Progress& progress, Team* team) {
-    const LeafInput input(given);
-    const std::size_t slots = slot_count(input.coincident);
+Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
+    const std::size_t slots = input.mesh.positions.size();
     const Members members{team, part_count(slots)};
     if (!members.has_part()) return Clustering();
     ProgressCounter counter(progress, (slots - 1) / members.count()); // each counts its own merges
     if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
+    const auto numbering = number_by_space(input, members);
     if (!numbering) return numbering.error();
     const PartMaker maker(input, *numbering);
     auto levels = PartContractor(maker, members, counter).run();

@@ -3,11 +3,15 @@
 #include <bit>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 
-#include "build/quadric.h"
+#include "build/component_merger.h"
+#include "build/quadric_setup.h"
 #include "build/spatial_order.h"
+#include "build/triangle_rings.h"
 
 // Vectors wider than the target's are only handed to functions that are inlined.
 #pragma GCC diagnostic ignored "-Wpsabi"
@@ -16,18 +20,11 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes. Keeps
-// clusters compact where the planes do not care. With 0.01 bunny and dragon stray 7 to 11% farther for their triangles;
-// with 0.001 hardly less far than with this, but clusters grow long in flat areas.
-constexpr float compactness = 0.003f;
-// Weight of a channel's variance within a cluster, against the deviation from the interpolated value.
-constexpr float channel_compactness = 0.1f;
-// Weight of the planes that stand on boundary edges, against those of triangles.
-constexpr double boundary_weight = 4;
+// Weight of the squared distance between a cluster's places and its proxy, against that from the planes. It puts what the
+// planes do not care for in order, and does not take part in placing.
+constexpr float compactness = 1e-4f;
 // Across a gap that no edge bridges, the full squared distance counts: joining two parts moves both.
 constexpr float gap_weight = 1;
-// Areas may be tiny or zero; every vertex keeps a little weight of its own, so that the form has a minimum.
-constexpr double least_weight = 1e-6; // share of the largest vertex area
 // A round that contracts a smaller share of the clusters takes other than mutually best pairs too: errors that grow
 // along a chain would otherwise contract one pair a round.
 constexpr std::size_t least_round_share = 16; // one in so many
@@ -36,6 +33,16 @@ constexpr std::size_t curve_neighbours = 3;
 
 // Rounds in which a component that is released becomes a single vertex and is taken up by a neighbour.
 constexpr std::size_t rounds_to_absorb = 4;
+
+// Components that a cluster keeps open at most, for what it costs to judge a pair grows with them. Beyond, at poles of
+// thousands of triangles with coordinates of their own, both sides of a seam may drift apart. The helmet's clusters have
+// up to 8, all but a few up to 4.
+constexpr std::size_t most_components = 24;
+
+// Whether a merge turns triangles over is tested from when one in so many clusters of a part is left, and always among so
+// few. From the start it would take half as long again to contract, for what is turned over there is small and rare, and
+// cuts repair it.
+constexpr std::size_t tested_share = 4, always_tested = 2048;
 
 constexpr Index none = std::numeric_limits<Index>::max();
 
@@ -51,237 +58,28 @@ UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[lanes],
     }
 }
 
-// ---- a part's first clusters
-
-class PartSetup {
-public:
-    explicit PartSetup(const PartMesh& part)
-        : part_(part), own_(part.own_slots), channels_(part.channels), stride_(quadric_stride(channels_)) {
-        result_.first_slot = part.first_slot;
-        result_.end_slot = part.first_slot + own_;
-        result_.channels = channels_;
-    }
-
-    Contraction run() {
-        make_clusters();
-        for (const Triangle& t : part_.triangles) add_triangle(t);
-        add_vertices();
-        find_edges();
-        return std::move(result_);
-    }
-
-private:
-    float* quadric_of(Index slot) { return result_.live.quadrics.data() + slot * stride_; }
-    Index slot(Index vertex) const { return part_.slot_of_vertex[vertex]; }
-    const float* values(Index vertex) const { return part_.channel_values.data() + vertex * channels_; }
-    glm::dvec3 corner(Index vertex) const { return part_.positions[slot(vertex)]; }
-
-    void make_clusters() {
-        LiveClusters& live = result_.live;
-        for (Index s = 0; s < own_; ++s) live.clusters.push_back({part_.first_slot + s, 0});
-        live.places.assign(part_.positions.begin(), part_.positions.begin() + own_);
-        live.quadrics.assign(own_ * stride_, 0);
-        live.references.assign(own_ * channels_, 0);
-        for (Index v = 0; v < part_.slot_of_vertex.size() && slot(v) < own_;) {
-            Index end = v;
-            float* reference = live.references.data() + slot(v) * channels_;
-            for (; end < part_.slot_of_vertex.size() && slot(end) == slot(v); ++end)
-                for (std::size_t c = 0; c < channels_; ++c) reference[c] += values(end)[c];
-            for (std::size_t c = 0; c < channels_; ++c) reference[c] /= static_cast<float>(end - v);
-            v = end;
-        }
-        own_vertices_ =
-            static_cast<Index>(std::lower_bound(part_.slot_of_vertex.begin(), part_.slot_of_vertex.end(), own_) -
-                               part_.slot_of_vertex.begin());
-        vertex_weights_.assign(own_vertices_, static_cast<float>(least_weight));
-    }
-
-    static void add_plane(float* q, float strength, glm::vec3 n) {
-        using namespace quadric;
-        q[xx] += strength * n.x * n.x, q[xy] += strength * n.x * n.y, q[xz] += strength * n.x * n.z;
-        q[yy] += strength * n.y * n.y, q[yz] += strength * n.y * n.z, q[zz] += strength * n.z * n.z;
-    }
-
-    // The plane, and each channel's linear function on it, seen from each own corner.
-    void add_triangle(const Triangle& t) {
-        using namespace quadric;
-        const glm::dvec3 p = corner(t[0]), e = corner(t[1]) - p, f = corner(t[2]) - p;
-        const glm::dvec3 cross = glm::cross(e, f);
-        const double squared = glm::dot(cross, cross);
-        if (!(squared > 0)) return;
-        const double length = std::sqrt(squared);
-        const glm::vec3 n(cross / length);
-        const float area = static_cast<float>(length * part_.area_scale / 6); // a third of the triangle's
-        const glm::dvec3 by_e = glm::cross(f, cross) / squared, by_f = glm::cross(cross, e) / squared;
-        glm::vec3 gradients[most_channels];
-        float weights[most_channels];
-        for (std::size_t c = 0; c < channels_; ++c) {
-            const double base = values(t[0])[c];
-            const glm::vec3 g((values(t[1])[c] - base) * by_e + (values(t[2])[c] - base) * by_f);
-            const float g_squared = glm::dot(g, g);
-            const bool bounded = g_squared < std::numeric_limits<float>::max();
-            gradients[c] = bounded ? g : glm::vec3(0);
-            weights[c] = bounded ? area / (1 + g_squared) : 0;
-        }
-        for (const Index v : t) {
-            const Index s = slot(v);
-            if (s >= own_) continue;
-            vertex_weights_[v] += area;
-            float* q = quadric_of(s);
-            add_plane(q, area, n);
-            for (std::size_t c = 0; c < channels_; ++c) {
-                const glm::vec3 g = gradients[c];
-                const float cw = weights[c], wd = cw * (values(v)[c] - result_.live.references[s * channels_ + c]);
-                add_plane(q, cw, g);
-                q[hx] += wd * g.x, q[hy] += wd * g.y, q[hz] += wd * g.z;
-                float* channel = q + first_channel + c * channel_size;
-                channel[gx] += cw * g.x, channel[gy] += cw * g.y, channel[gz] += cw * g.z;
-                channel[d] += wd;
-                channel[quadric::w] += cw;
-            }
-        }
-    }
-
-    void add_vertices() {
-        using namespace quadric;
-        for (Index v = 0; v < own_vertices_; ++v) {
-            const Index s = slot(v);
-            float* q = quadric_of(s);
-            const float point = vertex_weights_[v];
-            q[weight] += point;
-            q[xx] += point * compactness, q[yy] += point * compactness, q[zz] += point * compactness;
-            for (std::size_t c = 0; c < channels_; ++c) {
-                float* channel = q + first_channel + c * channel_size;
-                channel[d] += point * channel_compactness * (values(v)[c] - result_.live.references[s * channels_ + c]);
-                channel[quadric::w] += point * channel_compactness;
-            }
-        }
-        // Where vertices with different values coincide, that difference is there before any contraction and costs
-        // nothing.
-        for (Index s = 0; s < own_; ++s) {
-            float* q = quadric_of(s);
-            for (std::size_t c = 0; c < channels_; ++c) {
-                const float* channel = q + first_channel + c * channel_size;
-                q[k] += channel[d] * channel[d] / channel[quadric::w];
-            }
-        }
-    }
-
-    // One side of a triangle; lower and higher local slot.
-    struct Use {
-        Index high;
-        Index side; // triangle * 3 + its first corner
-    };
-
-    // From a lower slot, with its sides of triangles.
-    struct Edge {
-        Index high, side, second_side = none, uses = 1;
-    };
-
-    // Every edge with an own end: within the part a pair, to a ghost an outer edge. An edge with one triangle holds the
-    // contour.
-    void find_edges() {
-        std::vector<Index> start(own_ + 1, 0);
-        const auto for_each_side = [&](auto&& f) {
-            for (Index t = 0; t < part_.triangles.size(); ++t) {
-                const Triangle& tri = part_.triangles[t];
-                for (Index c = 0; c < 3; ++c) {
-                    const Index a = slot(tri[c]), b = slot(tri[c == 2 ? 0 : c + 1]);
-                    if (a != b && std::min(a, b) < own_) f(std::min(a, b), std::max(a, b), t * 3 + c);
-                }
-            }
-        };
-        for_each_side([&](Index low, Index, Index) { ++start[low + 1]; });
-        std::partial_sum(start.begin(), start.end(), start.begin());
-        std::vector<Use> uses(start.back());
-        for_each_side([&](Index low, Index high, Index side) { uses[start[low]++] = {high, side}; });
-        // Filling has moved each start to its end.
-        std::vector<Index> seen_from(part_.positions.size(), none), entry(part_.positions.size());
-        result_.pairs.reserve(uses.size() / 2 + uses.size() / 16);
-        std::vector<Edge> edges;
-        for (Index low = 0; low < own_; ++low) {
-            edges.clear();
-            for (Index i = low == 0 ? 0 : start[low - 1]; i < start[low]; ++i) {
-                const Use& use = uses[i];
-                if (seen_from[use.high] != low) {
-                    seen_from[use.high] = low;
-                    entry[use.high] = static_cast<Index>(edges.size());
-                    edges.push_back({use.high, use.side});
-                } else if (Edge& edge = edges[entry[use.high]]; ++edge.uses == 2) {
-                    edge.second_side = use.side;
-                }
-            }
-            for (const Edge& edge : edges) {
-                if (edge.uses == 1) add_boundary(low, edge.high, edge.side, boundary_weight);
-                if (edge.uses == 2) hold_seam(low, edge);
-                if (edge.high < own_) {
-                    result_.pairs.push_back({low, edge.high});
-                } else {
-                    result_.outer_edges.push_back({low, part_.ghost_slots[edge.high - own_]});
-                    if (result_.border_slots.empty() || result_.border_slots.back().cluster != low)
-                        result_.border_slots.push_back({part_.first_slot + low, low});
-                }
-            }
-        }
-    }
-
-    // A plane through the edge, at a right angle to its triangle.
-    void add_boundary(Index low, Index high, Index side, double edge_weight) {
-        const Triangle& t = part_.triangles[side / 3];
-        const glm::dvec3 p = corner(t[side % 3]), edge = corner(t[(side + 1) % 3]) - p,
-                         inner = corner(t[(side + 2) % 3]) - p;
-        const double squared = glm::dot(edge, edge);
-        const glm::dvec3 normal = inner - edge * (glm::dot(inner, edge) / squared);
-        const double length = glm::length(normal);
-        if (!(length > 0) || !(squared > 0)) return;
-        const glm::vec3 n(normal / length);
-        const float strength = static_cast<float>(edge_weight * squared * part_.area_scale);
-        for (const Index s : {low, high})
-            if (s < own_) add_plane(quadric_of(s), strength, n);
-    }
-
-    // Two triangles that meet at an edge with different vertices: where the values differ, the seam is a contour too.
-    void hold_seam(Index low, const Edge& edge) {
-        if (own_vertices_ == own_ && part_.slot_of_vertex.size() == part_.positions.size()) return; // nothing coincides
-        const Triangle &t = part_.triangles[edge.side / 3], &u = part_.triangles[edge.second_side / 3];
-        const Index t0 = t[edge.side % 3], t1 = t[(edge.side + 1) % 3];
-        Index u0 = u[edge.second_side % 3], u1 = u[(edge.second_side + 1) % 3];
-        if (slot(u0) != slot(t0)) std::swap(u0, u1);
-        if (t0 == u0 && t1 == u1) return;
-        float difference = 0; // unit-box length squared
-        for (std::size_t c = 0; c < channels_; ++c) {
-            const float at0 = values(t0)[c] - values(u0)[c], at1 = values(t1)[c] - values(u1)[c];
-            difference = std::max({difference, at0 * at0, at1 * at1});
-        }
-        // A step in the values as large as `whole_step` is held like a boundary, a smaller one less.
-        constexpr float whole_step = 0.002f; // unit-box length
-        const double share = std::min(1.0f, difference / (whole_step * whole_step));
-        if (!(share > 0)) return;
-        for (const Index side : {edge.side, edge.second_side})
-            add_boundary(low, edge.high, side, boundary_weight * share);
-    }
-
-    const PartMesh& part_;
-    Index own_, own_vertices_ = 0;
-    std::size_t channels_, stride_;
-    std::vector<float> vertex_weights_; // by own vertex
-    Contraction result_;
-};
-
 // ---- rounds of contraction
 
 class Contractor {
 public:
     explicit Contractor(Contraction& c)
-        : c_(c), live_(c.live), merges_(c.record.merges), channels_(c.channels), stride_(quadric_stride(c.channels)) {}
+        : c_(c), live_(c.live), merges_(c.record.merges), classes_(c.classes), channels_(classes_.total_channels()),
+          stride_(classes_.stride()), merger_(live_, classes_), rings_(c), tags_(c.live.size()),
+          refusals_(c.live.size(), 0) {
+        std::iota(tags_.begin(), tags_.end(), Index{0});
+        for (Index k = 0; k < classes_.count; ++k) links_of_each_class_.push_back({k, k});
+    }
 
     void run(Index target, const RoundCallback& after_round) {
         const std::size_t wanted = std::max<Index>(target, 1);
         if (live_.size() <= wanted) return;
+        const std::size_t tested_clusters = std::max<std::size_t>(live_.size() / tested_share, always_tested);
         merges_.reserve(live_.size() - wanted);
         find_components();
+        if (has_seams()) close_components(true);
         for (std::size_t round = 0; live_.size() > wanted; ++round) {
             const std::size_t before = merges_.size(), clusters = live_.size();
+            if (!rings_.is_started() && clusters <= tested_clusters) rings_.start();
             if (impatient_ || round % rounds_to_absorb == 1) release_components();
             contract_round();
             const std::size_t made = merges_.size() - before;
@@ -292,17 +90,18 @@ public:
             close_gaps();
             if (!after_round(made)) return;
         }
-        const auto key = [](const Contraction::OuterEdge& edge) { return std::pair(edge.cluster, edge.far_slot); };
-        std::ranges::sort(c_.outer_edges, {}, key);
         std::vector<Contraction::OuterEdge>& edges = c_.outer_edges;
-        const auto is_repeated = [&](const auto& a, const auto& b) { return key(a) == key(b); };
-        edges.erase(std::unique(edges.begin(), edges.end(), is_repeated), edges.end());
+        std::sort(edges.begin(), edges.end());
+        edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+        c_.triangles = rings_.left(tags_);
     }
 
 private:
     float* quadric_of(Index cluster) { return live_.quadrics.data() + cluster * stride_; }
     const float* quadric_of(Index cluster) const { return live_.quadrics.data() + cluster * stride_; }
     glm::vec3 offset(ClusterPair p) const { return glm::vec3(live_.places[p.b] - live_.places[p.a]); }
+    bool has_seams() const { return !live_.several.empty(); }
+    bool are_simple(ClusterPair p) const { return live_.is_simple(p.a) && live_.is_simple(p.b); }
 
     // ---- components
 
@@ -440,12 +239,22 @@ private:
         static constexpr std::uint64_t no_bits = ~std::uint64_t{0};
         std::uint64_t bits_ = no_bits;
     };
-    static constexpr float unknown_error = -1;
+    static constexpr float unknown_error = -1, waiting_error = -2; // a pair that waits is unknown a round later
 
-    // Errors of as many pairs as F has lanes. `channels` is channels_, as a constant where the compiler is to unroll.
+    // What the spread of the two clusters' places around their new one costs.
     template <class F>
-    UNSEEN_INLINE void errors_of(const ClusterPair* pairs, std::size_t channels, float* errors) const {
+    static UNSEEN_INLINE F spread(const Offset<F>& at, const Offset<F>& to, F weight_a, F weight_b) {
+        const F x = to.x - at.x, y = to.y - at.y, z = to.z - at.z;
+        return compactness *
+               (weight_a * (at.x * at.x + at.y * at.y + at.z * at.z) + weight_b * (x * x + y * y + z * z));
+    }
+
+    // Errors of as many pairs of simple clusters as F has lanes. `classes` is classes_, here and below, as a constant
+    // where the compiler is to unroll.
+    template <class F>
+    UNSEEN_INLINE void errors_of(const ClusterPair* pairs, const AttributeClasses classes, float* errors) const {
         constexpr std::size_t lanes = sizeof(F) / sizeof(float);
+        const std::size_t channels = classes.total_channels();
         Index a[lanes], b[lanes];
         float offsets[3][lanes], differences[most_channels][lanes];
         for (std::size_t l = 0; l < lanes; ++l) {
@@ -456,14 +265,24 @@ private:
             for (std::size_t c = 0; c < channels; ++c)
                 differences[c][l] = live_.references[b[l] * channels + c] - live_.references[a[l] * channels + c];
         }
-        F qa[most_quadric_floats], qb[most_quadric_floats], sum[most_quadric_floats], d[3], difference[most_channels];
-        std::memcpy(d, offsets, sizeof(d));
-        std::memcpy(difference, differences, channels * sizeof(F));
+        F qa[most_quadric_floats], qb[most_quadric_floats], sum[most_quadric_floats], raised[most_channels];
+        Offset<F> to;
+        std::memcpy(&to, offsets, sizeof(to));
+        std::memcpy(raised, differences, channels * sizeof(F));
         const float* quadrics = live_.quadrics.data();
-        gather(quadrics, a, quadric_stride(channels), qa);
-        gather(quadrics, b, quadric_stride(channels), qb);
-        add_from(qa, qb, d[0], d[1], d[2], difference, channels, sum);
-        const F found = minimise(sum, d[0], d[1], d[2], channels).error;
+        gather(quadrics, a, classes.stride(), qa);
+        gather(quadrics, b, classes.stride(), qb);
+        add_base(qa, qb, to, sum);
+        for (std::size_t k = 0; k < classes.count; ++k) {
+            const std::size_t first = classes.first_float(k);
+            add_block(qa + first, qb + first, to, raised + classes.first_channel(k), classes.channels[k], sum + first,
+                      sum);
+        }
+        Form<F> form = Form<F>::of_base(sum);
+        for (std::size_t k = 0; k < classes.count; ++k)
+            form.eliminate(sum + classes.first_float(k), classes.channels[k]);
+        const Minimum<F> best = minimise(form, to, 1);
+        const F found = best.error + spread(best.at, to, qa[quadric::weight], qb[quadric::weight]);
         std::memcpy(errors, &found, sizeof(F));
     }
     template <class F>
@@ -474,8 +293,9 @@ private:
             float found[lanes];
             const std::size_t count = std::min(lanes, pairs.size() - i);
             for (std::size_t l = 0; l < lanes; ++l) some[l] = pairs[i + std::min(l, count - 1)];
-            if (channels_ == 1) errors_of<F>(some, 1, found);
-            else errors_of<F>(some, channels_, found);
+            if (classes_ == only_normals) errors_of<F>(some, only_normals, found);
+            else if (classes_ == normals_and_uvs) errors_of<F>(some, normals_and_uvs, found);
+            else errors_of<F>(some, classes_, found);
             std::copy_n(found, count, errors + i);
         }
     }
@@ -486,6 +306,55 @@ private:
     void find_errors(std::span<const ClusterPair> pairs, float* errors) const {
         if (has_avx2()) errors_by_eights(pairs, errors);
         else errors_of_all<Float4>(pairs, errors);
+    }
+
+    // Gaps have no links of their own: what they bridge becomes one.
+    std::span<const Link> links_of(std::size_t pair) const {
+        if (pair >= c_.links_of_pairs.size()) return links_of_each_class_;
+        const LinkRange range = c_.links_of_pairs[pair];
+        return std::span(c_.links).subspan(range.first, range.count);
+    }
+
+    // What the error of a pair is found from where a cluster has several components.
+    struct Candidate {
+        Form<float> form;
+        Offset<float> to;
+        float weight_a, weight_b, unused = 0;
+    };
+    static_assert(sizeof(Candidate) == 16 * sizeof(float));
+
+    Candidate candidate(std::size_t pair) {
+        const ClusterPair p = c_.pairs[pair];
+        merger_.unite(p, links_of(pair));
+        const glm::vec3 d = offset(p);
+        return {merger_.form(), {d.x, d.y, d.z}, quadric_of(p.a)[quadric::weight], quadric_of(p.b)[quadric::weight]};
+    }
+
+    // As many as F has lanes.
+    template <class F>
+    static UNSEEN_INLINE void errors_of(const Candidate* some, float* errors) {
+        F columns[16];
+        for (std::size_t i = 0; i < 16; i += 4)
+            load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &some[lane].form.xx + i; }, columns + i);
+        const Form<F> form{columns[0], columns[1], columns[2], columns[3], columns[4],
+                           columns[5], columns[6], columns[7], columns[8], columns[9]};
+        const Offset<F> to{columns[10], columns[11], columns[12]};
+        const Minimum<F> best = minimise(form, to, 1);
+        const F found = best.error + spread(best.at, to, columns[13], columns[14]);
+        std::memcpy(errors, &found, sizeof(F));
+    }
+
+    // The same on every processor: four and four of them.
+    void find_errors_of_several() {
+        constexpr std::size_t lanes = sizeof(Float4) / sizeof(float);
+        candidates_.clear();
+        for (const Index pair : several_) candidates_.push_back(candidate(pair));
+        candidates_.resize((several_.size() + lanes - 1) / lanes * lanes);
+        for (std::size_t i = 0; i < several_.size(); i += lanes) {
+            float found[lanes];
+            errors_of<Float4>(candidates_.data() + i, found);
+            for (std::size_t l = 0; l < lanes && i + l < several_.size(); ++l) pair_errors_[several_[i + l]] = found[l];
+        }
     }
 
     // Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
@@ -500,14 +369,26 @@ private:
         pair_errors_.resize(c_.pairs.size(), unknown_error);
         unknown_.clear();
         unknown_pairs_.clear();
+        several_.clear();
+        const bool any_several = has_seams();
         for (std::size_t i = first; i < c_.pairs.size(); ++i) {
             if (pair_errors_[i] >= 0) continue;
+            if (pair_errors_[i] == waiting_error) {
+                pair_errors_[i] = unknown_error;
+                waits_[c_.pairs[i].a] = waits_[c_.pairs[i].b] = 1;
+                continue;
+            }
+            if (any_several && !are_simple(c_.pairs[i])) {
+                several_.push_back(static_cast<Index>(i));
+                continue;
+            }
             unknown_.push_back(static_cast<Index>(i));
             unknown_pairs_.push_back(c_.pairs[i]);
         }
         found_errors_.resize(unknown_.size());
         find_errors(unknown_pairs_, found_errors_.data());
         for (std::size_t i = 0; i < unknown_.size(); ++i) pair_errors_[unknown_[i]] = found_errors_[i];
+        find_errors_of_several();
     }
 
     // Lets the pairs from `first` on compete for being the best of their clusters; `gaps`: no edges join them. Ties go
@@ -517,6 +398,7 @@ private:
         for (std::size_t i = first; i < c_.pairs.size(); ++i) {
             const ClusterPair p = c_.pairs[i];
             if (gaps ? !is_allowed(p) : held_[p.a] != 0) continue; // an edge is within one component
+            if (pair_errors_[i] < 0) continue;                     // it waits
             const Rank rank(pair_errors_[i] + (gaps ? gap_error(p) : 0), static_cast<Index>(i));
             best_[p.a] = std::min(best_[p.a], rank);
             best_[p.b] = std::min(best_[p.b], rank);
@@ -538,7 +420,7 @@ private:
     void connect_lone_clusters() {
         lone_.assign(live_.size(), 0);
         bool any = false;
-        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s].is_none());
+        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s].is_none() && !waits_[s]);
         if (!any) return;
         if (!impatient_)
             for (const auto& edge : c_.outer_edges) lone_[edge.cluster] = 0;
@@ -560,8 +442,14 @@ private:
         into_.resize(clusters);
         std::iota(into_.begin(), into_.end(), Index{0});
         taken_.assign(clusters, 0);
+        waits_.assign(clusters, 0);
         held_.resize(clusters);
         for (Index s = 0; s < clusters; ++s) held_[s] = is_held(s);
+        if (has_seams()) {
+            several_before_ = live_.several;
+            numbers_of_.assign(clusters, none);
+            numbers_.clear();
+        }
         edges_ = c_.pairs.size();
         compete(0, false);
         connect_lone_clusters();
@@ -596,8 +484,7 @@ private:
         for (Index s = 0; s < best_.size(); ++s) {
             if (best_[s].is_none()) continue;
             const ClusterPair p = c_.pairs[best_[s].pair()];
-            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p))
-                contract(p, best_[s].error(), best_[s].pair() >= edges_);
+            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p)) contract(best_[s]);
         }
     }
 
@@ -609,7 +496,7 @@ private:
         std::sort(order.begin(), order.end());
         for (const Rank& best : order) {
             const ClusterPair p = c_.pairs[best.pair()];
-            if (!taken_[p.a] && !taken_[p.b] && is_allowed(p)) contract(p, best.error(), best.pair() >= edges_);
+            if (!taken_[p.a] && !taken_[p.b] && is_allowed(p) && pair_errors_[best.pair()] >= 0) contract(best);
         }
     }
 
@@ -624,8 +511,7 @@ private:
             if (rival == none) {
                 rival = s;
             } else if (is_allowed({rival, s})) {
-                contract({rival, s}, std::max(best_[rival].error(), best_[s].error()), false);
-                rival = none;
+                if (contract({rival, s}, std::max(best_[rival].error(), best_[s].error()), false, {})) rival = none;
             }
         }
     }
@@ -647,31 +533,179 @@ private:
         to.made_by = from.name;
     }
 
-    // Joins b to a: a's slot holds the new cluster.
-    void contract(ClusterPair p, float error, bool gap) {
+    struct Trial {
+        float error;
+        bool tested; // for triangles that turn over
+    };
+    // Where a cluster made of two goes.
+    struct Placed {
+        Offset<float> from_a;
+        glm::dvec3 place;
+    };
+
+    // Where the form is least; where that turns a triangle over, at an end or the middle, if that costs hardly more; none,
+    // where all do. Where nothing is tested, at the first.
+    std::optional<Placed> place(const Form<double>& form, ClusterPair p, const Trial& trial) {
+        constexpr double most_costly = 1.5; // times the pair's error, which puts it in order
+        constexpr int steps = 3;            // see minimise(): what is 100 times as steep as flat is exact to 1e-6
+        const glm::vec3 d = offset(p);
+        const Offset<double> to{d.x, d.y, d.z};
+        const Placed best = at_offset(minimise(form, to, steps).at, p);
+        if (!trial.tested || !rings_.turns(tags_[p.a], tags_[p.b], best.place)) return best;
+        std::array<Offset<double>, 3> others{{{0, 0, 0}, to, {to.x / 2, to.y / 2, to.z / 2}}};
+        std::ranges::sort(others, {}, form);
+        for (const Offset<double>& other : others) {
+            const Placed placed = at_offset(other, p);
+            if (form(other) <= most_costly * trial.error && !rings_.turns(tags_[p.a], tags_[p.b], placed.place))
+                return placed;
+        }
+        return {};
+    }
+
+    // At an end exactly, where it is as near as that.
+    Placed at_offset(const Offset<double>& offset_from_a, ClusterPair p) const {
+        constexpr double same_place = 1e-5; // share of the pair's distance: floats do not know better
+        const glm::vec3 d = offset(p);
+        const glm::dvec3 at(offset_from_a.x, offset_from_a.y, offset_from_a.z), to(d);
+        const double slack = same_place * same_place * glm::dot(to, to);
+        if (glm::dot(at, at) <= slack) return {{0, 0, 0}, live_.places[p.a]};
+        if (glm::dot(at - to, at - to) <= slack) return {{d.x, d.y, d.z}, live_.places[p.b]};
+        const glm::vec3 rounded(at);
+        return {{rounded.x, rounded.y, rounded.z}, live_.places[p.a] + glm::dvec3(rounded)};
+    }
+
+    // The sum's base, after its blocks and the place have moved to the new place. What the clusters were spread before
+    // is in it.
+    void finish_base(float* base, const Offset<float>& at, ClusterPair p) {
+        const glm::vec3 d = offset(p);
+        base[quadric::k] =
+            std::max(base[quadric::k], 0.0f) +
+            spread(at, {d.x, d.y, d.z}, quadric_of(p.a)[quadric::weight], quadric_of(p.b)[quadric::weight]);
+        std::copy_n(base, std::size_t{quadric::base_size}, quadric_of(p.a));
+    }
+
+    // Gives a's numbers to both, if they can be placed.
+    std::optional<Placed> unite_simple(ClusterPair p, const Trial& trial) {
+        if (classes_ == only_normals) return unite_simple(p, trial, only_normals);
+        if (classes_ == normals_and_uvs) return unite_simple(p, trial, normals_and_uvs);
+        return unite_simple(p, trial, classes_);
+    }
+    UNSEEN_INLINE std::optional<Placed> unite_simple(ClusterPair p, const Trial& trial,
+                                                     const AttributeClasses classes) {
+        const std::size_t channels = classes.total_channels();
+        float sum[most_quadric_floats], raised[most_channels];
+        float *a = quadric_of(p.a), *b = quadric_of(p.b), *references = live_.references.data() + p.a * channels;
+        const glm::vec3 d = offset(p);
+        const Offset<float> to{d.x, d.y, d.z};
+        for (std::size_t c = 0; c < channels; ++c) raised[c] = live_.references[p.b * channels + c] - references[c];
+        add_base(a, b, to, sum);
+        for (std::size_t k = 0; k < classes.count; ++k) {
+            const std::size_t first = classes.first_float(k);
+            add_block(a + first, b + first, to, raised + classes.first_channel(k), classes.channels[k], sum + first,
+                      sum);
+        }
+        Form<double> form = Form<double>::of_base(sum);
+        for (std::size_t k = 0; k < classes.count; ++k)
+            form.eliminate(sum + classes.first_float(k), classes.channels[k]);
+        const std::optional<Placed> placed = place(form, p, trial);
+        if (!placed) return {};
+        move_base(sum, placed->from_a);
+        for (std::size_t k = 0; k < classes.count; ++k)
+            move_block(sum + classes.first_float(k), placed->from_a, references + classes.first_channel(k),
+                       classes.channels[k], sum);
+        finish_base(sum, placed->from_a, p);
+        const std::size_t blocks = quadric::base_size;
+        std::copy_n(sum + blocks, classes.first_float(classes.count) - blocks, a + blocks);
+        return placed;
+    }
+
+    std::optional<Placed> unite_several(ClusterPair p, const Trial& trial, std::span<const Link> links) {
+        merger_.unite(p, links);
+        const std::optional<Placed> placed = place(Form<double>::of(merger_.form()), p, trial);
+        if (!placed) return {};
+        move_base(merger_.base(), placed->from_a);
+        const std::span<ClassComponent> components = merger_.components();
+        for (ClassComponent& c : components)
+            move_block(c.block.data(), placed->from_a, c.references.data(), classes_.channels[c.attribute_class],
+                       merger_.base());
+        finish_base(merger_.base(), placed->from_a, p);
+        const Index before = static_cast<Index>(numbers_.size());
+        const Index of_a = several_before_[p.a].count == 0 ? classes_.count : several_before_[p.a].count;
+        numbers_of_[p.a] = before;
+        numbers_of_[p.b] = before + of_a;
+        numbers_.insert(numbers_.end(), merger_.numbers().begin(), merger_.numbers().end());
+        store_components(p.a, components);
+        return placed;
+    }
+
+    // At the end of the list; close_gaps() tidies it up.
+    void store_components(Index cluster, std::span<const ClassComponent> components) {
+        const Index count = static_cast<Index>(components.size());
+        if (count > classes_.count) {
+            live_.several[cluster] = {static_cast<Index>(live_.components.size()), count};
+            live_.components.insert(live_.components.end(), components.begin(), components.end());
+        } else {
+            make_simple(cluster, components);
+        }
+    }
+
+    // With one component of each class, in the classes' order.
+    void make_simple(Index cluster, std::span<const ClassComponent> components) {
+        live_.several[cluster] = {};
+        for (std::size_t k = 0; k < classes_.count; ++k) {
+            std::copy_n(components[k].block.data(), block_size(classes_.channels[k]),
+                        quadric_of(cluster) + classes_.first_float(k));
+            std::copy_n(components[k].references.data(), classes_.channels[k],
+                        live_.references.data() + cluster * channels_ + classes_.first_channel(k));
+        }
+    }
+
+    // Pairs that were refused often are not tested any more, or a part of the surface that cannot go on would wait for all
+    // others; nor are the last clusters of a component, whose triangles have to turn.
+    bool is_tested(ClusterPair p, bool gap) {
+        constexpr std::uint8_t patience = 6; // refusals
+        constexpr Index last_clusters = 4;
+        if (gap || impatient_ || !rings_.is_started() || std::min(refusals_[p.a], refusals_[p.b]) >= patience)
+            return false;
+        const Component& c = components_[component_of(p.a)];
+        return c.open || c.clusters > last_clusters;
+    }
+
+    void contract(const Rank& best) {
+        const ClusterPair p = c_.pairs[best.pair()];
+        if (!contract(p, best.error(), best.pair() >= edges_, links_of(best.pair())))
+            pair_errors_[best.pair()] = waiting_error;
+    }
+
+    // Joins b to a: a's slot holds the new cluster. False where a triangle would turn over.
+    bool contract(ClusterPair p, float error, bool gap, std::span<const Link> links) {
+        const Trial trial{error, is_tested(p, gap)};
+        const std::optional<Placed> placed = are_simple(p) ? unite_simple(p, trial) : unite_several(p, trial, links);
+        if (!placed) {
+            for (const Index s : {p.a, p.b}) refusals_[s] = static_cast<std::uint8_t>(std::min(refusals_[s] + 1, 255));
+            return false;
+        }
         note_vanishing(p, gap);
         note_components(p);
         taken_[p.a] = taken_[p.b] = 1;
         into_[p.b] = p.a;
-        float sum[most_quadric_floats] = {}, difference[most_channels];
-        float* references = live_.references.data() + p.a * channels_;
-        for (std::size_t c = 0; c < channels_; ++c)
-            difference[c] = live_.references[p.b * channels_ + c] - references[c];
-        const glm::vec3 d = offset(p);
-        add_from(quadric_of(p.a), quadric_of(p.b), d.x, d.y, d.z, difference, channels_, sum);
-        const Minimum<float> best = minimise(sum, d.x, d.y, d.z, channels_);
-        recentre(sum, best.x, best.y, best.z, references, channels_);
-        std::copy_n(sum, stride_, quadric_of(p.a));
-        live_.places[p.a] += glm::dvec3(best.x, best.y, best.z);
-        const float deviation = std::sqrt(error / sum[quadric::weight]);
+        refusals_[p.a] = 0;
+        live_.places[p.a] = placed->place;
+        rings_.unite(tags_[p.a], tags_[p.b], placed->place);
+        const float deviation = std::sqrt(error / quadric_of(p.a)[quadric::weight]);
         LiveCluster& made = live_[p.a];
         made.deviation = std::max({deviation, made.deviation, live_[p.b].deviation});
         merges_.push_back({made.name, live_[p.b].name, error, made.deviation, live_.places[p.a]});
+        return true;
     }
 
     // Renumbers the clusters without those that were joined to others, and the edges with them.
     void close_gaps() {
         new_number_.resize(live_.size());
+        if (has_seams()) {
+            for (auto& edge : c_.outer_edges) renumber_components(edge.cluster, edge.components);
+            for (auto& border : c_.border_leaves) renumber_components(border.cluster, border.components);
+        }
         Index kept = 0;
         for (Index s = 0; s < live_.size(); ++s) {
             if (into_[s] != s) continue;
@@ -680,6 +714,9 @@ private:
                 live_[kept] = live_[s];
                 live_.places[kept] = live_.places[s];
                 component_[kept] = component_[s];
+                tags_[kept] = tags_[s];
+                refusals_[kept] = refusals_[s];
+                if (has_seams()) live_.several[kept] = live_.several[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
                 std::copy_n(live_.references.data() + s * channels_, channels_,
                             live_.references.data() + kept * channels_);
@@ -691,11 +728,20 @@ private:
         live_.clusters.resize(kept);
         live_.places.resize(kept);
         component_.resize(kept);
+        tags_.resize(kept);
+        refusals_.resize(kept);
         live_.quadrics.resize(kept * stride_);
         live_.references.resize(kept * channels_);
         for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster] & ~is_new;
-        for (auto& border : c_.border_slots) border.cluster = new_number_[border.cluster] & ~is_new;
+        for (auto& border : c_.border_leaves) border.cluster = new_number_[border.cluster] & ~is_new;
+        if (has_seams()) {
+            live_.several.resize(kept);
+            pairs_before_ = c_.pairs;
+        }
         renumber_pairs(kept);
+        if (!has_seams()) return;
+        renumber_links();
+        close_components(false);
     }
 
     // Sorted by a, each pair once, with its error where it is still known. Linear: two counting passes, and a mark by
@@ -730,10 +776,184 @@ private:
         pair_errors_.resize(out);
     }
 
+    // ---- components of attribute classes
+
+    // The number that a component of a cluster has after the round.
+    Index new_component(Index cluster_before, Index number) const {
+        const Index first = numbers_of_[cluster_before];
+        return first == none ? number : numbers_[first + number];
+    }
+    void renumber_components(Index cluster_before, LeafComponents& components) const {
+        for (std::size_t k = 0; k < classes_.count; ++k)
+            if (components[k] != no_component) components[k] = new_component(cluster_before, components[k]);
+    }
+
+    // Links of all pairs that have become one go with it. Linear: the pairs from before are put in the order of their lower
+    // cluster now, and a mark says which pair leads to its partners.
+    void renumber_links() {
+        first_before_.assign(live_.size() + 1, 0);
+        const auto for_each_before = [&](auto&& f) {
+            for (Index i = 0; i < pairs_before_.size(); ++i) {
+                const Index x = new_number_[pairs_before_[i].a] & ~is_new,
+                            y = new_number_[pairs_before_[i].b] & ~is_new;
+                if (x != y && !(live_.is_simple(x) && live_.is_simple(y))) f(i, std::min(x, y));
+            }
+        };
+        for_each_before([&](Index, Index low) { ++first_before_[low + 1]; });
+        std::partial_sum(first_before_.begin(), first_before_.end(), first_before_.begin());
+        in_order_.resize(first_before_.back());
+        for_each_before(
+            [&](Index i, Index low) { in_order_[first_before_[low]++] = i; }); // moves each start to its end
+        found_links_.clear();
+        marks_.resize(live_.size());
+        for (std::size_t pair = 0, i = 0; pair < c_.pairs.size();) {
+            const Index low = c_.pairs[pair].a;
+            for (; pair < c_.pairs.size() && c_.pairs[pair].a == low; ++pair)
+                marks_[c_.pairs[pair].b] = static_cast<Index>(pair);
+            for (; i < first_before_[low]; ++i) find_links(in_order_[i], low);
+        }
+        sort_links();
+    }
+
+    // Of a pair from before the round whose lower cluster is `low` now; marks_ leads to the pairs.
+    void find_links(Index pair_before, Index low) {
+        const ClusterPair before = pairs_before_[pair_before];
+        const Index x = new_number_[before.a] & ~is_new, y = new_number_[before.b] & ~is_new;
+        const Index pair = marks_[x == low ? y : x];
+        const bool were_simple = several_before_[before.a].count == 0 && several_before_[before.b].count == 0;
+        for (const Link& link : were_simple ? std::span<const Link>(links_of_each_class_) : links_of(pair_before)) {
+            const Index a = new_component(before.a, link.a), b = new_component(before.b, link.b);
+            found_links_.push_back({pair, x == low ? Link{a, b} : Link{b, a}});
+        }
+    }
+
+    // From found_links_ to links by pair, each once.
+    void sort_links() {
+        c_.links_of_pairs.assign(c_.pairs.size(), {});
+        for (const FoundLink& found : found_links_) ++c_.links_of_pairs[found.pair].count;
+        Index first = 0;
+        for (LinkRange& range : c_.links_of_pairs) {
+            range.first = first;
+            first += std::exchange(range.count, 0);
+        }
+        c_.links.resize(first);
+        for (const FoundLink& found : found_links_) {
+            LinkRange& range = c_.links_of_pairs[found.pair];
+            c_.links[range.first + range.count++] = found.link;
+        }
+        for (LinkRange& range : c_.links_of_pairs) {
+            const auto begin = c_.links.begin() + range.first, end = begin + range.count;
+            std::sort(begin, end);
+            range.count = static_cast<Index>(std::unique(begin, end) - begin);
+        }
+    }
+
+    // Closes what nothing links any more, of the clusters that were made in this round, or of all; and the lightest where
+    // there are too many. Tidies up the list of components.
+    void close_components(bool all) {
+        find_linked();
+        std::vector<ClassComponent> list;
+        list.reserve(live_.components.size());
+        numbers_of_.assign(live_.size(), none);
+        numbers_.clear();
+        for (Index s = 0; s < live_.size(); ++s) {
+            LiveClusters::Several& several = live_.several[s];
+            if (several.count == 0) continue;
+            const auto now = std::span(live_.components).subspan(several.first, several.count);
+            if (all || has_to_close(several)) choose_components(s);
+            else chosen_.assign(now.begin(), now.end());
+            if (chosen_.size() == classes_.count) {
+                make_simple(s, chosen_);
+            } else {
+                several = {static_cast<Index>(list.size()), static_cast<Index>(chosen_.size())};
+                list.insert(list.end(), chosen_.begin(), chosen_.end());
+            }
+        }
+        live_.components.swap(list);
+        if (numbers_.empty()) return;
+        for (auto& edge : c_.outer_edges) renumber_components(edge.cluster, edge.components);
+        for (auto& border : c_.border_leaves) renumber_components(border.cluster, border.components);
+        for (std::size_t i = 0; i < c_.pairs.size(); ++i) drop_closed_links(i);
+    }
+
+    void find_linked() {
+        linked_.assign(live_.components.size(), 0);
+        const auto mark = [&](Index cluster, Index number) {
+            if (!live_.is_simple(cluster) && number != no_component) linked_[live_.several[cluster].first + number] = 1;
+        };
+        for (std::size_t i = 0; i < c_.pairs.size(); ++i)
+            for (const Link& link : links_of(i)) mark(c_.pairs[i].a, link.a), mark(c_.pairs[i].b, link.b);
+        for (const auto& edge : c_.outer_edges)
+            for (std::size_t k = 0; k < classes_.count; ++k) mark(edge.cluster, edge.components[k]);
+    }
+
+    bool has_to_close(const LiveClusters::Several& several) const {
+        const auto linked = std::span(linked_).subspan(several.first, several.count);
+        return several.count > most_components || std::ranges::find(linked, 0) != linked.end();
+    }
+
+    // Which components of a cluster stay, in chosen_. The others' best values are eliminated from the base.
+    void choose_components(Index s) {
+        const LiveClusters::Several several = live_.several[s];
+        const auto now = std::span(live_.components).subspan(several.first, several.count);
+        const auto weight = [&](Index i) {
+            return now[i].block[classes_.channels[now[i].attribute_class] * quadric::row_size];
+        };
+        // The linked and heavy ones first; of each class one.
+        order_of_components_.resize(several.count);
+        std::iota(order_of_components_.begin(), order_of_components_.end(), Index{0});
+        std::ranges::sort(order_of_components_, {},
+                          [&](Index i) { return std::tuple(!linked_[several.first + i], -weight(i), i); });
+        numbers_of_[s] = static_cast<Index>(numbers_.size());
+        numbers_.resize(numbers_.size() + several.count, no_component);
+        Index* numbers = numbers_.data() + numbers_of_[s];
+        chosen_.resize(classes_.count);
+        std::array<bool, most_classes> has{};
+        for (const Index i : order_of_components_) {
+            const Index k = now[i].attribute_class;
+            if (!std::exchange(has[k], true)) {
+                numbers[i] = k;
+                chosen_[k] = now[i];
+            } else if (linked_[several.first + i] && chosen_.size() < most_components) {
+                numbers[i] = static_cast<Index>(chosen_.size());
+                chosen_.push_back(now[i]);
+            } else {
+                close(quadric_of(s), now[i]);
+            }
+        }
+    }
+
+    void close(float* base, const ClassComponent& c) const {
+        using namespace quadric;
+        const std::size_t channels = classes_.channels[c.attribute_class];
+        Form<float> form = Form<float>::of_base(base);
+        form.eliminate(c.block.data(), channels);
+        base[xx] = form.xx, base[xy] = form.xy, base[xz] = form.xz;
+        base[yy] = form.yy, base[yz] = form.yz, base[zz] = form.zz;
+        base[hx] = form.hx, base[hy] = form.hy, base[hz] = form.hz;
+        base[quadric::k] = std::max(form.k, 0.0f);
+    }
+
+    void drop_closed_links(std::size_t pair) {
+        const ClusterPair p = c_.pairs[pair];
+        LinkRange& range = c_.links_of_pairs[pair];
+        const auto links = std::span(c_.links).subspan(range.first, std::exchange(range.count, 0));
+        if (are_simple(p)) return;
+        for (const Link& link : links) {
+            const Link now{new_component(p.a, link.a), new_component(p.b, link.b)};
+            if (now.a != no_component && now.b != no_component) c_.links[range.first + range.count++] = now;
+        }
+    }
+
     Contraction& c_;
     LiveClusters& live_;
     std::vector<Merge>& merges_;
+    AttributeClasses classes_;
     std::size_t channels_, stride_;
+    ComponentMerger merger_;
+    TriangleRings rings_;
+    std::vector<Index> tags_;            // by cluster: its tag in rings_
+    std::vector<std::uint8_t> refusals_; // by cluster: how often a triangle would have turned over since it was made
     struct Nearest {
         Index component;
         float distance;
@@ -746,10 +966,12 @@ private:
     std::vector<float> pair_errors_; // by pair
     std::vector<Index> unknown_;     // pairs whose errors are to be found; likewise the next
     std::vector<ClusterPair> unknown_pairs_;
+    std::vector<Index> several_; // those of them where a cluster has several components of a class
+    std::vector<Candidate> candidates_;
     std::vector<float> found_errors_;
     std::vector<Rank> best_;  // by cluster: its best pair
     std::vector<Index> into_; // by cluster: the one that it was joined to in this round, or itself
-    std::vector<std::uint8_t> taken_, lone_, held_;
+    std::vector<std::uint8_t> taken_, lone_, held_, waits_;
     struct Partner {
         Index cluster;
         float error;
@@ -760,20 +982,152 @@ private:
     std::vector<Index> new_number_, start_, marks_;
     std::vector<Partner> partners_;
     std::vector<CodedIndex> curve_, curve_scratch_, order_, order_scratch_;
+
+    // Of components, in a round. The numbers that a cluster's components get: numbers_, from numbers_of_ of it on; none:
+    // they keep theirs.
+    struct FoundLink {
+        Index pair;
+        Link link;
+    };
+    std::vector<Link> links_of_each_class_;
+    std::vector<LiveClusters::Several> several_before_;
+    std::vector<ClusterPair> pairs_before_;
+    std::vector<Index> numbers_of_, numbers_, first_before_, in_order_, order_of_components_;
+    std::vector<FoundLink> found_links_;
+    std::vector<std::uint8_t> linked_; // by component
+    std::vector<ClassComponent> chosen_;
 };
 
 void append(LiveClusters& to, const LiveClusters& from) {
     const auto add = [](auto& x, const auto& y) { x.insert(x.end(), y.begin(), y.end()); };
+    const Index shift = static_cast<Index>(to.components.size());
+    if (!to.several.empty() || !from.several.empty()) {
+        to.several.resize(to.size());
+        to.several.insert(to.several.end(), from.several.begin(), from.several.end());
+        to.several.resize(to.size() + from.size());
+        for (std::size_t i = to.size(); i < to.several.size(); ++i) to.several[i].first += shift;
+    }
+    add(to.components, from.components);
     add(to.clusters, from.clusters);
     add(to.places, from.places);
     add(to.references, from.references);
     add(to.quadrics, from.quadrics);
 }
 
+// The edges between two neighbouring ranges, and the edges of each, in one list, each once, with its links.
+class PairJoiner {
+public:
+    PairJoiner(Contraction& to, const Contraction& left, const Contraction& right)
+        : to_(to), left_(left), right_(right), shift_(static_cast<Index>(left.live.size())) {}
+
+    void run() {
+        join_triangles();
+        for (const auto& edge : left_.outer_edges)
+            if (edge.far_leaf >= right_.first_leaf && edge.far_leaf < right_.end_leaf) add_edge(edge);
+        std::sort(crossing_.begin(), crossing_.end());
+        auto next = crossing_.begin();
+        for (std::size_t i = 0; i < left_.pairs.size(); ++i) {
+            for (; next != crossing_.end() && next->pair < left_.pairs[i]; ++next) add_crossing(*next);
+            add_pair(left_, i, 0);
+        }
+        for (; next != crossing_.end(); ++next) add_crossing(*next);
+        for (std::size_t i = 0; i < right_.pairs.size(); ++i) add_pair(right_, i, shift_);
+    }
+
+private:
+    struct Crossing {
+        ClusterPair pair;
+        Link link;
+        auto operator<=>(const Crossing&) const = default;
+    };
+
+    bool has_seams() const { return !to_.live.several.empty(); }
+
+    static auto border_of(const Contraction& side, Index leaf) {
+        return std::ranges::lower_bound(side.border_leaves, leaf, {}, &Contraction::BorderLeaf::leaf);
+    }
+
+    // Triangles of both sides are those of the left.
+    void join_triangles() {
+        const auto is_inside = [&](Index leaf) { return leaf >= left_.first_leaf && leaf < right_.end_leaf; };
+        for (const Contraction* side : {&left_, &right_})
+            for (const auto& leaf : side->outside)
+                if (!is_inside(leaf.leaf)) to_.outside.push_back(leaf);
+        const auto by_leaf = [](const auto& a, const auto& b) { return a.leaf < b.leaf; };
+        std::sort(to_.outside.begin(), to_.outside.end(), by_leaf);
+        const auto is_repeated = [](const auto& a, const auto& b) { return a.leaf == b.leaf; };
+        to_.outside.erase(std::unique(to_.outside.begin(), to_.outside.end(), is_repeated), to_.outside.end());
+        for (const Contraction* side : {&left_, &right_}) {
+            const bool is_right = side == &right_;
+            const Contraction& far = is_right ? left_ : right_;
+            for (const LiveTriangle& t : side->triangles) {
+                LiveTriangle now = t;
+                bool has_left = !is_right;
+                for (Index& corner : now.corners) {
+                    if (!(corner & LiveTriangle::is_outside)) {
+                        corner += is_right ? shift_ : 0;
+                        continue;
+                    }
+                    const Index leaf = side->outside[corner & ~LiveTriangle::is_outside].leaf;
+                    has_left |= is_right && is_inside(leaf);
+                    if (is_inside(leaf)) {
+                        corner = border_of(far, leaf)->cluster + (is_right ? 0 : shift_);
+                    } else {
+                        const auto at =
+                            std::ranges::lower_bound(to_.outside, leaf, {}, &Contraction::OutsideLeaf::leaf);
+                        corner = LiveTriangle::is_outside | static_cast<Index>(at - to_.outside.begin());
+                    }
+                }
+                if ((!is_right || !has_left) && !uses_a_vertex_twice(now.corners)) to_.triangles.push_back(now);
+            }
+        }
+    }
+
+    // The far leaf of the left's is a border leaf of the right.
+    void add_edge(const Contraction::OuterEdge& edge) {
+        const auto border = border_of(right_, edge.far_leaf);
+        const ClusterPair pair{edge.cluster, border->cluster + shift_};
+        if (to_.live.is_simple(pair.a) && to_.live.is_simple(pair.b)) {
+            crossing_.push_back({pair, {no_component, no_component}});
+            return;
+        }
+        for (std::size_t k = 0; k < to_.classes.count; ++k)
+            crossing_.push_back({pair, {edge.components[k], border->components[k]}});
+    }
+
+    void add_crossing(const Crossing& crossing) {
+        if (to_.pairs.empty() || to_.pairs.back() != crossing.pair) start_pair(crossing.pair);
+        if (crossing.link.a == no_component || crossing.link.b == no_component) return;
+        LinkRange& range = to_.links_of_pairs.back();
+        if (range.count > 0 && to_.links.back() == crossing.link) return;
+        to_.links.push_back(crossing.link);
+        ++range.count;
+    }
+
+    void add_pair(const Contraction& side, std::size_t i, Index shift) {
+        start_pair({side.pairs[i].a + shift, side.pairs[i].b + shift});
+        if (side.links_of_pairs.empty()) return;
+        const LinkRange range = side.links_of_pairs[i];
+        const auto links = std::span(side.links).subspan(range.first, range.count);
+        to_.links.insert(to_.links.end(), links.begin(), links.end());
+        to_.links_of_pairs.back().count = range.count;
+    }
+
+    void start_pair(ClusterPair pair) {
+        to_.pairs.push_back(pair);
+        if (has_seams()) to_.links_of_pairs.push_back({static_cast<Index>(to_.links.size()), 0});
+    }
+
+    Contraction& to_;
+    const Contraction &left_, &right_;
+    Index shift_;
+    std::vector<Crossing> crossing_;
+};
+
 } // namespace
 
 Contraction contract_part(const PartMesh& part, Index target, const RoundCallback& after_round) {
-    Contraction c = PartSetup(part).run();
+    Contraction c = set_up(part);
     Contractor(c).run(target, after_round);
     return c;
 }
@@ -782,31 +1136,24 @@ Contraction join(const Contraction& left, const Contraction& right, Index target
     Contraction c;
     c.first_slot = left.first_slot;
     c.end_slot = right.end_slot;
-    c.channels = left.channels;
+    c.first_leaf = left.first_leaf;
+    c.end_leaf = right.end_leaf;
+    c.classes = left.classes;
     append(c.live, left.live);
     append(c.live, right.live);
     const Index shift = static_cast<Index>(left.live.size());
-    c.pairs = left.pairs;
+    PairJoiner(c, left, right).run();
     const auto add_outer = [&](const Contraction& side, Index side_shift) {
         for (const auto& edge : side.outer_edges)
-            if (edge.far_slot < c.first_slot || edge.far_slot >= c.end_slot)
-                c.outer_edges.push_back({edge.cluster + side_shift, edge.far_slot});
+            if (edge.far_leaf < c.first_leaf || edge.far_leaf >= c.end_leaf)
+                c.outer_edges.push_back({edge.cluster + side_shift, edge.far_leaf, edge.components});
     };
     add_outer(left, 0);
     add_outer(right, shift);
-    // The edges between the two: the far slot of the left's is a border slot of the right.
-    for (const auto& edge : left.outer_edges) {
-        if (edge.far_slot < right.first_slot || edge.far_slot >= right.end_slot) continue;
-        const auto border = std::lower_bound(right.border_slots.begin(), right.border_slots.end(), edge.far_slot,
-                                             [](const auto& b, Index slot) { return b.slot < slot; });
-        c.pairs.push_back({edge.cluster, border->cluster + shift});
-    }
-    std::sort(c.pairs.begin(), c.pairs.end());
-    c.pairs.erase(std::unique(c.pairs.begin(), c.pairs.end()), c.pairs.end());
-    for (const ClusterPair& p : right.pairs) c.pairs.push_back({p.a + shift, p.b + shift});
-    // Border slots whose edges all lead to the other side are no border any more; telling them apart is not worth it.
-    c.border_slots = left.border_slots;
-    for (const auto& border : right.border_slots) c.border_slots.push_back({border.slot, border.cluster + shift});
+    // Border leaves whose edges all lead to the other side are no border any more; telling them apart is not worth it.
+    c.border_leaves = left.border_leaves;
+    for (const auto& border : right.border_leaves)
+        c.border_leaves.push_back({border.leaf, border.cluster + shift, border.components});
     Contractor(c).run(target, after_round);
     return c;
 }

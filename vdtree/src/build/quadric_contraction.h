@@ -1,15 +1,20 @@
 // Contraction by quadric error of one spatial part of a mesh, and joining such parts: what cluster_quadric() is made
 // of.
 //
-// A mesh's welded vertices ("slots") are numbered so that every part is a range of them. contract_part() takes one
-// part's own vertices, those of other parts that share a triangle with them, and these triangles, and contracts pairs
-// of its own until few are left. join() puts two neighbouring ranges together: edges between them, on which neither
-// could contract, become contractible, and contraction goes on. Both depend on nothing but their arguments, so the
-// parts of a mesh may be contracted in any order, by any thread or process; all that they take and give are contiguous
-// arrays of plain numbers. Triangles are never cut: a cluster is a set of slots, and parts fit each other without
-// seams.
+// A mesh's places ("slots") are numbered so that every part is a range of them. contract_part() takes one part's own
+// places, those of other parts that share a triangle with them, and these triangles, and contracts pairs of its own until
+// few are left. join() puts two neighbouring ranges together: edges between them, on which neither could contract, become
+// contractible, and contraction goes on. Both depend on nothing but their arguments, so the parts of a mesh may be
+// contracted in any order, by any thread or process; all that they take and give are contiguous arrays of plain numbers.
+// Triangles are never cut: a cluster is a set of slots, and parts fit each other without seams.
 //
-// Lengths are in units of the mesh's extent ("unit box"), weights are areas over the largest vertex area.
+// A place has one or several leaves, the distinct tuples of attributes of the corners there. Of each attribute class, those
+// of its leaves that share a value are one component, and components of two clusters become one when these merge, if
+// corners of one triangle of the mesh link them, whether it has vanished or not. So both sides of a seam stay apart, and
+// what is alike on both does not drift apart. Most clusters have one component of each class, and so has every cluster of a
+// mesh without seams: these are kept and judged side by side; only the others have lists.
+//
+// Lengths are in units of the mesh's extent ("unit box"), weights are areas over the largest area of a place.
 #pragma once
 
 #include <compare>
@@ -17,21 +22,26 @@
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/mesh.h>
 
+#include "build/quadric.h"
+
 namespace unseen::vdtree {
 
 // One part's input. Local slot numbers: own slots are 0 .. own_slots - 1, slot s being number first_slot + s of the
-// mesh; then come the ghosts, slots of other parts. Local vertices are numbered by slot, so own vertices come first
-// too.
+// mesh; then come the ghosts, slots of other parts. Leaves are numbered by slot, in the mesh and locally, so own leaves
+// come first, too.
 struct PartMesh {
-    Index first_slot = 0;
-    Index own_slots = 0;
-    std::vector<Index> ghost_slots;    // numbers in the mesh, ascending
+    Index first_slot = 0, own_slots = 0;
+    Index first_leaf = 0, own_leaves = 0;
+    std::vector<Index> ghost_leaves;   // numbers in the mesh, ascending; those that triangles here use
     std::vector<glm::dvec3> positions; // by local slot
-    std::vector<Index> slot_of_vertex; // by local vertex: local slot, ascending
-    std::size_t channels = 0;          // attribute values per vertex, at most most_channels
-    std::vector<float>
-        channel_values;              // by local vertex; as long in the unit box as a displacement that matters as much
-    std::vector<Triangle> triangles; // over local vertices: every triangle that touches an own vertex
+    std::vector<Index> slot_of_leaf;   // by local leaf: local slot, ascending
+    AttributeClasses classes;
+    // By local leaf, class by class; as long in the unit box as a displacement that matters as much.
+    std::vector<float> channel_values;
+    std::size_t uv_class = most_classes, normal_class = most_classes; // which classes these are; most_classes: none
+    float normal_scale = 1;                                           // length of the values of a unit normal
+    std::vector<Index> materials;                                     // by local leaf; empty: there is only one
+    std::vector<Triangle> triangles; // over local leaves: every triangle that touches an own one
     double area_scale = 1;           // from areas in the unit box to weights
 };
 
@@ -46,15 +56,31 @@ struct LiveCluster {
     Index made_by = no_merge, vanishing = no_merge;
 };
 
+// One of several components of a class in a cluster.
+struct ClassComponent {
+    Index attribute_class;
+    std::array<float, most_class_channels> references; // see LiveClusters
+    std::array<float, most_block_floats> block;        // see quadric.h
+};
+
 // Clusters that are still to be contracted. They lie in spatial order.
 struct LiveClusters {
     std::vector<LiveCluster> clusters;
     std::vector<glm::dvec3> places;
     std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
-    std::vector<float> quadrics;   // quadric_stride(channels) each, see quadric.h
+    std::vector<float> quadrics;   // as many floats each as AttributeClasses::stride() says, see quadric.h
+    // A cluster with several components of a class has all its components here, of every class: first one of each class,
+    // then the others. Of its quadric only the base counts.
+    struct Several {
+        Index first = 0, count = 0; // 0: it has one of each class
+    };
+    std::vector<Several> several; // by cluster; empty: no cluster has any
+    std::vector<ClassComponent> components;
+
     std::size_t size() const { return clusters.size(); }
     LiveCluster& operator[](std::size_t i) { return clusters[i]; }
     const LiveCluster& operator[](std::size_t i) const { return clusters[i]; }
+    bool is_simple(Index cluster) const { return several.empty() || several[cluster].count == 0; }
 };
 
 struct Merge {
@@ -83,24 +109,61 @@ struct ClusterPair {
     auto operator<=>(const ClusterPair&) const = default;
 };
 
+// Components of the clusters of a pair, numbered within their cluster, that are to become one.
+struct Link {
+    Index a, b;
+    auto operator<=>(const Link&) const = default;
+};
+struct LinkRange {
+    Index first = 0, count = 0;
+};
+
+// By class: the component of a cluster that a leaf belongs to. Of a class whose component is closed, see Contraction,
+// no_component.
+using LeafComponents = std::array<Index, most_classes>;
+inline constexpr Index no_component = 0xffffffffu;
+
+// A triangle of the mesh whose corners are in three live clusters, or leaves outside.
+struct LiveTriangle {
+    static constexpr Index is_outside = Index{1} << 31; // then a number in Contraction::outside; else a cluster
+    std::array<Index, 3> corners;
+    glm::vec3 normal; // of the mesh's triangle; unit length, or zero
+};
+
 // What contracting a part, or joining two, has led to.
 struct Contraction {
     Index first_slot = 0, end_slot = 0;
-    std::size_t channels = 0;
+    Index first_leaf = 0, end_leaf = 0;
+    AttributeClasses classes;
 
     MergeRecord record;
     LiveClusters live;
     std::vector<ClusterPair> pairs; // edges between live clusters, by a
-    // Edges that leave the range: from a live cluster to a slot outside, and, for the other side, which cluster each of
-    // our slots with such an edge is in, by slot.
+    // By pair, where one of its clusters has several components of a class; between others, those of each class are
+    // linked. Empty if there are none. A component without links is closed: its best values are eliminated for good and
+    // it leaves the list, unless it is the last of its class.
+    std::vector<LinkRange> links_of_pairs;
+    std::vector<Link> links;
+    // Edges that leave the range: from a live cluster to a leaf outside, and, for the other side, which cluster each of
+    // our leaves with such an edge is in, by leaf.
     struct OuterEdge {
-        Index cluster, far_slot;
+        Index cluster, far_leaf;
+        LeafComponents components;
+        auto operator<=>(const OuterEdge&) const = default;
     };
-    struct BorderSlot {
-        Index slot, cluster;
+    struct BorderLeaf {
+        Index leaf, cluster;
+        LeafComponents components;
     };
     std::vector<OuterEdge> outer_edges;
-    std::vector<BorderSlot> border_slots;
+    std::vector<BorderLeaf> border_leaves;
+    // The triangles around live clusters, and the leaves outside that they have, by leaf.
+    struct OutsideLeaf {
+        Index leaf;
+        glm::dvec3 place; // the mesh's
+    };
+    std::vector<LiveTriangle> triangles;
+    std::vector<OutsideLeaf> outside;
 };
 
 // Called after every round with the number of merges made in it; false stops at once (the result is then of no use).

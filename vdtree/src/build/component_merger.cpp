@@ -1,0 +1,87 @@
+#include "build/component_merger.h"
+
+#include <numeric>
+
+namespace unseen::vdtree {
+
+ComponentMerger::ComponentMerger(const LiveClusters& live, const AttributeClasses& classes)
+    : live_(live), classes_(classes), channels_(classes.total_channels()), stride_(classes.stride()) {
+    for (std::size_t k = 0; k < classes.count; ++k) {
+        first_channel_[k] = classes.first_channel(k);
+        first_float_[k] = classes.first_float(k);
+    }
+}
+
+Index ComponentMerger::root_of(Index number) {
+    while (joined_to_[number] != number) number = joined_to_[number] = joined_to_[joined_to_[number]];
+    return number;
+}
+
+// Roots have the lowest number, so a component of each class stays first, in its class's place.
+void ComponentMerger::unite(ClusterPair pair, std::span<const Link> links) {
+    const Index of_a = count(pair.a), of_b = count(pair.b);
+    joined_to_.resize(of_a + of_b);
+    std::iota(joined_to_.begin(), joined_to_.end(), Index{0});
+    for (const Link& link : links) {
+        const Index x = root_of(link.a), y = root_of(of_a + link.b);
+        joined_to_[std::max(x, y)] = std::min(x, y);
+    }
+    const glm::vec3 d(live_.places[pair.b] - live_.places[pair.a]);
+    const Offset<float> to{d.x, d.y, d.z};
+    add_base(live_.quadrics.data() + pair.a * stride_, live_.quadrics.data() + pair.b * stride_, to, base_.data());
+    numbers_.resize(of_a + of_b);
+    count_ = 0;
+    for (Index i = 0; i < of_a; ++i) add(component(pair.a, i), {0, 0, 0}, i, root_of(i));
+    for (Index i = 0; i < of_b; ++i) add(component(pair.b, i), to, of_a + i, root_of(of_a + i));
+}
+
+// Its place lies at `to`.
+void ComponentMerger::add(const View& from, const Offset<float>& to, Index number, Index root) {
+    if (root == number) {
+        numbers_[number] = static_cast<Index>(count_);
+        return copy(from, to);
+    }
+    const std::size_t channels = classes_.channels[from.attribute_class];
+    ClassComponent& onto = components_[numbers_[number] = numbers_[root]];
+    std::array<float, most_class_channels> raised{};
+    for (std::size_t c = 0; c < channels; ++c) raised[c] = from.references[c] - onto.references[c];
+    add_block(onto.block.data(), from.block, to, raised.data(), channels, onto.block.data(), base_.data());
+}
+
+void ComponentMerger::copy(const View& from, const Offset<float>& to) {
+    const std::size_t channels = classes_.channels[from.attribute_class];
+    if (count_ == components_.size()) components_.emplace_back();
+    ClassComponent& made = components_[count_++];
+    made.attribute_class = from.attribute_class;
+    for (std::size_t c = 0; c < channels; ++c) {
+        made.references[c] = from.references[c];
+        const float* row = from.block + c * quadric::row_size;
+        float* moved = made.block.data() + c * quadric::row_size;
+        for (std::size_t i = quadric::gx; i <= quadric::gz; ++i) moved[i] = row[i];
+        moved[quadric::d] =
+            row[quadric::d] - (row[quadric::gx] * to.x + row[quadric::gy] * to.y + row[quadric::gz] * to.z);
+    }
+    made.block[channels * quadric::row_size] = from.block[channels * quadric::row_size];
+}
+
+// A row is a register, and so is each row of the form's matrix with what is beside it.
+Form<float> ComponentMerger::form() const {
+    using namespace quadric;
+    const auto& q = base_;
+    Float4 x{q[xx], q[xy], q[xz], q[hx]}, y{q[xy], q[yy], q[yz], q[hy]}, z{q[xz], q[yz], q[zz], q[hz]},
+        rest{q[hx], q[hy], q[hz], q[k]};
+    for (std::size_t i = 0; i < count_; ++i) {
+        const ClassComponent& c = components_[i];
+        const std::size_t channels = classes_.channels[c.attribute_class];
+        const float inverse = 1 / c.block[channels * row_size];
+        for (std::size_t channel = 0; channel < channels; ++channel) {
+            Float4 row;
+            std::memcpy(&row, c.block.data() + channel * row_size, sizeof(row));
+            const Float4 scaled = row * inverse;
+            x -= scaled[gx] * row, y -= scaled[gy] * row, z -= scaled[gz] * row, rest -= scaled[d] * row;
+        }
+    }
+    return {x[0], x[1], x[2], y[1], y[2], z[2], x[3], y[3], z[3], rest[3]};
+}
+
+} // namespace unseen::vdtree
