@@ -6,14 +6,18 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <numbers>
 
 #include <glm/common.hpp>
+#include <glm/mat3x3.hpp>
 #include <tbb/global_control.h>
 
 #include <unseen/vdtree/internal/team.h>
 
 #include "build/quadric_contraction.h"
+#include "build/quadric_setup.h"
 #include "build/surface.h"
+#include "build/triangle_rings.h"
 #include "clustering_tools.h"
 #include "shapes.h"
 #include "testing.h"
@@ -80,6 +84,32 @@ Mesh star(Index n) {
     return m;
 }
 
+// Every `patch` triangles have texture coordinates of their own.
+Mesh patched(const Mesh& mesh, Index patch) {
+    Mesh m = shapes::unwelded(mesh);
+    for (Index v = 0; v < m.positions.size(); ++v) {
+        const float chart = static_cast<float>(v / 3 / patch);
+        m.uvs.emplace_back(static_cast<float>(m.positions[v].x) + chart, static_cast<float>(m.positions[v].y));
+    }
+    return m;
+}
+
+// n triangles around one position, each with texture coordinates of its own there.
+Mesh pole(Index n) {
+    Mesh m;
+    for (Index i = 0; i < n; ++i) {
+        const auto rim = [&](Index k) {
+            const double angle = 2 * std::numbers::pi * (k % n) / n;
+            return glm::dvec3(std::cos(angle), std::sin(angle), 0);
+        };
+        m.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+        m.positions.insert(m.positions.end(), {{0, 0, 1}, rim(i), rim(i + 1)});
+        const float u = static_cast<float>(i);
+        m.uvs.insert(m.uvs.end(), {{u + 0.5f, 1}, {u, 0}, {u + 1, 0}});
+    }
+    return m;
+}
+
 constexpr Index large = 60000; // vertices enough for several parts
 
 struct Hard {
@@ -92,6 +122,9 @@ const Hard hard_meshes[] = {
     {"random soup, every edge across parts", [] { return shapes::random_soup(large, 2 * large, 7); }},
     {"loose triangles", [] { return shapes::unwelded(shapes::bumpy_sphere(5)); }},
     {"star", [] { return star(large / 2); }},
+    {"seams across parts", [] { return patched(shapes::bumpy_sphere(6), 16); }},
+    {"a seam along every edge", [] { return patched(shapes::bumpy_sphere(6), 1); }},
+    {"a pole with thousands of texture coordinates", [] { return pole(large / 4); }},
     {"one far vertex",
      [] {
          Mesh m = shapes::bumpy_sphere(6);
@@ -351,6 +384,53 @@ TEST(Quadric, HoldsTheSeamOfATexture) {
     EXPECT_GT(on_seam, 2u);
 }
 
+// n x n squares a side, turned, with hard edges: each side has vertices of its own.
+Mesh hard_cube(int n) {
+    Mesh m;
+    const glm::dmat3 turn(glm::dvec3(0.36, 0.48, -0.8), glm::dvec3(-0.8, 0.6, 0), glm::dvec3(0.48, 0.64, 0.6));
+    for (int side = 0; side < 6; ++side) {
+        const int axis = side / 2;
+        const double sign = side % 2 == 0 ? -1 : 1;
+        const Index first = static_cast<Index>(m.positions.size()), row = static_cast<Index>(n) + 1;
+        for (int i = 0; i <= n; ++i) {
+            for (int j = 0; j <= n; ++j) {
+                glm::dvec3 p, normal(0);
+                p[axis] = normal[axis] = sign;
+                p[(axis + 1) % 3] = 2.0 * i / n - 1;
+                p[(axis + 2) % 3] = sign * (2.0 * j / n - 1);
+                m.positions.push_back(turn * p);
+                m.normals.emplace_back(turn * normal);
+            }
+        }
+        for (Index i = 0; i + 1 < row; ++i) {
+            for (Index j = 0; j + 1 < row; ++j) {
+                const Index a = first + i * row + j;
+                m.triangles.push_back({a, a + row, a + row + 1});
+                m.triangles.push_back({a, a + row + 1, a + 1});
+            }
+        }
+    }
+    return m;
+}
+
+TEST(Quadric, FoldsACubeToItsTwelveTriangles) {
+    const Mesh mesh = hard_cube(40);
+    const ClusteringTask task(mesh);
+    const Clustering c = clustered(task, ClustererKind::quadric);
+    const Mesh simple = support::simplified_by_deviation(task.places.mesh(), c, 12);
+    EXPECT_EQ(simple.triangles.size(), 12u);
+    constexpr double cosine = 0.5773502691896258; // of the angle between a side's normal and a corner's direction
+    for (const Triangle& t : simple.triangles) {
+        for (const Index v : t) {
+            double nearest = 2;
+            for (Index corner = 0; corner < mesh.positions.size(); ++corner)
+                if (glm::dot(glm::normalize(mesh.positions[corner]), glm::dvec3(mesh.normals[corner])) < cosine + 1e-6)
+                    nearest = std::min(nearest, glm::distance(mesh.positions[corner], simple.positions[v]));
+            EXPECT_LT(nearest, 2e-7);
+        }
+    }
+}
+
 TEST(Quadric, KeepsLooseTrianglesThatAreSpreadOut) {
     // Small triangles along a line, in pairs of close ones: half of them can go while one of each pair stays.
     Mesh mesh;
@@ -380,19 +460,19 @@ Strip strip(Index columns) {
         PartMesh& part = is_right ? s.right : s.left;
         const Index own = columns,
                     ghosts = 2; // columns / 2 columns of two slots each, and the next one of the other side
-        part.first_slot = is_right ? columns : 0;
-        part.own_slots = own;
-        part.channels = 1;
+        part.first_slot = part.first_leaf = is_right ? columns : 0;
+        part.own_slots = part.own_leaves = own;
+        part.classes = {{1}, 1};
         const Index other = is_right ? columns - 2 : columns;
-        part.ghost_slots = {other, other + 1};
+        part.ghost_leaves = {other, other + 1};
         const auto push = [&](Index slot) {
             part.positions.push_back(glm::dvec3(slot / 2, slot % 2, 0.1 * std::sin(slot / 2)) /
                                      static_cast<double>(columns));
-            part.slot_of_vertex.push_back(static_cast<Index>(part.positions.size() - 1));
+            part.slot_of_leaf.push_back(static_cast<Index>(part.positions.size() - 1));
             part.channel_values.push_back(0);
         };
         for (Index i = 0; i < own; ++i) push(part.first_slot + i);
-        for (Index i = 0; i < ghosts; ++i) push(part.ghost_slots[i]);
+        for (Index i = 0; i < ghosts; ++i) push(part.ghost_leaves[i]);
         const auto square = [&](Index a, Index b) { // columns that begin with local slots a and b
             part.triangles.push_back({a, b, b + 1});
             part.triangles.push_back({a, b + 1, a + 1});
@@ -411,10 +491,10 @@ TEST(QuadricParts, KeepTheEdgesThatLeaveThemUntilTheyAreJoined) {
     EXPECT_LE(left.live.size(), 6u);
     EXPECT_EQ(left.record.merges.size() + left.live.size(), 16u);
     ASSERT_FALSE(left.outer_edges.empty());
-    for (const auto& edge : left.outer_edges) EXPECT_TRUE(edge.far_slot == 16 || edge.far_slot == 17);
-    ASSERT_EQ(left.border_slots.size(), 2u);
-    EXPECT_EQ(left.border_slots[0].slot, 14u);
-    EXPECT_EQ(left.border_slots[1].slot, 15u);
+    for (const auto& edge : left.outer_edges) EXPECT_TRUE(edge.far_leaf == 16 || edge.far_leaf == 17);
+    ASSERT_EQ(left.border_leaves.size(), 2u);
+    EXPECT_EQ(left.border_leaves[0].leaf, 14u);
+    EXPECT_EQ(left.border_leaves[1].leaf, 15u);
 
     // Joined without any contraction, the edges between the two are pairs now.
     const Contraction both = join(left, right, 100, go_on);
@@ -437,6 +517,65 @@ TEST(QuadricParts, StopWhenToldTo) {
     const Contraction c = contract_part(s.left, 1, [&](std::size_t) { return ++rounds < 2; });
     EXPECT_EQ(rounds, 2);
     EXPECT_GT(c.live.size(), 1u);
+}
+
+// A flat square of 3 x 3 places.
+PartMesh square() {
+    PartMesh part;
+    part.own_slots = part.own_leaves = 9;
+    part.classes = {{1}, 1};
+    for (Index i = 0; i < 9; ++i) {
+        part.positions.emplace_back(i % 3, i / 3, 0);
+        part.slot_of_leaf.push_back(i);
+        part.channel_values.push_back(0);
+    }
+    for (const Index a : {0, 1, 3, 4}) {
+        part.triangles.push_back({a, a + 1, a + 4});
+        part.triangles.push_back({a, a + 4, a + 3});
+    }
+    return part;
+}
+
+TEST(QuadricParts, KnowWhichMergesTurnTrianglesOver) {
+    const Contraction c = set_up(square());
+    TriangleRings rings(c);
+    rings.start();
+    EXPECT_FALSE(rings.turns(4, 5, {1.5, 1, 0}));
+    EXPECT_TRUE(rings.turns(4, 5, {-0.5, 1, 0})); // beyond what is around the middle
+    EXPECT_TRUE(rings.turns(4, 5, {1.2, 1, 4}));  // too steep
+    rings.unite(4, 5, {1.5, 1, 0});
+    EXPECT_FALSE(rings.turns(4, 3, {0.5, 1, 0}));
+    EXPECT_TRUE(rings.turns(4, 3, {1, 2.5, 0}));
+    const std::vector<Index> tags{0, 1, 2, 3, 4, 6, 7, 8};
+    EXPECT_EQ(rings.left(tags).size(), 6u);
+}
+
+TEST(QuadricParts, KeepBothSidesOfASeamApart) {
+    // Two leaves at each place of the middle column, with different values in the first class and the same in the second.
+    PartMesh part = square();
+    part.classes = {{1, 1}, 2};
+    part.own_leaves = 12;
+    part.slot_of_leaf = {0, 1, 1, 2, 3, 4, 4, 5, 6, 7, 7, 8};
+    part.channel_values.clear();
+    for (const float first : {0.f, 0.f, 1.f, 1.f, 0.f, 0.f, 1.f, 1.f, 0.f, 0.f, 1.f, 1.f})
+        part.channel_values.insert(part.channel_values.end(), {first, 0.5f});
+    const auto leaf = [](Index slot, bool right) {
+        return slot / 3 * 4 + (slot % 3 == 0 ? 0 : slot % 3 == 2 ? 3 : right ? 2 : 1);
+    };
+    for (std::size_t t = 0; t < part.triangles.size(); ++t)
+        for (Index& corner : part.triangles[t]) corner = leaf(corner, t / 2 % 2 == 1);
+    const auto go_on = [](std::size_t) { return true; };
+    const Contraction c = contract_part(part, 3, go_on);
+    ASSERT_EQ(c.live.several.size(), c.live.size());
+    for (Index s = 0; s < c.live.size(); ++s) {
+        if (c.live.is_simple(s)) continue;
+        const auto components = std::span(c.live.components).subspan(c.live.several[s].first, c.live.several[s].count);
+        ASSERT_EQ(components.size(), 3u); // one of the second class
+        for (const ClassComponent& component : components) {
+            if (component.attribute_class == 0) EXPECT_NEAR(std::abs(component.references[0] - 0.5f), 0.5f, 1e-5f);
+            else EXPECT_EQ(component.references[0], 0.5f);
+        }
+    }
 }
 
 } // namespace unseen::vdtree::clusterer_test

@@ -20,7 +20,7 @@ constexpr double hard_edge_weight = 0.3;
 // Areas may be tiny or zero; every place keeps a little weight of its own.
 constexpr float least_weight = 1e-6f; // share of the largest area of a place
 
-constexpr Index none = std::numeric_limits<Index>::max();
+constexpr Index no_entry = std::numeric_limits<Index>::max();
 
 class PartSetup {
 public:
@@ -60,7 +60,7 @@ private:
         live_.references.assign(own_ * channels_, 0);
         if (part_.own_leaves > own_) {
             live_.several.resize(own_);
-            component_of_leaf_.assign(part_.own_leaves * classes_.count, none);
+            component_of_leaf_.assign(part_.own_leaves * classes_.count, no_entry);
         }
         for (Index leaf = 0, end = 0; leaf < part_.own_leaves; leaf = end) {
             while (end < part_.own_leaves && slot(end) == slot(leaf)) ++end;
@@ -217,7 +217,7 @@ private:
 
     // From a lower slot, with its sides of triangles.
     struct Edge {
-        Index high, side, second_side = none, uses = 1;
+        Index high, side, second_side = no_entry, uses = 1;
     };
 
     // Every edge with an own end: within the part a pair, to a ghost an outer edge.
@@ -237,7 +237,7 @@ private:
         std::vector<Use> uses(start.back());
         for_each_side([&](Index low, Index high, Index side) { uses[start[low]++] = {high, side}; });
         // Filling has moved each start to its end.
-        std::vector<Index> seen_from(part_.positions.size(), none);
+        std::vector<Index> seen_from(part_.positions.size(), no_entry);
         entry_.resize(part_.positions.size());
         result_.pairs.reserve(uses.size() / 2 + uses.size() / 16);
         for (Index low = 0; low < own_; ++low) {

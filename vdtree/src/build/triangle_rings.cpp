@@ -9,14 +9,14 @@ namespace unseen::vdtree {
 
 namespace {
 
-constexpr Index none = std::numeric_limits<Index>::max();
+constexpr Index no_corner = std::numeric_limits<Index>::max();
 // The cosine of the angle by which a merge may turn a triangle, squared: 78 degrees. What turns farther has folded over
 // in all but name, and the next merge would finish it.
 constexpr float least_cosine_squared = 0.0432f;
 // A triangle with less area than this share of its sides' squares has no direction that floats could tell.
 constexpr float least_area_share = 1e-5f;
 
-float squared(glm::vec3 v) { return glm::dot(v, v); }
+float length_squared(glm::vec3 v) { return glm::dot(v, v); }
 
 } // namespace
 
@@ -38,9 +38,9 @@ Index TriangleRings::tag_of(Index corner) const {
 }
 
 void TriangleRings::start() {
-    lists_.assign(places_.size(), {none, none});
+    lists_.assign(places_.size(), {no_corner, no_corner});
     for (const LiveTriangle& t : c_.triangles) {
-        Ring ring{{}, {none, none, none}, t.normal};
+        Ring ring{{}, {no_corner, no_corner, no_corner}, t.normal};
         for (std::size_t k = 0; k < 3; ++k) ring.corners[k] = short_root_of(tag_of(t.corners[k]));
         if (uses_a_vertex_twice(ring.corners)) continue;
         rings_.push_back(ring);
@@ -51,36 +51,37 @@ void TriangleRings::start() {
 
 void TriangleRings::append(Index tag, Index corner) {
     List& list = lists_[tag];
-    if (list.first == none) list.first = corner;
+    if (list.first == no_corner) list.first = corner;
     else rings_[list.last / 4].next[list.last % 4] = corner;
     list.last = corner;
 }
 
 bool TriangleRings::turns(Index a, Index b, glm::dvec3 place) {
     const glm::vec3 to(place - centre_);
-    return turns(a, b, to) || turns(b, a, to);
+    return turns_around(a, b, to) || turns_around(b, a, to);
 }
 
 // Of the triangles around `tag`, without those that vanish. Takes out of its list those that have vanished.
-bool TriangleRings::turns(Index tag, Index other, glm::vec3 place) {
+bool TriangleRings::turns_around(Index tag, Index other, glm::vec3 place) {
     const glm::vec3 from = places_[tag];
-    Index before = none;
-    for (Index corner = lists_[tag].first; corner != none;) {
+    Index before = no_corner;
+    for (Index corner = lists_[tag].first; corner != no_corner;) {
         Ring& ring = rings_[corner / 4];
         const Index k = corner % 4, next = ring.next[k];
         Index &u = ring.corners[k == 2 ? 0 : k + 1], &v = ring.corners[k == 0 ? 2 : k - 1];
         u = short_root_of(u), v = short_root_of(v);
         if (u == v || u == tag || v == tag) {
-            if (before == none) lists_[tag].first = next;
+            if (before == no_corner) lists_[tag].first = next;
             else rings_[before / 4].next[before % 4] = next;
-            if (next == none) lists_[tag].last = before;
+            if (next == no_corner) lists_[tag].last = before;
         } else if (u != other && v != other) {
             const glm::vec3 at_u = places_[u], side = places_[v] - at_u;
             const glm::vec3 was = glm::cross(side, from - at_u), now = glm::cross(side, place - at_u);
-            const float sides = squared(side) + squared(from - at_u);
-            const bool has_direction = squared(was) > least_area_share * least_area_share * sides * sides;
+            const float sides = length_squared(side) + length_squared(from - at_u);
+            const bool has_direction = length_squared(was) > least_area_share * least_area_share * sides * sides;
             const float same = glm::dot(was, now);
-            if (has_direction && !(same > 0 && same * same > least_cosine_squared * squared(was) * squared(now)))
+            if (has_direction &&
+                !(same > 0 && same * same > least_cosine_squared * length_squared(was) * length_squared(now)))
                 return true;
             if (glm::dot(now, ring.normal) < 0 && !(glm::dot(was, ring.normal) < 0)) return true;
             before = corner;
@@ -97,9 +98,9 @@ void TriangleRings::unite(Index a, Index b, glm::dvec3 place) {
     places_[a] = glm::vec3(place - centre_);
     if (!is_started()) return;
     const List of_b = lists_[b];
-    if (of_b.first == none) return;
+    if (of_b.first == no_corner) return;
     List& list = lists_[a];
-    if (list.first == none) {
+    if (list.first == no_corner) {
         list = of_b;
     } else {
         rings_[list.last / 4].next[list.last % 4] = of_b.first;
@@ -108,7 +109,7 @@ void TriangleRings::unite(Index a, Index b, glm::dvec3 place) {
 }
 
 std::vector<LiveTriangle> TriangleRings::left(std::span<const Index> tag_of_cluster) const {
-    std::vector<Index> number(places_.size(), none);
+    std::vector<Index> number(places_.size(), no_corner);
     for (Index cluster = 0; cluster < tag_of_cluster.size(); ++cluster) number[tag_of_cluster[cluster]] = cluster;
     for (Index tag = clusters_; tag < number.size(); ++tag) number[tag] = LiveTriangle::is_outside | (tag - clusters_);
     std::vector<LiveTriangle> out;

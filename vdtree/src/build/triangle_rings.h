@@ -49,7 +49,7 @@ private:
         return joined_to_[tag] = root;
     }
     Index tag_of(Index corner) const;
-    bool turns(Index tag, Index other, glm::vec3 place);
+    bool turns_around(Index tag, Index other, glm::vec3 place);
     void append(Index tag, Index corner);
 
     glm::dvec3 centre_{0}; // of what places are relative to
