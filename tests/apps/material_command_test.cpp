@@ -2,6 +2,10 @@
 // coordinates, colours.
 #include "run_command.h"
 
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
 #include <unseen/perception/image.h>
 
 #include "gltf_scene.h"
@@ -313,6 +317,207 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
         ASSERT_EQ(std::sscanf(info.c_str() + info.find("luminance"), "luminance %lf to %lf", &darkest, &brightest), 2);
         EXPECT_GT(brightest, darkest + 0.2) << model;
     }
+}
+
+// Two squares side by side, each with the whole image on it: at the seam u is 1 on the left and 0 on the right.
+TEST_F(MaterialCommandTest, SeamOfTwoSquaresStaysWhereItIs) {
+    std::ostringstream obj;
+    constexpr int cells = 4; // so that few digits do
+    int first = 1;
+    for (const int left : {0, 1}) {
+        for (int i = 0; i <= cells; ++i)
+            for (int k = 0; k <= cells; ++k) {
+                const double u = double(k) / cells, v = double(i) / cells;
+                obj << "v " << left + u << ' ' << v << " 0\nvt " << u << ' ' << v << '\n';
+            }
+        for (int i = 0; i < cells; ++i)
+            for (int k = 0; k < cells; ++k) {
+                const int a = first + i * (cells + 1) + k, b = a + cells + 1;
+                for (const auto& t : {std::array{a, a + 1, b + 1}, std::array{a, b + 1, b}}) {
+                    obj << 'f';
+                    for (const int v : t) obj << ' ' << v << '/' << v;
+                    obj << '\n';
+                }
+            }
+        first += (cells + 1) * (cells + 1);
+    }
+    write_text(path("in.obj"), obj.str());
+    for (const Words& budget : {Words{"--triangles", "64"}, {"--triangles", "20"}, {"--triangles", "4"}, {}}) {
+        succeed(joined({"simplify", "in.obj", "-o", "out.obj"}, budget));
+        const auto out = read_obj(read_text(path("out.obj")));
+        std::size_t triangles = 0;
+        double area = 0;
+        for (const auto& [name, of_part] : out.faces)
+            for (const auto& face : of_part) {
+                ++triangles;
+                std::array<glm::dvec2, 3> p, uv;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const auto &at = out.vector(0, face[k][0]), &coordinates = out.vector(1, face[k][1]);
+                    p[k] = {at[0], at[1]}, uv[k] = {coordinates[0], coordinates[1]};
+                }
+                const double left = (p[0].x + p[1].x + p[2].x) / 3 < 1 ? 0 : 1;
+                for (std::size_t k = 0; k < 3; ++k) EXPECT_LT(glm::length(uv[k] - (p[k] - glm::dvec2(left, 0))), 1e-6);
+                const glm::dvec2 e = p[1] - p[0], f = p[2] - p[0];
+                area += (e.x * f.y - e.y * f.x) / 2;
+            }
+        EXPECT_NEAR(area, 2, 1e-6) << "and no triangle is turned over";
+        EXPECT_GE(triangles, 4u);
+        if (!budget.empty()) EXPECT_LE(triangles, std::stoul(budget[1]));
+    }
+}
+
+// A box of 1,536 triangles. Each side is an object with texture coordinates from 0 to 1 and a normal of its own; the sides
+// along z are of another material.
+class BoxTest : public MaterialCommandTest {
+protected:
+    static constexpr int cells = 16, faces = 6 * cells * cells * 2;
+
+    // The sides are called x0, x1, y0, ...
+    static glm::dvec3 normal_of(const std::string& side) {
+        glm::dvec3 n(0);
+        n[side[0] - 'x'] = side[1] == '1' ? 1 : -1;
+        return n;
+    }
+    static glm::dvec2 uv_of(const std::string& side, const glm::dvec3& p) {
+        const int axis = side[0] - 'x';
+        return {p[(axis + 1) % 3], p[(axis + 2) % 3]};
+    }
+
+    void write_box() const {
+        std::ostringstream obj;
+        obj << "mtllib box.mtl\n";
+        int first = 1, number = 1;
+        for (const std::string side : {"x0", "x1", "y0", "y1", "z0", "z1"}) {
+            const glm::dvec3 n = normal_of(side);
+            const int axis = side[0] - 'x';
+            obj << "o " << side << "\nusemtl " << (axis == 2 ? "lid" : "body") << "\nvn " << n.x << ' ' << n.y << ' '
+                << n.z << '\n';
+            for (int i = 0; i <= cells; ++i)
+                for (int k = 0; k <= cells; ++k) {
+                    glm::dvec3 p(0);
+                    p[axis] = side[1] == '1' ? 1 : 0;
+                    p[(axis + 1) % 3] = double(i) / cells, p[(axis + 2) % 3] = double(k) / cells;
+                    const glm::dvec2 uv = uv_of(side, p);
+                    obj << "v " << p.x << ' ' << p.y << ' ' << p.z << "\nvt " << uv.x << ' ' << uv.y << '\n';
+                }
+            for (int i = 0; i < cells; ++i)
+                for (int k = 0; k < cells; ++k) {
+                    const int a = first + i * (cells + 1) + k, b = a + cells + 1;
+                    std::vector<int> quad{a, b, b + 1, a + 1};
+                    if (side[1] == '0') std::ranges::reverse(quad);
+                    for (const int t : {1, 2}) {
+                        obj << 'f';
+                        for (const int v : {quad[0], quad[t], quad[t + 1]})
+                            obj << ' ' << v << '/' << v << '/' << number;
+                        obj << '\n';
+                    }
+                }
+            first += (cells + 1) * (cells + 1);
+            ++number;
+        }
+        write_text(path("box.obj"), obj.str());
+        write_text(path("box.mtl"), "newmtl body\nKd 1 1 1\nmap_Kd check.png\nnewmtl lid\nKd 1 0.8 0.1\n");
+        write_text(path("check.png"), images()[0]);
+    }
+
+    static void expect_corner(const std::string& side, const glm::dvec3& p, const glm::dvec2& uv, const glm::dvec3& n) {
+        constexpr double near = 1e-5;
+        EXPECT_LT(glm::length(n - normal_of(side)), 1e-4) << side;
+        EXPECT_NEAR(p[side[0] - 'x'], side[1] == '1' ? 1 : 0, near) << side;
+        EXPECT_LT(glm::length(uv - uv_of(side, p)), near) << side << ": " << p.x << ' ' << p.y << ' ' << p.z;
+    }
+    static const std::vector<int>& budgets() {
+        static const std::vector<int> all{faces, faces / 2, faces / 10, faces / 50}; // 100, 50, 10, 2%
+        return all;
+    }
+    ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b) const {
+        return CommandTest::look_the_same(a, b,
+                                          {"--size", "300x300", "--eye", "2.5", "2", "3", "--target", "0.5", "0.5",
+                                           "0.5", "--samples", "4", "--light", "1", "2", "3"});
+    }
+};
+
+TEST_F(BoxTest, HasItsSeamsEdgesAndNamesInObjAtEveryBudget) {
+    write_box();
+    fs::create_directories(path("out"));
+    for (const int budget : budgets()) {
+        succeed({"simplify", "box.obj", "--triangles", std::to_string(budget), "-o", "out/box.obj"});
+        const auto out = read_obj(read_text(path("out/box.obj")));
+        EXPECT_EQ(out.faces.size(), 6u) << budget;
+        std::size_t triangles = 0;
+        for (const auto& [name, of_part] : out.faces) {
+            const std::string side = name.substr(0, 2);
+            EXPECT_EQ(name, side + "  " + (side[0] == 'z' ? "lid" : "body"));
+            triangles += of_part.size();
+            for (const auto& face : of_part)
+                for (const auto& corner : face) {
+                    const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]),
+                               n = out.vector(2, corner[2]);
+                    expect_corner(side, {p[0], p[1], p[2]}, {uv[0], uv[1]}, {n[0], n[1], n[2]});
+                }
+        }
+        EXPECT_LE(triangles, static_cast<std::size_t>(budget));
+        EXPECT_GE(triangles, 12u);
+        const auto& positions = out.vectors.at("v");
+        EXPECT_EQ(std::set(positions.begin(), positions.end()).size(), positions.size()) << "sides share their edges";
+        EXPECT_EQ(out.vectors.at("vn").size(), 6u);
+        EXPECT_TRUE(look_the_same("box.obj", "out/box.obj")) << budget;
+        fs::remove(path("out/box.obj"));
+    }
+}
+
+TEST_F(BoxTest, HasItsSeamsEdgesAndNamesInGltfAtEveryBudget) {
+    write_box();
+    succeed({"simplify", "box.obj", "--full", "-o", "box.glb"});
+    const GltfContents in = read_gltf(path("box.glb"));
+    for (const int budget : budgets()) {
+        succeed({"simplify", "box.glb", "--as", "model", "--triangles", std::to_string(budget), "-o", "out.glb"});
+        const GltfContents out = read_gltf(path("out.glb"));
+        EXPECT_EQ(in.rest, out.rest) << nlohmann::json::diff(in.rest, out.rest);
+        EXPECT_EQ(in.attributes, out.attributes);
+        std::size_t triangles = 0;
+        for (const auto& [name, of_part] : out.triangles) {
+            triangles += of_part.size();
+            for (const auto& triangle : of_part)
+                for (const auto& row : triangle) { // normal, position and coordinates, which glTF has downward
+                    ASSERT_EQ(row.size(), 8u);
+                    expect_corner(name.substr(0, 2), {row[3], row[4], row[5]}, {row[6], 1 - row[7]},
+                                  {row[0], row[1], row[2]});
+                }
+        }
+        EXPECT_LE(triangles, static_cast<std::size_t>(budget));
+        EXPECT_TRUE(look_the_same("box.glb", "out.glb")) << budget;
+    }
+}
+
+// What the file does not state, but the picture shows.
+TEST_F(BoxTest, GetsTheNormalsThatItIsDrawnWith) {
+    write_box();
+    std::string text = read_text(path("box.obj"));
+    for (std::size_t at = 0; (at = text.find("vn ", at)) != std::string::npos;)
+        text.erase(at, text.find('\n', at) + 1 - at);
+    std::string bare;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line); bare += line + '\n')
+        if (line.starts_with("f "))
+            for (std::size_t at = 2; (at = line.find('/', at)) != std::string::npos;) { // V/T/N to V/T
+                const std::size_t second = line.find('/', at + 1);
+                line.erase(second, std::min(line.find(' ', second), line.size()) - second);
+                at = second;
+            }
+    write_text(path("bare.obj"), bare);
+    succeed({"simplify", "bare.obj", "--full", "-o", "out.obj"});
+    const auto out = read_obj(read_text(path("out.obj")));
+    EXPECT_EQ(out.vectors.at("vn").size(), 6u) << "its edges are sharp";
+    for (const auto& [name, of_part] : out.faces)
+        for (const auto& face : of_part)
+            for (const auto& corner : face) {
+                const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]), n = out.vector(2, corner[2]);
+                expect_corner(name.substr(0, 2), {p[0], p[1], p[2]}, {uv[0], uv[1]}, {n[0], n[1], n[2]});
+            }
+    succeed({"simplify", "bare.obj", "--full", "-o", "out.glb"});
+    for (const auto& [name, attributes] : read_gltf(path("out.glb")).attributes)
+        EXPECT_TRUE(attributes.contains("NORMAL")) << name;
 }
 
 } // namespace material_command_test

@@ -56,11 +56,13 @@ bool unseen::fuzz::accepts(std::string_view input) {
             if (read && *read && !unseen::vdtree::validate((*read)->mesh.view())) std::abort();
         }
     }
-    const auto result = unseen::meshio::read_mesh_bytes(bytes, name, options);
+    auto result = unseen::meshio::read_mesh_bytes(bytes, name, options);
     if (!result) {
         if (result.error().message.empty()) std::abort();
         return false;
     }
+    if (result->document && result->document->format == unseen::meshio::SourceDocument::Format::table)
+        result->mesh.further = unseen::meshio::further_values(*result->document); // of others once materials are laid
     const bool is_mesh = !result->mesh.triangles.empty() && unseen::vdtree::validate(result->mesh.view());
     if (!is_mesh || !unseen::meshio::examine(result->mesh.view())) std::abort();
     return is_accepted;

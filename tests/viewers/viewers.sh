@@ -25,5 +25,10 @@ for model in htc-vive/none oculus-touch-v3/left; do
     lod -o "$name-quantized.glb" --quantize
     lod -o "$name-compressed.glb" --meshopt
     lod -o "$name-small.glb" --quantize --meshopt
+    cp "$npm/$models_folder/$model.glb" "$name-source.glb"
+    for percent in 100 50 10 2; do
+        "$unseen" simplify "$name-source.glb" --as model --triangles $percent% -o "$name-cut-$percent.glb" \
+            >"$out/log" 2>&1 || { cat "$out/log"; exit 1; }
+    done
     node "$here/read_levels.mjs" "$npm" "$name"
 done

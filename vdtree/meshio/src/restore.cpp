@@ -3,6 +3,7 @@
 #include <limits>
 #include <map>
 
+#include <glm/common.hpp>
 #include <glm/matrix.hpp>
 
 #include <unseen/vdtree/internal/vertex_tree_data.h>
@@ -82,29 +83,67 @@ private:
         return document_.parts[document_.vertex_parts[source]].channels >> channel & 1;
     }
 
+    // What the values of a wedge's leaves say of a proxy: the linear function of the place that fits best (least squares),
+    // at the proxy, and within their range. So what is linear over a flat surface stays that.
+    std::array<double, 4> value_at(std::size_t number, WedgeId wedge, bool& have_all) const {
+        const SourceDocument::Channel& channel = document_.channels[number];
+        const auto for_each = [&](auto&& visit) {
+            for (Index rank = leaves_.begin(wedge); rank < leaves_.end(wedge); ++rank) {
+                const Index leaf = leaves_.leaf(rank), source = tree_.source_vertices()[leaf];
+                if (!has(source, number)) {
+                    have_all = false;
+                    continue;
+                }
+                glm::dvec4 value(0);
+                for (std::uint32_t k = 0; k < channel.components; ++k)
+                    value[static_cast<int>(k)] = channel.values[source * std::size_t{channel.components} + k];
+                visit(glm::dvec3(tree_.positions()[tree_.wedge_of_leaf(leaf)]), value);
+            }
+        };
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        double count = 0;
+        glm::dvec3 place(0);
+        glm::dvec4 mean(0), low(infinity), high(-infinity);
+        for_each([&](const glm::dvec3& p, const glm::dvec4& value) {
+            ++count, place += p, mean += value;
+            low = glm::min(low, value), high = glm::max(high, value);
+        });
+        if (count == 0) return {};
+        place /= count, mean /= count;
+        glm::dmat3 spread(0);
+        std::array<glm::dvec3, 4> slopes{};
+        for_each([&](const glm::dvec3& p, const glm::dvec4& value) {
+            const glm::dvec3 d = p - place;
+            spread += glm::outerProduct(d, d);
+            for (int k = 0; k < 4; ++k) slopes[static_cast<std::size_t>(k)] += (value[k] - mean[k]) * d;
+        });
+        // Across the surface nothing is known: there the least share of the spread that floats still tell from none.
+        constexpr double least_share = 1e-7;
+        const double size = spread[0][0] + spread[1][1] + spread[2][2];
+        const glm::dmat3 inverse = glm::inverse(spread / size + glm::dmat3(least_share));
+        const glm::dvec3 to = inverse * (glm::dvec3(tree_.positions()[wedge]) - place) / size;
+        std::array<double, 4> values{};
+        for (int k = 0; k < 4; ++k) {
+            const double fitted = mean[k] + glm::dot(slopes[static_cast<std::size_t>(k)], to);
+            values[static_cast<std::size_t>(k)] = std::isfinite(fitted) ? std::clamp(fitted, low[k], high[k]) : mean[k];
+        }
+        return values;
+    }
+
     void append(std::vector<float>& to, std::size_t number, Index vertex, const RestoredPart& of,
                 const NodeFrame& frame) const {
         const Part& part = document_.parts[of.part];
         const SourceDocument::Channel& channel = document_.channels[number];
         const std::size_t size = channel.components;
         const WedgeId wedge = extracted_.wedges[vertex];
-        const Index first = leaves_.begin(wedge), end = leaves_.end(wedge);
-        const auto source = [&](Index rank) { return tree_.source_vertices()[leaves_.leaf(rank)]; };
         if (wedge >= tree_.interior_wedge_count() && (frame.has_inverse || !is_normal(number))) { // as it was
-            const auto own = std::span(channel.values).subspan(source(first) * size, size);
+            const auto own = std::span(channel.values)
+                                 .subspan(tree_.source_vertices()[leaves_.leaf(leaves_.begin(wedge))] * size, size);
             const bool is_missing = is_normal(number) && std::ranges::count(own, 0.0f) == 3;
             if (!is_missing) return void(to.insert(to.end(), own.begin(), own.end()));
         }
-        std::array<double, 4> values{};
-        Index count = 0;
-        for (Index rank = first; rank < end; ++rank) {
-            if (!has(source(rank), number)) continue;
-            ++count;
-            for (std::size_t k = 0; k < size; ++k)
-                values[k] += static_cast<double>(channel.values[source(rank) * size + k]);
-        }
-        for (double& value : values) value /= std::max<Index>(count, 1);
-        const bool have_all = count == end - first;
+        bool have_all = true;
+        std::array<double, 4> values = value_at(number, wedge, have_all);
         const Mesh& mesh = extracted_.mesh;
         if (is_normal(number)) {
             const glm::dvec3 n = frame.normal_from_world * glm::dvec3(mesh.normals[vertex]);

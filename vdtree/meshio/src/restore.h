@@ -35,8 +35,8 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document);
 
 // Parts of which nothing is left are left out. All have normals. Vertices of the mesh come with the values that they had;
 // normals that they had not, and normals and drawn values of proxies, follow from the mesh that was drawn. Other values of
-// proxies are the means of the vertices that they stand for, of those that have the attribute.
-// `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other. Cost: the cut's triangles, and the tree's leaves.
+// proxies are fitted to those of the vertices that they stand for and that have the attribute. `uvs`: by part, as by
+// drawn_uvs(). Fails where tree and document contradict each other. Cost: the cut's triangles, and the tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs);
 
