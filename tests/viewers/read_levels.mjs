@@ -95,8 +95,10 @@ for (let i = 0; i < told.length; ++i) {
 }
 // What a cut must have of its source: materials with their images, attributes by node, coordinates in the atlas.
 async function parts(file) {
-    const bytes = fs.readFileSync(file), found = {materials: new Set(), attributes: new Map(), triangles: 0, low: [1e9, 1e9], high: [-1e9, -1e9]};
-    const gltf = await new GLTFLoader().parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length), '');
+    const bytes = fs.readFileSync(file);
+    const data = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
+    const gltf = await new GLTFLoader().parseAsync(data, '');
+    const found = {materials: new Set(), attributes: new Map(), triangles: 0, low: [1e9, 1e9], high: [-1e9, -1e9]};
     gltf.scene.traverse(part => {
         if (!part.isMesh) return;
         const {index, attributes} = part.geometry;
@@ -118,7 +120,8 @@ for (const file of files.filter(file => file.includes('-cut-'))) {
     expect(cut.triangles > 0 && cut.triangles <= most, `${file}: ${cut.triangles} triangles`);
     for (const material of cut.materials) expect(source.materials.has(material), `${file}: material ${material}`);
     for (const [part, names] of cut.attributes)
-        expect(source.attributes.get(part) === names, `${file}: ${part} has ${names}, not ${source.attributes.get(part)}`);
+        expect(source.attributes.get(part) === names,
+               `${file}: ${part} has ${names}, not ${source.attributes.get(part)}`);
     for (let k = 0; k < 2; ++k) { // coordinates that leave the charts a little are those of a fitted proxy
         const room = 0.02 * (source.high[k] - source.low[k]);
         expect(cut.low[k] >= source.low[k] - room && cut.high[k] <= source.high[k] + room,
