@@ -366,8 +366,8 @@ TEST_F(MaterialCommandTest, SeamOfTwoSquaresStaysWhereItIs) {
     }
 }
 
-// A box of 1,536 triangles. Each side is an object with texture coordinates from 0 to 1 and a normal of its own; the sides
-// along z are of another material.
+// A box of 1,536 triangles. Each side is an object with texture coordinates from 0 to 1 and a normal of its own; the
+// sides along z are of another material.
 class BoxTest : public MaterialCommandTest {
 protected:
     static constexpr int cells = 16, faces = 6 * cells * cells * 2;

@@ -9,8 +9,8 @@
 
 namespace unseen::meshio {
 
-// A tree's document. It has a channel for normals even where the file states none: cuts are written with those that they
-// are drawn with.
+// A tree's document. It has a channel for normals even where the file states none: cuts are written with those that
+// they are drawn with.
 Result<SourceDocument> document_of(const vdtree::VertexTree& tree);
 
 // The leaves that each wedge stands for. Fails for a damaged tree, and unless its mesh had that many vertices. The tree
@@ -33,15 +33,16 @@ struct RestoredPart {
 // By part of a document as it was packed: the channel of the texture coordinates that are drawn.
 std::vector<std::string> drawn_uvs(const SourceDocument& document);
 
-// Parts of which nothing is left are left out. All have normals. Vertices of the mesh come with the values that they had;
-// normals that they had not, and normals and drawn values of proxies, follow from the mesh that was drawn. Other values of
-// proxies are fitted to those of the vertices that they stand for and that have the attribute. `uvs`: by part, as by
-// drawn_uvs(). Fails where tree and document contradict each other. Cost: the cut's triangles, and the tree's leaves.
+// Parts of which nothing is left are left out. All have normals. Vertices of the mesh come with the values that they
+// had; normals that they had not, and normals and drawn values of proxies, follow from the mesh that was drawn. Other
+// values of proxies are fitted to those of the vertices that they stand for and that have the attribute. `uvs`: by
+// part, as by drawn_uvs(). Fails where tree and document contradict each other. Cost: the cut's triangles, and the
+// tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document, const std::vector<std::string>& uvs);
 
-// How normals go where a matrix takes positions, but for their length. The cofactors are the inverse transpose times the
-// determinant, and exist where the inverse does not.
+// How normals go where a matrix takes positions, but for their length. The cofactors are the inverse transpose times
+// the determinant, and exist where the inverse does not.
 struct NormalMatrix {
     glm::dmat3 matrix = glm::dmat3(1);
     bool is_mirrored = false;
