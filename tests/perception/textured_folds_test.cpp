@@ -212,7 +212,7 @@ TEST(StandIns, AreKeptInFilesAndUnderLights) {
     const auto folds = require(LitFolds::measure(tree));
     const auto with = require(folds->with_attributes(tree));
     EXPECT_FALSE(with->attribute<FoldTexture>("lit_texture").empty());
-    EXPECT_TRUE(require(LitFolds::of(*with))->under(tree, {.ambient = 0.5}));
+    EXPECT_TRUE(require(LitFolds::of(*with))->under(tree, {.lights = {}, .ambient = 0.5}));
 }
 
 TEST(TexturedFolds, DoNotDependOnTheThreads) {

@@ -82,7 +82,7 @@ private:
         case 1: return shapes::random_soup(static_cast<int>(4 + size), static_cast<int>(4 + 2 * size), seed);
         case 2: return shapes::inside_out(shapes::bumpy_sphere(1, 0.1, seed));
         case 3: return shapes::grid(static_cast<int>(1 + size / 2));
-        case 4: return shapes::all_coincident(static_cast<int>(3 + size));
+        case 4: return shapes::cube(static_cast<int>(1 + size / 4)); // with hard edges
         case 5: return shapes::non_manifold_fan(static_cast<int>(3 + size));
         case 6: return shapes::placed(shapes::torus(3 + static_cast<int>(size), 4), 1e-3, {100, -2, 0.5});
         default: return shapes::bumpy_sphere(2, 0.05, seed);
