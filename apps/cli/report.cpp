@@ -159,4 +159,20 @@ std::string texture_text(const vdtree::VertexTree& tree) {
     return std::to_string(texture.width) + " x " + std::to_string(texture.height);
 }
 
+Json creases_json(const vdtree::Creases& creases) {
+    using Source = vdtree::Creases::Source;
+    const char* const source = creases.source == Source::file    ? "file"
+                               : creases.source == Source::asked ? "asked"
+                                                                 : "rule";
+    return {{"source", source}, {"degrees", creases.source == Source::file ? Json() : Json(creases.degrees)}};
+}
+
+std::string creases_text(const vdtree::Creases& creases) {
+    using Source = vdtree::Creases::Source;
+    if (creases.source == Source::file) return "as the mesh says";
+    const std::string why = creases.source == Source::asked ? ", as asked" : ", as its edges suggest";
+    if (creases.degrees >= 180) return "none" + why;
+    return "above " + rounded(static_cast<double>(creases.degrees), 4) + " degrees" + why;
+}
+
 } // namespace unseen::app

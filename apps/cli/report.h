@@ -69,5 +69,8 @@ void print_facts(const std::vector<Fact>& facts);
 // A tree's texture; null or "none" if it has none.
 Json texture_json(const vdtree::VertexTree& tree);
 std::string texture_text(const vdtree::VertexTree& tree);
+// How normals were found: {"source": "rule", "degrees": 30}; "above 30 degrees, as its edges suggest".
+Json creases_json(const vdtree::Creases& creases);
+std::string creases_text(const vdtree::Creases& creases);
 
 } // namespace unseen::app

@@ -72,7 +72,8 @@ Json to_json(const vdtree::VertexTree& tree, double seconds, const Json& repair)
             {"peak_bytes", peak_bytes()},
             {"fold_errors", perception::has_fold_measurement(tree)},
             {"lit_fold_errors", perception::has_lit_folds(tree)},
-            {"texture", texture_json(tree)}};
+            {"texture", texture_json(tree)},
+            {"creases", creases_json(tree.creases())}};
 }
 
 void print_details(const vdtree::VertexTree& tree) {
@@ -83,7 +84,8 @@ void print_details(const vdtree::VertexTree& tree) {
                  {"nodes", grouped(tree.node_count())},
                  {"bytes", grouped(tree.byte_size())},
                  {"bytes a triangle", rounded(bytes_per_triangle, 4)},
-                 {"texture", texture_text(tree)}});
+                 {"texture", texture_text(tree)},
+                 {"hard edges", creases_text(tree.creases())}});
 }
 
 meshio::ReadOptions reading(const BuildArguments& a) {

@@ -179,6 +179,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                     rounded(static_cast<double>(range.lo), 3) + " to " + rounded(static_cast<double>(range.hi), 3)},
                    {"prelit", "colours", tree->is_prelit(), text_of_colours(*tree)},
                    {"texture", "texture", texture_json(*tree), texture_text(*tree)},
+                   {"creases", "hard edges", creases_json(tree->creases()), creases_text(tree->creases())},
                    {"arrays", "", arrays_json(*arrays)},
                    count_of("ranges", "groups and materials", tree->ranges().size())};
     if (a.verify) facts.push_back(is_sound);

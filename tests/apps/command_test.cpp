@@ -318,6 +318,30 @@ TEST_F(BuildTest, RefusesCreasesThatAreNoAngleOrComeTooLate) {
                 fails(1, AllOf(HasSubstr("m.vdt is a tree"), HasSubstr("Give --crease with the mesh"))));
 }
 
+TEST_F(BuildTest, SaysWhereHardEdgesComeFrom) {
+    const std::string box = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n",
+                      faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    write_text(path("box.obj"), box + faces);
+    write_text(path("round.obj"), box + "s 1\n" + faces);
+    const auto creases = [&](const Words& words, const std::string& text) {
+        Words all = {"build", "-o", "b.vdt", "--verbose"};
+        all.insert(all.end(), words.begin(), words.end());
+        EXPECT_THAT(succeed(all).out, HasSubstr(text));
+        const Outcome info = succeed({"info", "b.vdt"});
+        EXPECT_THAT(info.out, HasSubstr(text));
+        const Json json = run({"info", "b.vdt", "--json"}).json();
+        return std::tuple(json["creases"], json["vertices"].get<int>());
+    };
+    EXPECT_EQ(creases({"box.obj"}, "above 30 degrees, as its edges suggest"),
+              std::tuple(Json({{"source", "rule"}, {"degrees", 30}}), 24));
+    EXPECT_EQ(creases({"box.obj", "--crease", "95"}, "above 95 degrees, as asked"),
+              std::tuple(Json({{"source", "asked"}, {"degrees", 95}}), 8));
+    EXPECT_EQ(creases({"box.obj", "--crease", "smooth"}, "none, as asked"),
+              std::tuple(Json({{"source", "asked"}, {"degrees", 180}}), 8));
+    EXPECT_EQ(creases({"round.obj"}, "as the mesh says"),
+              std::tuple(Json({{"source", "file"}, {"degrees", nullptr}}), 8));
+}
+
 TEST_F(InfoTest, SaysWhatIsUnusualAboutAMesh) {
     write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv nan 1 0\nf 1 2 3\nf 2 3 4\nf 2 5 3\n");
     const Json found = run({"info", "m.obj", "--json"}).json()["examination"];

@@ -77,6 +77,7 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
         return "ranges";
     if (a.dropped_triangles() != b.dropped_triangles()) return "dropped_triangles";
     if (a.closedness() != b.closedness()) return "closedness";
+    if (!(a.creases() == b.creases())) return "creases";
     const auto sphere_a = a.bounding_sphere(), sphere_b = b.bounding_sphere();
     if (std::memcmp(&sphere_a, &sphere_b, sizeof sphere_a) != 0) return "bounding_sphere";
     if (a.luminance_range().lo != b.luminance_range().lo || a.luminance_range().hi != b.luminance_range().hi)

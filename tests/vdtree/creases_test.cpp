@@ -5,6 +5,8 @@
 
 #include <tbb/global_control.h>
 
+#include <unseen/vdtree/builder.h>
+
 #include "build/surface.h"
 #include "shapes.h"
 #include "testing.h"
@@ -444,6 +446,30 @@ TEST(Creases, AnglesAreChecked) {
         EXPECT_EQ(checked.error().code, ErrorCode::invalid_argument);
         EXPECT_THAT(checked.error().message, HasSubstr("0 to 180"));
     }
+}
+
+// ---- trees
+
+TEST(Creases, TreesHaveALeafForEachNormalAndSayHowItWasFound) {
+    BuildOptions options;
+    const auto tree = [&](const Mesh& mesh) { return require(build_tree(mesh.view(), options)); };
+    EXPECT_EQ(tree(shapes::cube(1))->leaf_count(), 24u);
+    EXPECT_EQ(tree(shapes::cube(1))->creases(), (Creases{Creases::Source::rule, 30}));
+    const auto inward = tree(shapes::inside_out(shapes::cube(1)));
+    for (Index leaf = 0; leaf < inward->leaf_count(); ++leaf) {
+        const glm::vec3 normal = inward->normals()[inward->wedge_of_leaf(leaf)];
+        EXPECT_GT(glm::dot(normal, inward->position(inward->place_of_leaf(leaf))), 0.9f);
+    }
+    options.crease = 90.0f;
+    EXPECT_EQ(tree(shapes::cube(1))->leaf_count(), 8u);
+    EXPECT_EQ(tree(shapes::cube(1))->creases(), (Creases{Creases::Source::asked, 90}));
+    Mesh flat = shapes::with_degenerate_triangles(shapes::icosphere(1)); // whose groups go with the triangles
+    for (std::size_t t = 0; t < flat.triangles.size(); ++t)
+        flat.smoothing.push_back(uses_a_vertex_twice(flat.triangles[t]) ? 1 : 0);
+    EXPECT_EQ(tree(flat)->leaf_count(), 3 * shapes::icosphere(1).triangles.size());
+    EXPECT_EQ(tree(flat)->creases(), Creases());
+    options.crease = -1.0f;
+    EXPECT_THAT(build_tree(flat.view(), options).error().message, HasSubstr("0 to 180 degrees"));
 }
 
 TEST(Creases, ThreadsDoNotMatter) {

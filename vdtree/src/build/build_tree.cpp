@@ -192,6 +192,7 @@ public:
         mark_translucent();
 
         g_->closedness = surface_.closedness;
+        g_->creases = places_->creases();
         g_->dropped_triangles = places_->dropped() + options_.dropped_before;
         g_->source_vertex_count = static_cast<Index>(source_.positions.size());
         g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
@@ -449,6 +450,7 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
     if (const auto valid = validate(mesh); !valid) return valid.error();
     if (const auto valid = check_attributes(mesh); !valid) return valid.error();
     if (const auto valid = check(options.light); !valid) return valid.error();
+    if (const auto valid = check_crease(options.crease); !valid) return valid.error();
     if (options.threads < 0 || options.threads_alone < 0)
         return invalid_argument("The number of threads must be 0 or more.");
     return {};

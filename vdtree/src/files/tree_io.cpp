@@ -62,8 +62,10 @@ struct Facts {
     std::uint32_t prelit;
     float fill;
     std::uint32_t source_vertices;
+    std::uint32_t crease_source;
+    float crease_degrees;
 };
-static_assert(sizeof(Facts) == 88);
+static_assert(sizeof(Facts) == 96);
 
 std::uint64_t checksum(const void* data, std::size_t bytes) { return XXH3_64bits(data, bytes); }
 
@@ -172,7 +174,9 @@ Facts facts_of(const TreeGeometry& g, const TreeLuminance& l) {
             static_cast<std::uint32_t>(g.closedness),
             l.prelit ? 1u : 0u,
             l.light.fill,
-            g.source_vertex_count};
+            g.source_vertex_count,
+            static_cast<std::uint32_t>(g.creases.source),
+            g.creases.degrees};
 }
 
 // ---- writing
@@ -455,13 +459,15 @@ private:
         if (facts.size() != 1) return fail("Section facts has the wrong length.");
         const Facts& f = facts[0];
         if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
-        if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward))
+        if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward) ||
+            f.crease_source > static_cast<std::uint32_t>(Creases::Source::rule))
             return fail("Section facts is malformed.");
         g.origin = {f.origin[0], f.origin[1], f.origin[2]};
         g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
         g.dropped_triangles = f.dropped_triangles;
         g.source_vertex_count = f.source_vertices;
         g.closedness = static_cast<Closedness>(f.closedness);
+        g.creases = {static_cast<Creases::Source>(f.crease_source), f.crease_degrees};
         l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3], f.fill};
         l.prelit = f.prelit != 0;
         l.range = {f.luminance_range[0], f.luminance_range[1]};
@@ -469,7 +475,8 @@ private:
         const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
         const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
                                   is_finite(l.light.direction, l.light.ambient + l.light.fill) && l.range.lo >= 0 &&
-                                  l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
+                                  l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0 &&
+                                  g.creases.degrees >= 0 && g.creases.degrees <= 180;
         if (!facts_finite) return fail("Section facts has a value out of range.");
         return {};
     }

@@ -266,6 +266,7 @@ std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->g
 std::span<const std::byte> VertexTree::document() const noexcept { return data_->geometry->document; }
 std::uint64_t VertexTree::dropped_triangles() const noexcept { return data_->geometry->dropped_triangles; }
 Closedness VertexTree::closedness() const noexcept { return data_->geometry->closedness; }
+const Creases& VertexTree::creases() const noexcept { return data_->geometry->creases; }
 Sphere VertexTree::bounding_sphere() const noexcept { return data_->geometry->bounding_sphere; }
 LuminanceRange VertexTree::luminance_range() const noexcept { return data_->light->range; }
 

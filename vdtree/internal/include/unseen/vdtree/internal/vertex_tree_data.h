@@ -87,6 +87,7 @@ struct GeometryFacts {
     std::uint64_t dropped_triangles = 0;
     Index source_vertex_count = 0;
     Closedness closedness = Closedness::open;
+    Creases creases;
 };
 
 // What another light leaves as it is.
