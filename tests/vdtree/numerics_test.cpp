@@ -335,7 +335,7 @@ glm::vec3 naive_minimum(const Floats& q) {
 TEST(Numerics, QuadricsOfRank1And2) {
     std::mt19937_64 random(4);
     int naive_away = 0;
-    constexpr int rounds = 400;
+    constexpr int rounds = 400, steps = 2;
     for (int round = 0; round < rounds; ++round) {
         // One plane, or two that meet in a line; also nearly the same one, which is of rank 2 for doubles alone.
         std::vector<Plane3> planes = {{random_direction(random), 0.1 * random_direction(random)}};
@@ -347,10 +347,11 @@ TEST(Numerics, QuadricsOfRank1And2) {
         const glm::vec3 naive = naive_minimum(q);
         naive_away += !(glm::length(naive) < 2);
         const glm::dvec3 other = random_direction(random); // the other place of the pair
-        const auto best = minimise<float>(q.data(), static_cast<float>(other.x), static_cast<float>(other.y),
-                                          static_cast<float>(other.z), 0);
+        const auto best = minimise<float>(
+            Form<float>::of_base(q.data()),
+            {static_cast<float>(other.x), static_cast<float>(other.y), static_cast<float>(other.z)}, steps);
         // Not farther from the pair's middle than its places are from each other, and as good as it says.
-        const glm::dvec3 at(best.x, best.y, best.z);
+        const glm::dvec3 at(best.at.x, best.at.y, best.at.z);
         ASSERT_LE(glm::distance(at, 0.5 * other), 1.0001) << round;
         constexpr double bound = 2e-6; // of the squares of distances up to 1.5, in floats
         ASSERT_NEAR(static_cast<double>(best.error), static_cast<double>(exact_error(planes, at)), bound) << round;
@@ -375,14 +376,13 @@ TEST(Numerics, CancellationInQuadrics) {
         std::vector<Plane3> planes;
         Floats sum{}, about_origin{};
         glm::dvec3 place = far;
-        const float none = 0;
         for (int i = 0; i < 64; ++i) {
             planes.push_back({random_direction(random), far + 0.5 * random_direction(random)});
             add_plane(planes.back(), glm::dvec3(0), about_origin);
             Floats own{}, both{};
             add_plane(planes.back(), planes.back().point, own);
             const glm::vec3 d(planes.back().point - place);
-            add_from<float>(sum.data(), own.data(), d.x, d.y, d.z, &none, 0, both.data());
+            add_base<float>(sum.data(), own.data(), {d.x, d.y, d.z}, both.data());
             sum = both;
         }
         const glm::dvec3 at = far + 0.5 * random_direction(random);

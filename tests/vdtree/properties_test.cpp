@@ -112,8 +112,8 @@ RC_GTEST_PROP(Properties, QuadricsAreLeastBetweenTheirPairAndTellTheirError, ())
         size += 8;
     }
     const glm::vec3 other(*any_direction());
-    const auto best = minimise<float>(q.data(), other.x, other.y, other.z, 0);
-    const glm::dvec3 at(best.x, best.y, best.z);
+    const auto best = minimise<float>(Form<float>::of_base(q.data()), {other.x, other.y, other.z}, 2);
+    const glm::dvec3 at(best.at.x, best.at.y, best.at.z);
     RC_ASSERT(glm::distance(at, 0.5 * glm::dvec3(other)) <= 1.0001);
     double truth = 0;
     for (const auto& [n, away] : planes) truth += (glm::dot(n, at) - away) * (glm::dot(n, at) - away);
