@@ -1,5 +1,6 @@
 // Subdivision: no crack anywhere, counts as asked for, attributes and ranges where they belong.
 
+#include "build/leaves.h"
 #include "build/surface.h"
 #include "shapes.h"
 #include "subdivide.h"
@@ -14,7 +15,8 @@ using vdtree::Closedness;
 using vdtree::Mesh;
 
 Closedness closedness(const Mesh& mesh) {
-    return vdtree::analyse_surface(mesh.view(), vdtree::find_coincident(mesh.positions)).closedness;
+    const vdtree::MeshView view = mesh.view();
+    return vdtree::analyse_surface(vdtree::PlaceMesh(view).mesh()).closedness;
 }
 
 Mesh subdivided(const Mesh& mesh, const SubdivideOptions& options) {

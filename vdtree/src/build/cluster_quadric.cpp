@@ -523,10 +523,28 @@ private:
     }
 
     void write(const Merge& merge) {
-        const Index parent = make_cluster(maker_.from_unit_box(merge.place));
+        const glm::dvec3 place = snapped(maker_.from_unit_box(merge.place), position(cluster_[merge.kept]),
+                                         position(cluster_[merge.joined]));
+        const Index parent = make_cluster(place);
         result_.deviations.back() = maker_.length_from_unit_box(merge.deviation);
         result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
         cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+    }
+
+    glm::dvec3 position(Index cluster) const {
+        return cluster < places() ? input_.mesh.positions[cluster] : result_.positions[cluster - places()];
+    }
+
+    // Floats place a proxy to a millionth of the way between its parts. Where it has a coordinate of one of them but for
+    // that, it has it exactly: so what folds in a plane along the axes, or at its border, stays there.
+    static glm::dvec3 snapped(glm::dvec3 at, const glm::dvec3& a, const glm::dvec3& b) {
+        constexpr double near_enough = 1e-5; // share of the distance between the parts
+        const double reach = near_enough * glm::distance(a, b);
+        for (int axis = 0; axis < 3; ++axis) {
+            if (std::abs(at[axis] - a[axis]) <= reach) at[axis] = a[axis];
+            else if (std::abs(at[axis] - b[axis]) <= reach) at[axis] = b[axis];
+        }
+        return at;
     }
 
     Index make_cluster(glm::dvec3 position) {
