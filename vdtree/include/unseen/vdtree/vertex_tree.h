@@ -364,7 +364,7 @@ public:
     std::uint64_t dropped_triangles() const noexcept;     // input triangles with two corners at one position
     std::span<const std::byte> document() const noexcept; // MeshView::document; unchecked if it comes from a file
     Closedness closedness() const noexcept;
-    const Creases& creases() const noexcept; // how the normals of leaves were found
+    const Creases& creases() const noexcept;         // how the normals of leaves were found
     Sphere bounding_sphere() const noexcept;         // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
