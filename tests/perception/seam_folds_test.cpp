@@ -1,13 +1,16 @@
 // What folds change at hard edges and seams: nothing where both sides stay as they are.
 #include <unseen/perception/fold_measurement.h>
 
+#include <ctime>
 #include <numbers>
 
+#include <unseen/perception/criterion.h>
 #include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/cut.h>
 
-#include "built.h"
 #include "measure/contacts.h"
 #include "measure/fold_record.h"
+#include "measured.h"
 #include "shapes.h"
 #include "sound.h"
 #include "testing.h"
@@ -199,6 +202,75 @@ TEST(Contacts, AreFoundAroundHubs) {
         const Mesh both = shapes::together(disc(spokes, 0), shapes::inside_out(disc(spokes, 0.05)));
         for (const Contact& contact : contacts_of(both)) ASSERT_NEAR(contact.gap, 0.05f, 1e-4f) << spokes;
     }
+}
+
+// Rings of so many vertices, each of a radius and a height, with quads between; closed by hubs where asked.
+Mesh turned(int around, std::initializer_list<glm::dvec2> rings, bool has_hubs) {
+    Mesh mesh;
+    const auto n = static_cast<Index>(around);
+    for (const glm::dvec2& ring : rings)
+        for (Index i = 0; i < n; ++i) {
+            const double angle = 2 * std::numbers::pi * i / around;
+            mesh.positions.push_back({ring.x * std::cos(angle), ring.x * std::sin(angle), ring.y});
+        }
+    const auto last = static_cast<Index>(rings.size() - 1) * n, low = last + n, high = low + 1;
+    for (Index from = 0; from < last; from += n)
+        for (Index i = 0; i < n; ++i) {
+            const Index j = (i + 1) % n;
+            mesh.triangles.push_back({from + i, from + j, from + n + j});
+            mesh.triangles.push_back({from + i, from + n + j, from + n + i});
+        }
+    if (!has_hubs) return mesh;
+    mesh.positions.push_back({0, 0, rings.begin()->y});
+    mesh.positions.push_back({0, 0, std::prev(rings.end())->y});
+    for (Index i = 0; i < n; ++i) {
+        const Index j = (i + 1) % n;
+        mesh.triangles.push_back({low, j, i});
+        mesh.triangles.push_back({high, last + i, last + j});
+    }
+    return mesh;
+}
+
+// Long triangles fold like any others: most of their folds move nothing by as much as a hundredth of a pixel.
+TEST(Slivers, FoldWhereNothingShows) {
+    struct Case {
+        const char* name;
+        Mesh mesh;
+        double most_left; // share of the triangles
+    };
+    Mesh cone = disc(2000, 0);
+    cone.positions[0].z = 1;
+    const Case cases[] = {{"disc", disc(4000, 0), 0.15},
+                          {"ring", turned(2000, {{0.5, 0}, {1, 0}}, false), 0.25},
+                          {"tube", turned(2000, {{0.5, 0}, {0.5, 2}}, false), 0.2},
+                          {"cylinder", turned(2000, {{0.5, 0}, {0.5, 2}}, true), 0.15},
+                          {"cone", cone, 0.3}};
+    for (const auto& [name, mesh, most_left] : cases) {
+        const VertexTree tree = support::measured(support::built(mesh));
+        View view;
+        view.fov_y_degrees = 20;
+        view.target = tree.origin() + glm::dvec3(tree.bounding_sphere().centre);
+        view.eye = view.target +
+                   10.0 * static_cast<double>(tree.bounding_sphere().radius) * glm::normalize(glm::dvec3(0.3, 0.4, 1));
+        const auto criterion = require(error_distances(tree, view, {}));
+        Cut cut(tree);
+        ASSERT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, FoldTestOptions())));
+        const double left = static_cast<double>(cut.indices().size() / 3) / tree.triangle_count();
+        EXPECT_LT(left, most_left) << name;
+        EXPECT_GT(cut.indices().size() / 3, 30u) << name << " is still round";
+    }
+}
+
+// However many triangles meet at a hub, the time goes with them.
+TEST(Slivers, AreMeasuredInTimeInProportion) {
+    const auto cpu_seconds = [](int spokes) {
+        const VertexTree tree = support::built(disc(spokes, 0));
+        const std::clock_t start = std::clock();
+        EXPECT_TRUE(measure_folds(tree));
+        return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+    };
+    const double few = cpu_seconds(2000), many = cpu_seconds(16000);
+    EXPECT_LT(many, 16 * few) << "8 is linear, 64 the square";
 }
 
 } // namespace unseen::perception::seam_folds_test

@@ -7,9 +7,11 @@
 
 namespace unseen::perception {
 
-// Differences over a mean luminance, in classes up to 2^8: beyond any display's peak over its black.
+// Differences over a mean luminance, in classes up to 2^8: beyond any display's peak over its black. They begin far below
+// what is seen of a pattern that fills the view, for they are rounded up: else the least difference of a fold of long
+// triangles would be one that is seen.
 inline constexpr int pattern_contrasts_per_octave = 8;
-inline constexpr ClassSeries pattern_contrasts{pattern_contrasts_per_octave, -10, 18};
+inline constexpr ClassSeries pattern_contrasts{pattern_contrasts_per_octave, -16, 24};
 inline constexpr int pattern_contrast_count = static_cast<int>(pattern_contrasts.count()) - 1; // without no_contrast
 inline constexpr int no_contrast = -1;
 inline constexpr int pattern_luminance_count = static_cast<int>(LuminanceClasses::count);

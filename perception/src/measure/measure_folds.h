@@ -73,9 +73,13 @@ LitStages find_lit_stages(const vdtree::SoundTree& tree, const TexturedLight& te
 void find_luminance_bias(const vdtree::SoundTree& tree, const TexturedLight& light,
                          std::span<const FoldTexture> textures, std::span<FoldError> errors);
 
-// The radius of what a fold of the node changes, in mesh units.
+// The radius of what a fold of the node changes, in mesh units. What a fold changes of slivers is as long as they are,
+// and about as wide as the support: no more than the latter's multiple counts, or else all folds of a fan were alike,
+// the first and the last.
 inline float changed_radius(const vdtree::VertexTree& tree, std::span<const FoldError> errors, vdtree::NodeId node) {
-    return std::max(tree.support_spheres()[node].radius, errors[node].extent);
+    constexpr float most_extent = 4; // radii of the support: twice that of regular meshes' finest nodes
+    const float radius = tree.support_spheres()[node].radius;
+    return std::max(radius, std::min(errors[node].extent, most_extent * radius));
 }
 
 } // namespace unseen::perception

@@ -78,10 +78,16 @@ public:
     void assign(std::span<const RingTriangle<count>> ring) {
         triangles_.clear();
         for (const auto& [corner, inside, sheet] : ring) {
-            const auto& [a, b, c] = corner;
-            const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
-            const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
-            const float determinant = bb * cc - bc * bc;
+            std::size_t first = 0;
+            Products products(corner, first);
+            // At the tip of a sliver, its two long edges are almost one: rounding would move points along them.
+            if (!(products.determinant() > sharp_tip * products.bb * products.cc)) {
+                first = widest_corner(corner);
+                products = Products(corner, first);
+            }
+            const auto &a = corner[first], &b = corner[(first + 1) % 3], &c = corner[(first + 2) % 3];
+            const auto& [ab, ac, bb, bc, cc] = products;
+            const float determinant = products.determinant();
             PreparedTriangle& t = triangles_.emplace_back();
             t.a = a.position, t.b = ab, t.c = ac;
             t.bb = bb, t.bc = bc, t.cc = cc;
@@ -114,6 +120,29 @@ private:
     static constexpr float infinitely_far = std::numeric_limits<float>::infinity();
     // Triangles whose area is less than a thousandth of their edges' squares count by their edges.
     static constexpr float least_determinant = 1e-6f;
+    static constexpr float sharp_tip = 1e-3f; // squared sine of an angle, of 1.8 degrees
+
+    // Of the edges from a corner.
+    struct Products {
+        glm::vec3 b, c;
+        float bb, bc, cc;
+
+        Products(const LitPointOf<count> (&corner)[3], std::size_t from)
+            : b(corner[(from + 1) % 3].position - corner[from].position),
+              c(corner[(from + 2) % 3].position - corner[from].position), bb(glm::dot(b, b)), bc(glm::dot(b, c)),
+              cc(glm::dot(c, c)) {}
+        float determinant() const { return bb * cc - bc * bc; }
+    };
+    // That of the largest angle, opposite to the longest edge.
+    static std::size_t widest_corner(const LitPointOf<count> (&corner)[3]) {
+        std::size_t widest = 0;
+        float longest = -1;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const glm::vec3 opposite = corner[(k + 2) % 3].position - corner[(k + 1) % 3].position;
+            if (const float squared = glm::dot(opposite, opposite); squared > longest) longest = squared, widest = k;
+        }
+        return widest;
+    }
 
     struct PreparedTriangle {
         glm::vec3 a, b, c;                                            // b and c from a
