@@ -174,6 +174,26 @@ std::vector<std::uint8_t> stages_of(std::span<const FoldError> errors) {
     return stage_of;
 }
 
+// By stage: whether nothing moves, up to it. Where folds in a plane move its border by the rounding of floats, a sample of
+// a picture may come to lie on the other side of it: no contrast that anybody could see, but one that the pictures tell of.
+std::vector<std::uint8_t> stages_without_motion(const VertexTree& tree, std::span<const MeasuredFolds> found,
+                                                std::span<const FoldError> errors) {
+    constexpr float least_motion = 1e-5f;    // share of the radius; 400th of a sample
+    constexpr float least_luminance = 1e-5f; // relative; below the steps in which it is stored
+    const float length = least_motion * tree.bounding_sphere().radius;
+    std::vector<std::uint8_t> still(256, 1);
+    for (const MeasuredFolds& of : found)
+        for (std::size_t node = 0; node < errors.size(); ++node) {
+            const FoldRecord& fold = of.folds[node];
+            const bool slides = !of.textures.empty() && !(of.textures[node].slide * fold.extent <= length);
+            if (slides || !(fold.farthest <= length && fold.border <= length) ||
+                !(fold.largest_luminance <= least_luminance))
+                still[errors[node].stage] = 0;
+        }
+    for (std::size_t stage = 1; stage < still.size(); ++stage) still[stage] &= still[stage - 1];
+    return still;
+}
+
 // What folds change under light from everywhere, as far as the order goes in which they fold: half as much along each
 // axis as a light from there.
 std::vector<FoldError> errors_in_any_light(const Measured& measured, float to_light) {
@@ -210,6 +230,9 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
                              errors, told);
     });
     if (told.is_cancelled()) return cancelled_error();
+    const auto still = stages_without_motion(tree, measured->found, errors);
+    for (std::size_t stage = 0; stage < stages.size(); ++stage)
+        if (still[stage]) stages[stage] = {};
     return with_records(tree, std::move(measured->found.front()), stages_of(errors), std::move(stages));
 }
 
@@ -232,6 +255,9 @@ Result<MeasuredShadings> measure_shadings(const VertexTree& tree, std::span<cons
                                      measured->found.front().textures, errors, told);
     });
     if (told.is_cancelled()) return cancelled_error();
+    const auto still = stages_without_motion(tree, measured->found, errors);
+    for (std::size_t i = 0; i < all.stages.by_share.size(); ++i)
+        if (still[i % all.stages.stage_count()]) all.stages.by_share[i] = {};
     all.stage_of = stages_of(errors);
     all.of = std::move(measured->found);
     return all;
