@@ -35,13 +35,12 @@ constexpr std::size_t curve_neighbours = 3;
 constexpr std::size_t rounds_to_absorb = 4;
 
 // Components that a cluster keeps open at most, for what it costs to judge a pair grows with them. Beyond, at poles of
-// thousands of triangles with coordinates of their own, both sides of a seam may drift apart. The helmet's clusters have
-// up to 8, all but a few up to 4.
+// thousands of triangles with coordinates of their own, both sides of a seam may drift apart.
 constexpr std::size_t most_components = 24;
 
 // Whether a merge turns triangles over is tested from when one in so many clusters of a part is left, and always among so
-// few. From the start it would take half as long again to contract, for what is turned over there is small and rare, and
-// cuts repair it.
+// few. From the start contraction would take a sixth more instructions (bunny), for what is small and rare there; cuts
+// repair it.
 constexpr std::size_t tested_share = 4, always_tested = 2048;
 
 constexpr Index none = std::numeric_limits<Index>::max();

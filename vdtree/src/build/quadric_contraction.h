@@ -170,7 +170,7 @@ struct Contraction {
 using RoundCallback = FunctionRef<bool(std::size_t merges)>;
 
 // Contracts until at most `target` clusters are left (at least 1; fewer may remain). Cost: linear in the part for each
-// round, and a round contracts a good share of the clusters. Memory: about 420 bytes a slot.
+// round, and a round contracts a good share of the clusters. Memory: about 520 bytes a slot, more with seams.
 Contraction contract_part(const PartMesh& part, Index target, const RoundCallback& after_round);
 
 // Joins neighbouring ranges; left.end_slot == right.first_slot. The merges of both have to be kept elsewhere.

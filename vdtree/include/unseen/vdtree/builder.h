@@ -54,8 +54,8 @@ using Clusterer = FunctionRef<Result<Clustering>(const ClusterInput&)>;
 // their points are skipped, so any depth works. Parallel. Memory: 32 bytes a vertex.
 Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& progress = {});
 
-// Contracts vertex pairs in the order of their quadric error over position, luminance and the mesh's own attributes
-// (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies. Pairs are the edges,
+// Contracts pairs of places in the order of their quadric error over position, normals, texture coordinates and colours
+// with luminance (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies. Pairs are the edges,
 // and near neighbours where no edge connects two parts. Space is divided into blocks that are contracted in parallel and
 // then joined; the blocks depend on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle. With a team,
 // whose members all call this with the same input, each contracts its share of the blocks, and member 0 gets the result,
