@@ -185,7 +185,9 @@ TEST(ShipHulls, AreFoldedUnseenUnderLights) {
 
 // Why that test is what requests fall back to.
 TEST(ShipHulls, ShowWhatLuebkeAndHallensTestFolds) {
-    Seen seen(built(ship_hulls().front()));
+    // Smooth: with hard edges, sides and deck do not share their luminances.
+    const HardMesh hull = ship_hulls().front();
+    Seen seen(std::move(*require(vdtree::build_tree(hull.mesh.view(), {.crease = 180}))));
     const auto judged =
         seen.judge({{1, 0.5, 0.1}, 0.2}, 12, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
             return perception::luebke_hallen_distances(seen.tree(), view, options);

@@ -147,7 +147,7 @@ TEST(DamagedWedges, LeadNobodyOutOfBounds) {
     int refused = 0, folded = 0, harmless = 0;
     for (const char* section : {"several", "extra_wedges", "further", "leaf_ranks", "wedge_ranks"}) {
         const std::size_t count = TreeFile(honest)[section].data.size() / sizeof(std::uint32_t);
-        ASSERT_GT(count, 4u) << section;
+        ASSERT_GE(count, 4u) << section;
         for (std::size_t i = 0; i < count; ++i) {
             const auto was = TreeFile(honest)[section].get<std::uint32_t>(i);
             for (const std::uint32_t now : {0u, was - 1, was + 1, was + 7, 0x7fffffffu, 0xffffffffu}) {

@@ -17,13 +17,13 @@ using shapes::random_unit;
 constexpr double glide_seconds = 0.25;
 constexpr double frame_seconds = 1 / 60.0;
 
-VertexTree built(Mesh mesh, ClustererKind kind) {
+VertexTree built(Mesh mesh, ClustererKind kind, std::optional<float> crease = {}) {
     // Colours that vary, so that all that glides is seen to.
     for (const glm::dvec3 p : mesh.positions) {
         const glm::dvec3 wave = 0.5 + 0.4 * glm::sin(7.0 * p);
         mesh.colours.push_back(glm::vec4(glm::vec3(wave), 1));
     }
-    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .threads = 1})));
+    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .crease = crease, .threads = 1})));
 }
 
 Geomorph made(const VertexTree& tree, double seconds = 0.25, double jump_share = 0.25) {
@@ -299,7 +299,7 @@ protected:
         });
     }
 
-    VertexTree tree_ = built(shapes::bumpy_sphere(3, 0.05), ClustererKind::quadric);
+    VertexTree tree_ = built(shapes::bumpy_sphere(3, 0.05), ClustererKind::quadric, 180); // nodes have one wedge
     Cut cut_{tree_};
     Geomorph geomorph_ = made(tree_, 0.5);
     NodeId node_ = 0;
