@@ -7,6 +7,7 @@
 
 #include "shapes.h"
 #include "testing.h"
+#include "tree_checks.h"
 
 namespace session_test {
 
@@ -186,15 +187,7 @@ TEST(Follower, ComesWhereACutFromScratchIs) {
         const auto followed = require(follower.follow(view, request));
         const auto anew = require(session.simplify(view, request));
         for (std::size_t object = 0; object < 2; ++object) {
-            // A still shows no triangle that is turned over, which a flight has no time for.
-            const vdtree::Cut& cut = follower.cut(object);
-            vdtree::Cut still(cut.tree());
-            still.adjust(
-                [&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> nodes, std::span<float> costs) {
-                    for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = cut.is_unfolded(nodes[i]) ? 2.0f : 0.0f;
-                });
-            EXPECT_EQ(still.triangle_count(), cut.triangle_count());
-            still.unfold_turned();
+            const vdtree::Cut still = support::still_of(follower.cut(object));
             EXPECT_EQ(still.triangle_count(), anew->cuts[object].triangle_count()) << "frame " << frame;
         }
     }

@@ -279,4 +279,14 @@ inline std::string fault_in_cut(const Cut& cut) {
     return {};
 }
 
+// The cut as a still or a written mesh has it: without triangles that are turned over, which a flight has no time for.
+inline Cut still_of(const Cut& cut) {
+    Cut still(cut.tree());
+    still.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = cut.is_unfolded(nodes[i]) ? 2.0f : 0.0f;
+    });
+    still.unfold_turned();
+    return still;
+}
+
 } // namespace unseen::support
