@@ -61,7 +61,7 @@ AccuracyPoint kept_point(AccuracySubject& subject, const std::string& name, cons
         });
         if (i <= settling_frames) continue;
         times.push_back(1e6 * seconds);
-        const double truth = require(subject.session.simplify(now, exact)).stats.triangles;
+        const double truth = require(session::Follower(subject.session).follow(now, exact)).stats.triangles;
         error = std::max(error, std::abs(triangles / std::max(1.0, truth) - 1));
     }
     return {.name = name, .values = {median(std::move(times)), error}};

@@ -113,7 +113,7 @@ TEST_F(MaterialCommandTest, CutsKeepEverythingAndLookTheSame) {
     const GltfContents in = read_gltf(path("in.glb"));
     succeed({"build", "in.glb", "-o", "in.vdt"});
     // What nobody sees, and a rough one.
-    const Words view = {"--size", "400x200", "--eye", "0", "0.5", "6", "--target", "0", "0", "0", "--fov", "40"};
+    const Words view = {"--size", "400x200", "--eye", "0", "0.5", "12", "--target", "0", "0", "0", "--fov", "40"};
     const auto simplified = [&](Words words) {
         words.insert(words.begin(), {"simplify", "in.vdt"});
         words.insert(words.end(), view.begin(), view.end());

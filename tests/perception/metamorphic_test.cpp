@@ -28,7 +28,7 @@ Mesh ball() {
     for (glm::dvec3& p : mesh.positions) p = on_grid(p);
     return mesh;
 }
-VertexTree measured_tree(const Mesh& mesh) { return measured(support::built(mesh)); }
+VertexTree measured_tree(const Mesh& mesh) { return measured(support::built(mesh, {.crease = 180})); }
 View view_from(glm::dvec3 eye) { return {.eye = eye, .target = glm::dvec3(0), .up = {0.1, 1, 0.2}}; }
 std::vector<View> path(int frames) {
     std::vector<View> views;
