@@ -183,24 +183,6 @@ TEST(ShipHulls, AreFoldedUnseenUnderLights) {
     }
 }
 
-// Why that test is what requests fall back to.
-TEST(ShipHulls, ShowWhatLuebkeAndHallensTestFolds) {
-    std::uint64_t visible_pixels = 0;
-    for (const HardMesh& hull : ship_hulls()) {
-        // By cells, which put vertices of both sides of an edge together.
-        Seen seen(std::move(*require(
-            vdtree::build_tree(hull.mesh.view(), {.clusterer = vdtree::ClustererKind::octree, .prelit = true}))));
-        for (const glm::dvec3& direction : {glm::dvec3(1, 0.5, 0.1), glm::dvec3(0.1, 1, 0.2)})
-            for (const double aside : degrees_aside)
-                visible_pixels += seen.judge({direction, 0.2}, aside,
-                                             [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
-                                                 return perception::luebke_hallen_distances(seen.tree(), view, options);
-                                             })
-                                      .visible_pixels;
-    }
-    EXPECT_GT(visible_pixels, 0u);
-}
-
 // Measured once for all lights: a far one, a near one, and a spot that ends on the mesh.
 TEST(LitFolds, AreUnseenUnderLightsThatStandStill) {
     for (HardMesh& hard : tuning_meshes(8'000)) {
