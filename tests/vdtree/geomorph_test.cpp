@@ -23,7 +23,8 @@ VertexTree built(Mesh mesh, ClustererKind kind, std::optional<float> crease = {}
         const glm::dvec3 wave = 0.5 + 0.4 * glm::sin(7.0 * p);
         mesh.colours.push_back(glm::vec4(glm::vec3(wave), 1));
     }
-    return std::move(*require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .crease = crease, .threads = 1})));
+    return std::move(
+        *require(build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .crease = crease, .threads = 1})));
 }
 
 Geomorph made(const VertexTree& tree, double seconds = 0.25, double jump_share = 0.25) {
