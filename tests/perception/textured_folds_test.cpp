@@ -80,7 +80,7 @@ float largest_contrast(const VertexTree& tree) {
     return most;
 }
 
-// Of pairs of vertices away from the border, where corners are cut.
+// The largest value over pairs of vertices away from the border: at the border, corners are cut.
 template <class F>
 float largest_inside(const VertexTree& tree, const F& value) {
     float most = 0;

@@ -46,7 +46,7 @@ private:
     XXH3_state_t state_;
 };
 
-// Of an angle, which is never negative.
+// A crease angle is never negative, so -1 stands for none stated.
 std::uint32_t bits_of(const std::optional<float>& crease) {
     return std::bit_cast<std::uint32_t>(crease.value_or(-1.0f));
 }

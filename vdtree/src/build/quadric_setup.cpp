@@ -90,7 +90,7 @@ private:
         live_.several[s] = {first_component, static_cast<Index>(live_.components.size()) - first_component};
     }
 
-    // Of a class: one for each distinct value. The first is at the class's own place, the others follow.
+    // Makes a component of a class for each distinct value. The first is at the class's own place, the others follow.
     void make_components(Index first, Index end, std::size_t c, Index first_component) {
         by_value_.resize(end - first);
         std::iota(by_value_.begin(), by_value_.end(), first);
