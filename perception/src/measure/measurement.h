@@ -20,8 +20,8 @@ inline constexpr std::size_t witness_count = 4;
 inline constexpr std::uint32_t spread_count = 8;          // leaves compared besides, at equal steps through the support
 inline constexpr std::size_t triangles_compared = 16;     // of each surface, at equal steps
 inline constexpr std::uint32_t most_wedges_compared = 16; // of a child: poles have as many as triangles
-// Of the width that a fold changes: surfaces whose distances from a point differ by less meet at a seam, and of those
-// the point's own side counts. Some hundred times what rounding makes of distances.
+// A share of the width that a fold changes. Surfaces whose distances from a point differ by less meet at a seam, and the
+// point's own side counts. Some hundred times what rounding makes of distances.
 inline constexpr float seam_width = 1e-3f;
 inline constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 // Neighbours with more than so many times the node's luminance range fold later than it: they are not folded with it.
@@ -51,9 +51,9 @@ inline constexpr std::size_t most_triangles_drawn = 4096; // of the mesh's own; 
 inline constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
 
 // ---- what lies over the surface and is not drawn (TextureDetail::stand_in)
-// Of the base colours of three controllers and a helmet, images of 2048 texels a side, the four finest octaves have
-// contrasts of 0.04 to 0.25 (root mean square; the median is 0.1); of the helmet's normal map under a light 0.03 to 0.04,
-// and more than 0.1 in a tenth of the places.
+// Measured on images of 2048 texels a side, as root mean square contrasts of the four finest octaves. The base colours of
+// three controllers and a helmet have 0.04 to 0.25, with a median of 0.1. The helmet's normal map under a light has 0.03
+// to 0.04, and more than 0.1 in a tenth of the places.
 inline constexpr float usual_contrast = 0.1f;        // of an octave
 inline constexpr std::uint32_t stand_in_side = 1024; // texels over the range 0..1 of coordinates
 inline constexpr std::size_t stand_in_octaves = 8;   // the finest; wider patterns are the parts of an atlas

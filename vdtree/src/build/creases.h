@@ -30,10 +30,10 @@ struct CornerNormals {
 
 // Finds the normal of every corner.
 //
-// A corner's own normal is kept. The others are area-weighted means of the faces around the place that the corner shares
-// a normal with: faces share across an edge if the angle between them is at most the crease angle (any two of the faces
-// that meet there), and all faces around a place share if each is within half that angle of their mean. Smoothing groups,
-// where stated, decide in place of the angle. Faces without an area join their neighbours'.
+// A corner's own normal is kept. Any other is the area-weighted mean of the faces around the place that share a normal
+// with the corner's face. Any two faces that meet at an edge share if the angle between them is at most the crease angle.
+// All faces around a place share if each is within half that angle of their mean. Smoothing groups, where stated, decide
+// in place of the angle. Faces without an area join their neighbours'.
 // Normals of a place that are nearly the same become one.
 //
 // Cost: linear but for sorting the corners of each place; parallel; 60 bytes a triangle while it lasts. The result does

@@ -169,9 +169,9 @@ struct Minimum {
     F error;
 };
 
-// Where a sum whose parts lie at 0 and `to` is least. In flat directions it stays at the middle of the two: each step goes
-// to where the form and the squared distance from the step before, a little weight of it, are least together, so that
-// what is steep is as good as exact after few and what is flat has hardly moved. A minimum that is farther from the
+// Where a sum whose parts lie at 0 and `to` is least. In flat directions it stays at the middle of the two. Each step
+// minimises the form plus a small weight times the squared distance from the step before. So steep directions are as good
+// as exact after few steps, and flat ones have hardly moved. A minimum that is farther from the
 // middle than the two are from each other is not trusted: then, and wherever they are better, the middle and the two
 // ends are tried.
 template <class F>

@@ -8,9 +8,9 @@
 // contracted in any order, by any thread or process; all that they take and give are contiguous arrays of plain numbers.
 // Triangles are never cut: a cluster is a set of slots, and parts fit each other without seams.
 //
-// A place has one or several leaves, the distinct tuples of attributes of the corners there. Of each attribute class, those
-// of its leaves that share a value are one component, and components of two clusters become one when these merge, if
-// corners of one triangle of the mesh link them, whether it has vanished or not. So both sides of a seam stay apart, and
+// A place has one or several leaves, the distinct tuples of attributes of the corners there. In each attribute class, the
+// leaves that share a value form one component. When two clusters merge, two of their components become one if corners of
+// one triangle of the mesh link them, whether the triangle has vanished or not. So both sides of a seam stay apart, and
 // what is alike on both does not drift apart. Most clusters have one component of each class, and so has every cluster of a
 // mesh without seams: these are kept and judged side by side; only the others have lists.
 //
@@ -118,8 +118,7 @@ struct LinkRange {
     Index first = 0, count = 0;
 };
 
-// By class: the component of a cluster that a leaf belongs to. Of a class whose component is closed, see Contraction,
-// no_component.
+// By class: the component of a cluster that a leaf belongs to; no_component where that is closed (see Contraction).
 using LeafComponents = std::array<Index, most_classes>;
 inline constexpr Index no_component = 0xffffffffu;
 
