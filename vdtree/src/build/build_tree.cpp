@@ -185,9 +185,10 @@ public:
         bound(ancestors);
         find_vertices(ancestors);
         take_links();
-        const TreeLinks links = links_of(*g_);
-        parts_.emplace(links);
-        parts_->assign_triangles(g_->first_triangle, g_->triangles);
+        if (places_->has_seams()) { // else leaves are places
+            parts_.emplace(links_of(*g_));
+            parts_->assign_triangles(g_->first_triangle, g_->triangles);
+        }
         if (is_textured()) lay_texture();
         mark_translucent();
 

@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "build/parallel_array.h"
 #include "build/spatial_order.h"
 #include <unseen/vdtree/internal/parallel.h>
 
@@ -33,25 +34,19 @@ constexpr std::size_t most_compared = 64;
 constexpr std::size_t most_classes = 4, most_channels_of_class = 4;
 enum class Kind { normal, uv, colour, further };
 
-// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g, w d, and of
-// the values at the corners themselves.
+// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g and w d.
 struct Component {
-    double weight = 0, corner_weight = 0;
+    double weight = 0;
     std::array<glm::dvec4, most_channels_of_class> linear{}; // w g and w d
-    glm::dvec4 corners{0};
 
-    void operator+=(const Component& other) {
-        weight += other.weight, corner_weight += other.corner_weight;
-        for (std::size_t c = 0; c < most_channels_of_class; ++c) linear[c] += other.linear[c];
-        corners += other.corners;
+    void add(const Component& other, std::size_t channels) {
+        weight += other.weight;
+        for (std::size_t c = 0; c < channels; ++c) linear[c] += other.linear[c];
     }
     glm::dvec4 value_at(const glm::dvec3& p, std::size_t channels) const {
-        const glm::dvec4 mean = corners / corner_weight;
-        glm::dvec4 value = mean;
-        for (std::size_t c = 0; c < channels; ++c) {
-            const double s = (glm::dot(glm::dvec3(linear[c]), p) + linear[c].w) / weight;
-            if (std::isfinite(s)) value[static_cast<int>(c)] = s;
-        }
+        glm::dvec4 value(0);
+        for (std::size_t c = 0; c < channels; ++c)
+            value[static_cast<int>(c)] = (glm::dot(glm::dvec3(linear[c]), p) + linear[c].w) / weight;
         return value;
     }
 };
@@ -87,9 +82,15 @@ struct WedgeValues {
 // States of nodes whose parents are still to come, and the values that have been found. One for each task; what a parent
 // has taken is used again.
 struct Workspace {
+    std::vector<Component>
+        of_leaves;                 // class by class, of the leaves that hang on the task's nodes: of a run of leaves,
+    Index first_leaf = 0;          // which begins here,
+    std::vector<Index> top_leaves; // or, above the parts, of these, ascending
     std::deque<NodeState> states;
     std::vector<NodeState*> unused;
     std::vector<WedgeValues> values;
+    NodeState compacted;
+    std::vector<Index> number;           // by wedge or component of a node, for a while
     std::vector<Index> into;             // by wedge of the children: the wedge that it became, by its first one
     std::vector<Index> component_parent; // by component: itself, or one that it was united with
 
@@ -128,21 +129,23 @@ public:
                 const LeafMesh& mesh, const Ancestors& ancestors)
         : shape_(shape), parts_(parts), positions_(positions), mesh_(mesh), interior_(shape.interior()),
           splits_(!mesh.first_leaf.empty() || !mesh.materials.empty()) {
-        list_triangles();
+        list_places();
         measure();
         if (splits_) find_meetings(ancestors);
-        counts_.assign(interior_, 1);
-        values_at_.resize(interior_);
         states_.assign(interior_, nullptr);
         spaces_.resize(parts.count());
     }
 
     NodeWedges run() {
-        parts_.bottom_up([&] {
-            const std::uint16_t number = make_workspace();
-            return [this, &space = *spaces_[number], number](NodeId node) { visit(node, space, number); };
-        });
-        number_wedges();
+        if (!splits_) {
+            make_room(interior_ + shape_.leaves());
+            for_each_node([this](NodeId node, Workspace& space, std::uint16_t) { visit_whole(node, space); });
+        } else {
+            counts_.assign(interior_, 1);
+            values_at_.resize(interior_);
+            for_each_node([this](NodeId node, Workspace& space, std::uint16_t number) { visit(node, space, number); });
+            number_wedges();
+        }
         fill();
         return std::move(out_);
     }
@@ -194,21 +197,11 @@ private:
         return glm::dvec4(mesh_.colours[leaf]);
     }
 
-    // The triangles at each leaf.
-    void list_triangles() {
-        if (!mesh_.first_leaf.empty()) {
-            places_.resize(leaf_count());
-            for (Index place = 0; place < shape_.leaves(); ++place)
-                for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf) places_[leaf] = place;
-        }
-        start_.assign(std::size_t{leaf_count()} + 1, 0);
-        for (const Triangle& t : mesh_.triangles)
-            for (const Index leaf : t) ++start_[leaf + 1];
-        std::partial_sum(start_.begin(), start_.end(), start_.begin());
-        around_.resize(start_.back());
-        std::vector<Index> next(start_.begin(), start_.end() - 1);
-        for (Index t = 0; t < mesh_.triangles.size(); ++t)
-            for (const Index leaf : mesh_.triangles[t]) around_[next[leaf]++] = t;
+    void list_places() {
+        if (mesh_.first_leaf.empty()) return;
+        places_.resize(leaf_count());
+        for (Index place = 0; place < shape_.leaves(); ++place)
+            for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf) places_[leaf] = place;
     }
 
     // Where triangles vanish with two corners, and where the third one joins these.
@@ -218,34 +211,72 @@ private:
         std::iota(root_.begin(), root_.end(), Index{0});
         local_.assign(leaf_count(), 0);
         last_.assign(leaf_count(), 0);
-        std::vector<NodeId> vanishing(triangles), joins(triangles);
-        for (NodeId node = 0; node < interior_; ++node)
-            for (Index t = mesh_.first_triangle[node]; t < mesh_.first_triangle[node + 1]; ++t) vanishing[t] = node;
-        parallel_loop(std::size_t{0}, triangles, [&](std::size_t t) {
-            const auto place = [&](std::size_t k) { return place_node(mesh_.triangles[t][k]) - interior_; };
-            const Index low = std::min({place(0), place(1), place(2)}), high = std::max({place(0), place(1), place(2)});
-            joins[t] = ancestors.lowest(vanishing[t], [&](NodeId node) {
-                return shape_.first_leaf[node] <= low && high < shape_.leaf_end[node];
-            });
+        ParallelArray<NodeId> joins(triangles, Unfilled());
+        parallel_loop(NodeId{0}, interior_, [&](NodeId vanishing) {
+            for (Index t = mesh_.first_triangle[vanishing]; t < mesh_.first_triangle[vanishing + 1]; ++t) {
+                const auto place = [&](std::size_t k) { return place_node(mesh_.triangles[t][k]) - interior_; };
+                const auto [low, high] = std::minmax({place(0), place(1), place(2)});
+                const NodeId whole = ancestors.lowest(vanishing, [&](NodeId node) {
+                    return shape_.first_leaf[node] <= low && high < shape_.leaf_end[node];
+                });
+                joins[t] = whole == vanishing ? no_node : whole;
+            }
         });
         first_join_.assign(std::size_t{interior_} + 1, 0);
-        for (Index t = 0; t < triangles; ++t) first_join_[joins[t] + 1] += joins[t] != vanishing[t];
+        for (Index t = 0; t < triangles; ++t)
+            if (joins[t] != no_node) ++first_join_[joins[t] + 1];
         std::partial_sum(first_join_.begin(), first_join_.end(), first_join_.begin());
         joining_.resize(first_join_.back());
         std::vector<Index> next(first_join_.begin(), first_join_.end() - 1);
-        for (Index t = 0; t < triangles; ++t) {
-            if (joins[t] != vanishing[t]) joining_[next[joins[t]]++] = t;
-            for (const Index leaf : mesh_.triangles[t]) last_[leaf] = std::max(last_[leaf], shape_.made[vanishing[t]]);
-        }
+        for (Index t = 0; t < triangles; ++t)
+            if (joins[t] != no_node) joining_[next[joins[t]]++] = t;
+        for (NodeId node = 0; node < interior_; ++node)
+            for (Index t = mesh_.first_triangle[node]; t < mesh_.first_triangle[node + 1]; ++t)
+                for (const Index leaf : mesh_.triangles[t]) last_[leaf] = std::max(last_[leaf], shape_.made[node]);
         parents_below_.resize(interior_);
     }
 
     // ---- node by node, children first
 
-    std::uint16_t make_workspace() {
-        const auto number = static_cast<std::uint16_t>(used_spaces_++);
-        spaces_[number] = std::make_unique<Workspace>();
-        return number;
+    // Calls visit(node, space, the space's number).
+    template <class Visit>
+    void for_each_node(Visit&& visit) {
+        parts_.bottom_up([&](const TreePart& part) {
+            const auto number = static_cast<std::uint16_t>(used_spaces_++);
+            spaces_[number] = std::make_unique<Workspace>();
+            measure_leaves(part, *spaces_[number]);
+            return [&visit, &space = *spaces_[number], number](NodeId node) { visit(node, space, number); };
+        });
+    }
+
+    // In a tree without seams: a node has one wedge, of its number.
+    void visit_whole(NodeId node, Workspace& space) {
+        NodeState* state = nullptr;
+        const auto add = [&](std::span<const Component> components) {
+            for (std::size_t c = 0; c < classes_.size(); ++c)
+                state->components[c].add(components[c], classes_[c].channels);
+        };
+        shape_.for_each_child(
+            node,
+            [&](NodeId child) {
+                if (!state) {
+                    state = states_[child];
+                } else {
+                    add(states_[child]->components);
+                    space.unused.push_back(states_[child]);
+                }
+            },
+            [&](Index place) {
+                if (!state) {
+                    state = space.take();
+                    state->components.resize(classes_.size());
+                }
+                add(components_of(place, space));
+            });
+        const glm::dvec3 at = unit_position(node);
+        for (std::size_t c = 0; c < classes_.size(); ++c)
+            put(node, classes_[c].kind, state->components[c].value_at(at, classes_[c].channels));
+        states_[node] = state;
     }
 
     void visit(NodeId node, Workspace& space, std::uint16_t number) {
@@ -256,7 +287,7 @@ private:
                 append(*states_[child], state);
                 space.unused.push_back(std::exchange(states_[child], nullptr));
             },
-            [&](Index place) { add_place(place, state); });
+            [&](Index place) { add_place(place, state, space); });
         unite_wedges(node, state, space);
         values_at_[node] = {static_cast<Index>(space.values.size()), number};
         for (const WedgeState& wedge : state.wedges)
@@ -265,7 +296,12 @@ private:
         states_[node] = &state;
     }
 
-    void append(const NodeState& child, NodeState& to) const {
+    void append(NodeState& child, NodeState& to) const {
+        if (to.wedges.empty()) {
+            to.wedges.swap(child.wedges);
+            to.components.swap(child.components);
+            return;
+        }
         const Index before = static_cast<Index>(to.components.size());
         to.components.insert(to.components.end(), child.components.begin(), child.components.end());
         for (WedgeState wedge : child.wedges) {
@@ -274,14 +310,14 @@ private:
         }
     }
 
-    void add_place(Index place, NodeState& to) const {
+    void add_place(Index place, NodeState& to, Workspace& space) const {
         const std::size_t first_wedge = to.wedges.size();
         for (Index leaf = first_leaf(place); leaf < first_leaf(place + 1); ++leaf) {
             WedgeState wedge;
             wedge.root = leaf;
             if (!mesh_.materials.empty()) wedge.material = mesh_.materials[leaf];
-            if (splits_) wedge.last = last_[leaf];
-            const std::array<Component, most_classes> own = components_of(leaf);
+            wedge.last = last_[leaf];
+            const std::span<const Component> own = components_of(leaf, space);
             for (std::size_t c = 0; c < classes_.size(); ++c) {
                 Index& component = wedge.component[c];
                 component = shared_component(classes_[c], c, wedge, std::span(to.wedges).subspan(first_wedge));
@@ -289,7 +325,7 @@ private:
                     component = static_cast<Index>(to.components.size());
                     to.components.push_back(own[c]);
                 } else {
-                    to.components[component] += own[c];
+                    to.components[component].add(own[c], classes_[c].channels);
                 }
             }
             to.wedges.push_back(wedge);
@@ -308,49 +344,75 @@ private:
         return none;
     }
 
-    // What the classes have on the triangles at a leaf.
-    std::array<Component, most_classes> components_of(Index leaf) const {
-        std::array<Component, most_classes> sums;
-        std::array<glm::dvec4, most_classes> own;
-        for (std::size_t c = 0; c < classes_.size(); ++c) own[c] = value_of(classes_[c], leaf);
-        constexpr double least_area = 1e-12; // of the unit box: leaves on slivers have a mean, too
-        for (Index i = start_[leaf]; i < start_[leaf + 1]; ++i) {
-            const Triangle& t = mesh_.triangles[around_[i]];
-            const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p,
-                             cross = glm::cross(e, f);
-            const double squared = glm::dot(cross, cross), area = std::sqrt(squared) / 6;
-            const glm::dvec3 by_e = glm::cross(f, cross) / squared, by_f = glm::cross(cross, e) / squared;
-            for (std::size_t c = 0; c < classes_.size(); ++c) {
-                sums[c].corner_weight += area + least_area;
-                sums[c].corners += (area + least_area) * own[c];
-                add_linear(classes_[c], t, {p, by_e, by_f, area}, sums[c]);
-            }
-        }
-        return sums;
+    // What the classes have on the triangles at a leaf that hangs on a node of the task.
+    std::span<Component> components_of(Index leaf, Workspace& space) const {
+        const std::size_t at =
+            space.top_leaves.empty()
+                ? leaf - space.first_leaf
+                : static_cast<std::size_t>(std::ranges::lower_bound(space.top_leaves, leaf) - space.top_leaves.begin());
+        return std::span(space.of_leaves).subspan(at * classes_.size(), classes_.size());
     }
 
-    // A triangle: its first corner, what a step of 1 along its first and its last side's value adds to a gradient, and a
-    // third of its area.
-    struct Plane {
-        glm::dvec3 at, by_e, by_f;
-        double area;
-    };
-    void add_linear(const Class& of, const Triangle& t, const Plane& plane, Component& sum) const {
-        if (of.channels == 0) return;
-        const glm::dvec4 s = value_of(of, t[0]), along_e = value_of(of, t[1]) - s, along_f = value_of(of, t[2]) - s;
-        std::array<glm::dvec3, most_channels_of_class> gradients;
-        double steepest = 0;
-        for (std::size_t k = 0; k < of.channels; ++k) {
-            const int channel = static_cast<int>(k);
-            gradients[k] = along_e[channel] * plane.by_e + along_f[channel] * plane.by_f;
-            steepest = std::max(steepest, glm::dot(gradients[k], gradients[k]));
+    void measure_leaves(const TreePart& part, Workspace& space) const {
+        const auto is_own = [&](Index leaf) { return parts_.owns_leaf(part, place_node(leaf) - interior_); };
+        std::vector<Index>& top = space.top_leaves;
+        Index count = 0;
+        if (parts_.is_top(part)) {
+            for (const Index t : part.crossing)
+                std::ranges::copy_if(mesh_.triangles[t], std::back_inserter(top), is_own);
+            std::sort(top.begin(), top.end());
+            top.erase(std::unique(top.begin(), top.end()), top.end());
+            count = static_cast<Index>(top.size());
+        } else {
+            space.first_leaf = first_leaf(part.first_leaf);
+            count = first_leaf(part.leaf_end) - space.first_leaf;
         }
-        const double weight = plane.area / (1 + steepest * of.scale * of.scale);
-        if (!(weight > 0)) return;
-        sum.weight += weight;
-        for (std::size_t k = 0; k < of.channels; ++k)
-            sum.linear[k] +=
-                weight * glm::dvec4(gradients[k], s[static_cast<int>(k)] - glm::dot(gradients[k], plane.at));
+        space.of_leaves.resize(count * classes_.size());
+        TreeParts::for_each_triangle(part, [&](Index t) {
+            const Triangle& corners = mesh_.triangles[t];
+            std::array<Component*, 3> at{};
+            for (std::size_t k = 0; k < 3; ++k)
+                if (is_own(corners[k])) at[k] = components_of(corners[k], space).data();
+            add_triangle(corners, at);
+        });
+        constexpr double least_weight = 1e-12; // of leaves on nothing but slivers
+        for (Index i = 0; i < space.of_leaves.size(); ++i) {
+            Component& component = space.of_leaves[i];
+            if (component.weight > 0) continue;
+            const Class& of = classes_[i % classes_.size()];
+            const Index number = static_cast<Index>(i / classes_.size());
+            const glm::dvec4 value = value_of(of, top.empty() ? space.first_leaf + number : top[number]);
+            component.weight = least_weight;
+            for (std::size_t c = 0; c < of.channels; ++c)
+                component.linear[c].w = least_weight * value[static_cast<int>(c)];
+        }
+    }
+
+    // The linear functions that the classes have on a triangle. `at`: by corner, its classes' components, or none.
+    void add_triangle(const Triangle& t, const std::array<Component*, 3>& at) const {
+        const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p, cross = glm::cross(e, f);
+        const double squared = glm::dot(cross, cross), inverse = 1 / squared, area = std::sqrt(squared) / 6;
+        const glm::dvec3 by_e = glm::cross(f, cross) * inverse, by_f = glm::cross(cross, e) * inverse;
+        for (std::size_t c = 0; c < classes_.size(); ++c) {
+            const Class& of = classes_[c];
+            const glm::dvec4 s = value_of(of, t[0]), along_e = value_of(of, t[1]) - s, along_f = value_of(of, t[2]) - s;
+            Component here;
+            double steepest = 0;
+            bool is_bounded = true;
+            for (std::size_t k = 0; k < of.channels; ++k) {
+                const int channel = static_cast<int>(k);
+                const glm::dvec3 gradient = along_e[channel] * by_e + along_f[channel] * by_f;
+                here.linear[k] = glm::dvec4(gradient, s[channel] - glm::dot(gradient, p));
+                const double slope = glm::dot(gradient, gradient);
+                is_bounded &= slope < std::numeric_limits<double>::max(); // false for NaN, too
+                steepest = std::max(steepest, slope);
+            }
+            here.weight = area / (1 + steepest * of.scale * of.scale);
+            if (!is_bounded || !(here.weight > 0)) continue;
+            for (std::size_t k = 0; k < of.channels; ++k) here.linear[k] *= here.weight;
+            for (Component* corner : at)
+                if (corner) corner[c].add(here, of.channels);
+        }
     }
 
     // Unions of leaves; parts do not touch each other's.
@@ -360,7 +422,6 @@ private:
     }
 
     void unite_wedges(NodeId node, NodeState& state, Workspace& space) {
-        if (!splits_) return unite_all(state);
         auto& wedges = state.wedges;
         space.into.resize(wedges.size());
         std::iota(space.into.begin(), space.into.end(), Index{0});
@@ -384,14 +445,6 @@ private:
         compact(node, state, space);
     }
 
-    void unite_all(NodeState& state) const {
-        for (std::size_t w = 1; w < state.wedges.size(); ++w)
-            for (std::size_t c = 0; c < classes_.size(); ++c)
-                state.components[state.wedges[0].component[c]] += state.components[state.wedges[w].component[c]];
-        state.wedges.resize(1);
-        state.components.resize(classes_.size()); // the first wedge's came first
-    }
-
     static Index top(std::vector<Index>& parents, Index i) {
         while (parents[i] != i) i = parents[i] = parents[parents[i]];
         return i;
@@ -410,7 +463,7 @@ private:
             const Index x = top(space.component_parent, to.component[c]),
                         y = top(space.component_parent, from.component[c]);
             if (x == y) continue;
-            state.components[std::min(x, y)] += state.components[std::max(x, y)];
+            state.components[std::min(x, y)].add(state.components[std::max(x, y)], classes_[c].channels);
             space.component_parent[std::max(x, y)] = std::min(x, y);
         }
     }
@@ -515,7 +568,8 @@ private:
 
     // Numbers what is left, and notes which wedge each child's has become.
     void compact(NodeId node, NodeState& state, Workspace& space) {
-        std::vector<Index> number(state.wedges.size());
+        auto& number = space.number;
+        number.assign(state.wedges.size(), none);
         Index kept = 0;
         for_each_wedge(state, space, [&](Index w) { number[w] = kept++; });
         if (kept > 1) {
@@ -523,20 +577,19 @@ private:
             for (Index w = 0; w < state.wedges.size(); ++w) below[w] = number[top(space.into, w)];
             parents_below_[node] = std::move(below);
         }
-        std::vector<Index> component_number(state.components.size(), none);
-        std::vector<Component> components;
-        std::vector<WedgeState> wedges;
+        number.assign(state.components.size(), none);
+        auto& [wedges, components] = space.compacted;
+        space.compacted.clear();
         for_each_wedge(state, space, [&](Index w) {
-            WedgeState wedge = state.wedges[w];
+            WedgeState& wedge = wedges.emplace_back(state.wedges[w]);
             for (std::size_t c = 0; c < classes_.size(); ++c) {
                 const Index from = top(space.component_parent, wedge.component[c]);
-                if (component_number[from] == none) {
-                    component_number[from] = static_cast<Index>(components.size());
+                if (number[from] == none) {
+                    number[from] = static_cast<Index>(components.size());
                     components.push_back(state.components[from]);
                 }
-                wedge.component[c] = component_number[from];
+                wedge.component[c] = number[from];
             }
-            wedges.push_back(wedge);
         });
         state.wedges.swap(wedges);
         state.components.swap(components);
@@ -575,12 +628,13 @@ private:
     void number_wedges() {
         const NodeId nodes = interior_ + shape_.leaves();
         auto& first = first_wedge_;
-        if (!has_seams()) return;
+        if (!has_seams()) return make_room(nodes);
         first.assign(std::size_t{nodes} + 1, 0);
         for (NodeId node = 0; node < interior_; ++node) first[node + 1] = first[node] + counts_[node];
         for (Index place = 0; place < shape_.leaves(); ++place)
             first[interior_ + place + 1] = first[interior_] + first_leaf(place + 1);
         const WedgeId wedges = first[nodes];
+        make_room(wedges);
         std::vector<Index> sizes(wedges, 0), next(wedges, 0), ranks(wedges, 0);
         std::fill(sizes.begin() + first[interior_], sizes.end(), Index{1});
         for (NodeId node = interior_; node-- > 0;)
@@ -627,38 +681,38 @@ private:
 
     // ---- values
 
-    void fill() {
-        const NodeId nodes = interior_ + shape_.leaves();
-        const auto first_wedge_of = [&](NodeId node) { return first_wedge_.empty() ? node : first_wedge_[node]; };
-        const WedgeId wedges = first_wedge_of(nodes), leaves_begin = first_wedge_of(interior_);
+    void make_room(WedgeId wedges) {
         out_.positions.resize(wedges);
         out_.normals.resize(wedges);
         if (!mesh_.uvs.empty()) out_.uvs.resize(wedges);
         if (!mesh_.colours.empty()) out_.colours.resize(wedges);
+    }
+
+    void fill() {
+        const NodeId nodes = interior_ + shape_.leaves();
+        const auto first_wedge_of = [&](NodeId node) { return first_wedge_.empty() ? node : first_wedge_[node]; };
+        const WedgeId leaves_begin = first_wedge_of(interior_);
         parallel_loop(NodeId{0}, nodes, [&](NodeId node) {
             const WedgeId begin = first_wedge_of(node), end = first_wedge_of(node + 1);
             for (WedgeId w = begin; w < end; ++w) {
                 out_.positions[w] = positions_[node];
                 const WedgeId given = by_rank_.empty() ? w : by_rank_[w];
-                if (node < interior_) {
-                    const auto& [at, space] = values_at_[node];
-                    put(w, spaces_[space]->values[at + given - begin]);
-                } else {
-                    put_leaf(w, given - leaves_begin);
-                }
+                if (node >= interior_) put_leaf(w, given - leaves_begin);
+                else if (splits_) put(w, values_at_[node], given - begin);
             }
         });
     }
 
-    void put(WedgeId w, const WedgeValues& values) {
-        for (std::size_t c = 0; c < classes_.size(); ++c) {
-            const glm::dvec4& value = values.of[c];
-            switch (classes_[c].kind) {
-            case Kind::normal: out_.normals[w] = PackedNormal::nearest(glm::vec3(value)); break;
-            case Kind::uv: out_.uvs[w] = glm::vec2(value); break;
-            case Kind::further: break;
-            case Kind::colour: out_.colours[w] = glm::vec4(glm::clamp(value, 0.0, 1.0)); break;
-            }
+    void put(WedgeId w, const std::pair<Index, std::uint16_t>& of_node, Index number) {
+        const WedgeValues& values = spaces_[of_node.second]->values[of_node.first + number];
+        for (std::size_t c = 0; c < classes_.size(); ++c) put(w, classes_[c].kind, values.of[c]);
+    }
+    void put(WedgeId w, Kind kind, const glm::dvec4& value) {
+        switch (kind) {
+        case Kind::normal: out_.normals[w] = PackedNormal::nearest(glm::vec3(value)); break;
+        case Kind::uv: out_.uvs[w] = glm::vec2(value); break;
+        case Kind::further: break;
+        case Kind::colour: out_.colours[w] = glm::vec4(glm::clamp(value, 0.0, 1.0)); break;
         }
     }
 
@@ -682,7 +736,6 @@ private:
     std::vector<Class> classes_;
 
     std::vector<Index> places_;               // by leaf; empty: the same
-    std::vector<Index> start_, around_;       // triangles by leaf
     std::vector<Index> first_join_, joining_; // triangles by the node at which their third corner joins the others
     std::vector<Index> root_, local_, last_;  // by leaf
 

@@ -36,14 +36,19 @@ public:
                             : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
     }
 
-    // Calls one of make_worker()'s workers for each node, children before parents, for several parts at the same time.
+    // Calls one of make_worker()'s or make_worker(part)'s workers for each node, children before parents, for several parts
+    // at the same time.
     template <class MakeWorker>
     void bottom_up(MakeWorker&& make_worker) const {
+        const auto make = [&](const TreePart& part) {
+            if constexpr (std::is_invocable_v<MakeWorker&, const TreePart&>) return make_worker(part);
+            else return make_worker();
+        };
         parallel_loop(std::size_t{0}, parts_.size(), [&](std::size_t i) {
-            auto worker = make_worker();
+            auto worker = make(parts_[i]);
             for (NodeId node = parts_[i].end; node-- > parts_[i].begin;) worker(node);
         });
-        auto worker = make_worker();
+        auto worker = make(top_);
         for (std::size_t i = top_nodes_.size(); i-- > 0;) worker(top_nodes_[i]);
     }
 
