@@ -16,7 +16,7 @@ namespace unseen::support {
 struct ClusteringTask {
     explicit ClusteringTask(const vdtree::Mesh& mesh)
         : view(mesh.view()), places(view), surface(vdtree::analyse_surface(places.mesh())) {
-        places.find_leaves();
+        places.find_leaves(surface);
         for (vdtree::Index leaf = 0; leaf < places.leaf_count(); ++leaf) {
             const vdtree::Index v = places.sources()[leaf];
             if (!view.colours.empty()) colours.push_back(view.colours[v]);

@@ -18,13 +18,14 @@ constexpr float hard = 0, smooth = 180; // degrees
 struct Options {
     std::optional<float> crease = {};
     std::vector<glm::vec3> own = {}; // by corner
-    float face_sign = 1, own_sign = 1;
+    float own_sign = 1;
 };
 
 // Of a mesh whose vertices are places.
 CornerNormals find(const Mesh& mesh, const Options& options = {}) {
-    return find_corner_normals({mesh.positions, mesh.triangles, options.own, mesh.smoothing, options.crease,
-                                options.face_sign, options.own_sign});
+    const Surface surface = analyse_surface(mesh.view());
+    return find_corner_normals(
+        {mesh.positions, mesh.triangles, surface, options.own, mesh.smoothing, options.crease, options.own_sign});
 }
 
 // Normals at each place, in the order of the places.
@@ -173,9 +174,8 @@ TEST(Creases, SmoothSurfacesHaveTheNormalsOfTheirPlaces) {
         for (const bool turned : {false, true}) {
             const Mesh mesh = turned ? shapes::inside_out(outward) : outward;
             const Surface surface = analyse_surface(mesh.view());
-            const float sign = surface.closedness == Closedness::closed_inward ? -1 : 1;
             for (const std::optional<float> crease : {std::optional<float>(), std::optional(smooth)}) {
-                const CornerNormals found = find(mesh, {crease, {}, sign});
+                const CornerNormals found = find(mesh, {crease});
                 EXPECT_EQ(fault(mesh, found), "");
                 EXPECT_FALSE(found.has_creases);
                 EXPECT_EQ(found.normals, surface.normals);
@@ -319,17 +319,18 @@ TEST(Creases, NormalsThatAreNearlyEqualAreOne) {
     }
 }
 
-TEST(Creases, NormalsAreTurnedWhereAsked) {
-    const Mesh mesh = shapes::icosphere(2);
+TEST(Creases, NormalsOfAnInwardSurfaceAreTurned) {
+    const Mesh mesh = shapes::icosphere(2), inward = shapes::inside_out(mesh);
     std::vector<glm::vec3> own(3 * mesh.triangles.size(), glm::vec3(0, 0, 1));
     for (std::size_t i = 0; i < own.size(); i += 3) own[i] = glm::vec3(0); // computed
-    const CornerNormals found = find(mesh, {{}, own}), turned = find(mesh, {{}, own, -1, -1}),
-                        faces_turned = find(mesh, {{}, own, -1, 1});
-    EXPECT_EQ(turned.number, found.number);
-    for (std::size_t i = 0; i < own.size(); ++i) {
-        const glm::vec3 normal = found.normals[found.number[i]];
-        EXPECT_EQ(turned.normals[turned.number[i]], -normal);
-        EXPECT_EQ(faces_turned.normals[faces_turned.number[i]], i % 3 == 0 ? -normal : normal);
+    const CornerNormals found = find(mesh, {{}, own});
+    for (const float own_sign : {1.0f, -1.0f}) {
+        const CornerNormals turned = find(inward, {{}, own, own_sign});
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (k == 0) ASSERT_EQ(inward.triangles[t][k], mesh.triangles[t][k]);
+                EXPECT_EQ(normal_of(turned, t, k), k == 0 ? normal_of(found, t, 0) : own_sign * glm::vec3(0, 0, 1));
+            }
     }
 }
 

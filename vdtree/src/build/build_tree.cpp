@@ -239,9 +239,9 @@ private:
     void analyse() {
         prelit_ = options_.prelit && (!source_.colours.empty() || is_textured());
         surface_ = analyse_surface(places_->mesh());
-        const bool turns = surface_.closedness == Closedness::closed_inward && own_normals_agree(source_);
-        places_->find_leaves({surface_.closedness == Closedness::closed_inward ? -1.0f : 1.0f, turns ? -1.0f : 1.0f},
-                             options_.crease);
+        places_->find_leaves(surface_, options_.crease);
+        surface_.corners = {};
+        surface_.faces = {};
         uvs_ = select(source_.uvs, places_->sources());
         colours_ = select(source_.colours, places_->sources());
     }

@@ -51,55 +51,35 @@ bool is_stated(glm::vec3 v) {
 // ---- what is known of faces
 
 struct FaceNormals {
-    ParallelArray<glm::dvec3> vectors; // normals as long as twice the areas
-    ParallelArray<glm::vec3> normals;  // unit length; zero: no area
+    ParallelArray<glm::vec3> normals;    // by triangle; unit length; zero: no area
+    ParallelArray<double> least_cosines; // by place: of the angles between its faces with an area and the mean of all
 };
 
 bool has_area(glm::vec3 normal) { return normal != glm::vec3(0); }
 
 FaceNormals find_face_normals(const CornerInput& in) {
-    FaceNormals faces{ParallelArray<glm::dvec3>(in.triangles.size(), Unfilled()),
-                      ParallelArray<glm::vec3>(in.triangles.size(), Unfilled())};
+    FaceNormals out{ParallelArray<glm::vec3>(in.triangles.size(), Unfilled()),
+                    ParallelArray<double>(in.positions.size(), Unfilled())};
     const double least_height = in.positions.empty() ? 0 : box_around(in.positions).extent() * lost_height;
     parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
         const Triangle& corners = in.triangles[t];
         const glm::dvec3 &a = in.positions[corners[0]], &b = in.positions[corners[1]], &c = in.positions[corners[2]];
-        const glm::dvec3 vector = glm::cross(b - a, c - a);
-        const double longest = std::max({glm::length(b - a), glm::length(c - b), glm::length(a - c)});
-        faces.vectors[t] = vector;
-        faces.normals[t] = glm::length(vector) > longest * least_height ? glm::vec3(unit(vector)) : glm::vec3(0);
+        const auto squared = [](const glm::dvec3& v) { return glm::dot(v, v); };
+        const double longest = std::sqrt(std::max({squared(b - a), squared(c - b), squared(a - c)}));
+        const FaceVector& face = in.surface.faces[t];
+        out.normals[t] = face.length > longest * least_height ? glm::vec3(unit(face.vector)) : glm::vec3(0);
     });
-    return faces;
-}
-
-// Corners by place, in the order of the triangles.
-struct CornersOfPlaces {
-    std::vector<Index> start; // one longer
-    ParallelArray<Index> corners;
-
-    std::span<const Index> at(std::size_t place) const {
-        return std::span<const Index>(corners).subspan(start[place], start[place + 1] - start[place]);
-    }
-};
-
-CornersOfPlaces sort_corners(const CornerInput& in) {
-    CornersOfPlaces out{std::vector<Index>(in.positions.size() + 1, 0),
-                        ParallelArray<Index>(in.triangles.size() * 3, Unfilled())};
-    parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
-        for (const Index place : in.triangles[t])
-            std::atomic_ref(out.start[place]).fetch_add(1, std::memory_order_relaxed);
-    });
-    std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
-    parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            Index& start = out.start[in.triangles[t][k]];
-            out.corners[std::atomic_ref(start).fetch_sub(1, std::memory_order_relaxed) - 1] =
-                static_cast<Index>(3 * t + k);
-        }
-    });
-    const std::span<Index> corners = out.corners;
     parallel_loop(std::size_t{0}, in.positions.size(), [&](std::size_t place) {
-        std::sort(corners.begin() + out.start[place], corners.begin() + out.start[place + 1]);
+        const std::span<const Index> corners = in.surface.corners.at(place);
+        glm::dvec3 sum(0);
+        for (const Index corner : corners) sum += in.surface.faces[corner / 3].vector;
+        const glm::dvec3 mean = unit(sum);
+        double least = 1;
+        for (const Index corner : corners) {
+            const glm::vec3 normal = out.normals[corner / 3];
+            if (has_area(normal)) least = std::min(least, glm::dot(glm::dvec3(normal), mean));
+        }
+        out.least_cosines[place] = least;
     });
     return out;
 }
@@ -142,25 +122,9 @@ public:
 
     std::uint64_t compared = 0;
 
-    void look_at(std::span<const Index> corners) {
-        corners_ = corners;
-        sum_ = glm::dvec3(0);
-        for (const Index corner : corners) sum_ += faces_.vectors[corner / 3];
-    }
+    void look_at(std::span<const Index> corners) { corners_ = corners; }
 
-    // Of the faces' area vectors.
-    glm::dvec3 sum() const { return sum_; }
     glm::vec3 normal(Index corner) const { return faces_.normals[corners_[corner] / 3]; }
-
-    // Whether each face with an area is so near to the mean of all that the place has no hard edge.
-    bool is_within(double least_cosine) {
-        const glm::dvec3 mean = unit(sum_);
-        compared += corners_.size();
-        return std::ranges::all_of(corners_, [&](Index corner) {
-            const glm::vec3 normal = faces_.normals[corner / 3];
-            return !has_area(normal) || glm::dot(glm::dvec3(normal), mean) >= least_cosine;
-        });
-    }
 
     // Calls use(edges, neighbour) for each edge.
     template <class Use>
@@ -289,7 +253,6 @@ private:
     const CornerInput& in_;
     const FaceNormals& faces_;
     std::span<const Index> corners_;
-    glm::dvec3 sum_{0};
     std::vector<EdgeOfCorner> edges_;
     std::vector<Index> neighbours_;
     std::vector<std::pair<double, Index>> angles_;
@@ -304,7 +267,7 @@ struct EdgeCounts {
 };
 
 // Edges of two faces, each counted at the end with the lower number.
-EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces, const CornersOfPlaces& corners) {
+EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces) {
     const double made = cosine_of(made_degrees + slack_degrees), organic = cosine_of(organic_degrees + slack_degrees);
     const double no_edges = cosine_of(made_degrees / 2);
     std::atomic<std::uint64_t> above_made = 0, above_organic = 0;
@@ -312,8 +275,8 @@ EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces, const Co
         CornerFan fan(in, faces);
         EdgeCounts counts;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
-            fan.look_at(corners.at(place));
-            if (fan.is_within(no_edges)) continue;
+            if (faces.least_cosines[place] >= no_edges) continue;
+            fan.look_at(in.surface.corners.at(place));
             fan.for_each_edge([&](std::span<const EdgeOfCorner> edges, Index neighbour) {
                 if (edges.size() != 2 || neighbour < place || edges[0].follows == edges[1].follows) return;
                 const Index a = edges[0].corner, b = edges[1].corner;
@@ -410,14 +373,22 @@ public:
           least_cosine_(cosine_of(degrees + slack_degrees)), within_(cosine_of(degrees / 2)) {}
 
     std::vector<glm::vec3> normals;
-    double area = 0, creased_area = 0; // six times the places' shares, of those with several normals
+    double area = 0, creased_area = 0; // of the places, and of those with several normals
 
     std::uint64_t compared() const { return fan_.compared + different_.compared; }
 
-    void add(std::span<const Index> corners) {
+    void add(Index place) {
+        const std::span<const Index> corners = in_.surface.corners.at(place);
         if (corners.empty()) return;
+        area += in_.surface.areas[place];
+        const bool is_one = in_.smoothing.empty() && (is_smooth_ || faces_.least_cosines[place] >= within_);
+        if (is_one && in_.own.empty()) {
+            for (const Index corner : corners) number_[corner] = static_cast<Index>(normals.size());
+            normals.push_back(in_.surface.normals[place]);
+            return;
+        }
         different_.begin();
-        group(corners);
+        if (!is_one) group(corners);
         first_.assign(corners.size(), none);
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Index corner = corners[i];
@@ -426,16 +397,13 @@ public:
                 number_[corner] = static_cast<Index>(different_.number_of(own));
                 continue;
             }
-            const Index g = is_one_ ? 0 : groups_.find(static_cast<Index>(i));
+            const Index g = is_one ? 0 : groups_.find(static_cast<Index>(i));
             if (first_[g] == none)
                 first_[g] = static_cast<Index>(
-                    different_.number_of(in_.face_sign * glm::vec3(unit(is_one_ ? fan_.sum() : sums_[g]))));
+                    different_.number_of(is_one ? in_.surface.normals[place] : face_sign_ * glm::vec3(unit(sums_[g]))));
             number_[corner] = first_[g];
         }
-        double around = 0;
-        for (const Index corner : corners) around += glm::length(faces_.vectors[corner / 3]);
-        area += around;
-        if (different_.count() > 1) creased_area += around;
+        if (different_.count() > 1) creased_area += in_.surface.areas[place];
     }
 
 private:
@@ -445,18 +413,15 @@ private:
 
     // Which corners share a computed normal.
     void group(std::span<const Index> corners) {
-        is_one_ = true;
         if (std::ranges::all_of(corners, [&](Index corner) { return has_own(corner); })) return;
         fan_.look_at(corners);
         const bool stated = !in_.smoothing.empty();
-        is_one_ = !stated && (is_smooth_ || fan_.is_within(within_));
-        if (is_one_) return;
         groups_.reset(corners.size());
         fan_.unite(stated ? flat_ : least_cosine_, groups_);
         if (stated) fan_.unite_smoothing_groups(groups_);
         sums_.assign(corners.size(), glm::dvec3(0));
         for (std::size_t i = 0; i < corners.size(); ++i)
-            sums_[groups_.find(static_cast<Index>(i))] += faces_.vectors[corners[i] / 3];
+            sums_[groups_.find(static_cast<Index>(i))] += in_.surface.faces[corners[i] / 3].vector;
     }
 
     const CornerInput& in_;
@@ -466,7 +431,7 @@ private:
     DifferentNormals different_{normals};
     const bool is_smooth_;
     const double least_cosine_, within_, flat_ = cosine_of(slack_degrees);
-    bool is_one_ = true;
+    const float face_sign_ = in_.surface.closedness == Closedness::closed_inward ? -1 : 1;
     CornerSets groups_;
     std::vector<glm::dvec3> sums_; // by the group's first corner
     std::vector<Index> first_;     // likewise: the number of its normal
@@ -474,14 +439,9 @@ private:
 
 // ---- the whole mesh
 
-bool states_all(const CornerInput& in) {
-    return !in.smoothing.empty() || (!in.own.empty() && std::ranges::all_of(in.own, is_stated));
-}
-
 // Fills all of `out` but `creases`, which says what the angle is. Returns the share of the area at places with several
 // normals; NaN without an area.
-double number_corners(const CornerInput& input, const FaceNormals& faces, const CornersOfPlaces& corners,
-                      CornerNormals& out) {
+double number_corners(const CornerInput& input, const FaceNormals& faces, CornerNormals& out) {
     struct Block {
         std::vector<glm::vec3> normals;
         double area, creased_area;
@@ -491,12 +451,12 @@ double number_corners(const CornerInput& input, const FaceNormals& faces, const 
     std::vector<Block> blocks((places + block_size - 1) / block_size);
     const auto for_each_place = [&](std::size_t block, auto&& use) {
         for (std::size_t p = block * block_size; p < std::min(places, (block + 1) * block_size); ++p)
-            use(corners.at(p));
+            use(static_cast<Index>(p));
     };
     std::atomic<std::uint64_t> compared = out.compared;
     parallel_loop(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         NormalBlock block(input, faces, static_cast<double>(out.creases.degrees), out.number);
-        for_each_place(b, [&](std::span<const Index> at) { block.add(at); });
+        for_each_place(b, [&](Index place) { block.add(place); });
         compared.fetch_add(block.compared(), std::memory_order_relaxed);
         blocks[b] = {std::move(block.normals), block.area, block.creased_area, 0};
     });
@@ -507,12 +467,13 @@ double number_corners(const CornerInput& input, const FaceNormals& faces, const 
         count += block.normals.size();
         area += block.area, creased_area += block.creased_area;
     }
-    for (std::size_t p = 0; p < places; ++p) used += !corners.at(p).empty();
+    for (std::size_t p = 0; p < places; ++p) used += !input.surface.corners.at(p).empty();
     out.normals.resize(count);
     parallel_loop(std::size_t{0}, blocks.size(), [&](std::size_t b) {
         std::ranges::copy(blocks[b].normals, out.normals.begin() + static_cast<std::ptrdiff_t>(blocks[b].begin));
-        for_each_place(b, [&](std::span<const Index> at) {
-            for (const Index corner : at) out.number[corner] += static_cast<Index>(blocks[b].begin);
+        for_each_place(b, [&](Index place) {
+            for (const Index corner : input.surface.corners.at(place))
+                out.number[corner] += static_cast<Index>(blocks[b].begin);
         });
     });
     out.has_creases = count > used;
@@ -523,18 +484,19 @@ double number_corners(const CornerInput& input, const FaceNormals& faces, const 
 } // namespace
 
 CornerNormals find_corner_normals(const CornerInput& input) {
-    const FaceNormals faces = find_face_normals(input);
-    const CornersOfPlaces corners = sort_corners(input);
+    const bool all_own = !input.own.empty() && std::ranges::all_of(input.own, is_stated);
+    const FaceNormals faces = all_own ? FaceNormals() : find_face_normals(input);
     CornerNormals out;
-    if (states_all(input)) out.creases = {};
+    out.compared = all_own ? 0 : input.triangles.size() * 3;
+    if (all_own || !input.smoothing.empty()) out.creases = {};
     else if (input.crease) out.creases = {Creases::Source::asked, std::min(*input.crease, 180.0f)};
-    else out.creases = {Creases::Source::rule, static_cast<float>(angle_by_rule(count_edges(input, faces, corners)))};
+    else out.creases = {Creases::Source::rule, static_cast<float>(angle_by_rule(count_edges(input, faces)))};
     out.number.resize(input.triangles.size() * 3);
-    const double share = number_corners(input, faces, corners, out);
+    const double share = number_corners(input, faces, out);
     const bool is_organic = out.creases == Creases{Creases::Source::rule, static_cast<float>(organic_degrees)};
     if (is_organic && out.has_creases && share < least_creased_share) {
         out.creases.degrees = 180;
-        number_corners(input, faces, corners, out);
+        number_corners(input, faces, out);
     }
     return out;
 }

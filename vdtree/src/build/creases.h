@@ -7,15 +7,18 @@
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
 
+#include "build/surface.h"
+
 namespace unseen::vdtree {
 
 struct CornerInput {
     std::span<const glm::dvec3> positions; // by place
     std::span<const Triangle> triangles;   // over places, each with three different ones
+    const Surface& surface;                // of these; its normals are those of smooth places
     std::span<const glm::vec3> own = {};   // by corner, 3 a triangle; zero or non-finite: computed. Empty: all are
     std::span<const Index> smoothing = {}; // by triangle, see MeshView::smoothing; empty: not stated
     std::optional<float> crease = {};      // degrees, see BuildOptions::crease
-    float face_sign = 1, own_sign = 1;     // -1: turns computed normals, or the mesh's own, around
+    float own_sign = 1;                    // -1: turns the mesh's own around
 };
 
 struct CornerNormals {
@@ -36,8 +39,8 @@ struct CornerNormals {
 // in place of the angle. Faces without an area join their neighbours'.
 // Normals of a place that are nearly the same become one.
 //
-// Cost: linear but for sorting the corners of each place; parallel; 60 bytes a triangle while it lasts. The result does
-// not depend on the number of threads.
+// Cost: linear but for sorting the corners of places with hard edges; parallel. The result does not depend on the number of
+// threads.
 CornerNormals find_corner_normals(const CornerInput& input);
 
 // Fails if an angle is asked for that is not one from 0 to 180 degrees.

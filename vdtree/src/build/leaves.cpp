@@ -5,7 +5,6 @@
 #include <numeric>
 #include <tuple>
 
-#include "build/surface.h"
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
@@ -72,31 +71,37 @@ void PlaceMesh::find_materials() {
     if (std::ranges::none_of(triangle_materials_, is_other)) triangle_materials_.clear();
 }
 
-CornerNormals PlaceMesh::corner_normals(Signs signs, std::optional<float> crease) const {
+CornerNormals PlaceMesh::corner_normals(const Surface& surface, std::optional<float> crease) const {
+    const Index triangles = static_cast<Index>(mesh_.triangles.size());
     std::vector<glm::vec3> own;
     if (!source_.normals.empty()) {
         own.reserve(3 * mesh_.triangles.size());
-        for (Index t = 0; t < mesh_.triangles.size(); ++t)
+        for (Index t = 0; t < triangles; ++t)
             for (const Index v : source_corners(t)) own.push_back(source_.normals[v]);
     }
     std::vector<Index> smoothing;
     if (!source_.smoothing.empty())
-        for (Index t = 0; t < mesh_.triangles.size(); ++t) smoothing.push_back(source_.smoothing[source_triangle(t)]);
-    return find_corner_normals({mesh_.positions, mesh_.triangles, own, smoothing, crease, signs.face, signs.own});
+        for (Index t = 0; t < triangles; ++t) smoothing.push_back(source_.smoothing[source_triangle(t)]);
+    const bool turns = surface.closedness == Closedness::closed_inward && own_normals_agree(source_);
+    return find_corner_normals(
+        {mesh_.positions, mesh_.triangles, surface, own, smoothing, crease, turns ? -1.0f : 1.0f});
 }
 
-void PlaceMesh::find_leaves(Signs signs, std::optional<float> crease) {
+void PlaceMesh::find_leaves(const Surface& surface, std::optional<float> crease) {
     const Index places = static_cast<Index>(mesh_.positions.size());
-    CornerNormals found = corner_normals(signs, crease);
+    CornerNormals found = corner_normals(surface, crease);
     creases_ = found.creases;
-    if (is_split_ || !triangle_materials_.empty() || found.has_creases) gather_leaves(found);
-    if (sources_.size() > places) return;
-    // One leaf a place, which has its number.
-    first_leaf_ = {};
-    leaf_triangles_ = {};
+    if (is_split_ || !triangle_materials_.empty() || found.has_creases) {
+        const bool needs_further = number_leaves(found, surface.corners);
+        describe_leaves(found, surface.corners, needs_further);
+        if (leaf_count() > places) return;
+        // One leaf a place, which has its number.
+        first_leaf_ = {};
+        leaf_triangles_ = {};
+        return;
+    }
     places_.resize(places);
     std::iota(places_.begin(), places_.end(), Index{0});
-    if (!sources_.empty()) return;
     sources_.resize(places);
     for (Index t = 0; t < mesh_.triangles.size(); ++t)
         for (std::size_t k = 0; k < 3; ++k) sources_[mesh_.triangles[t][k]] = source_corners(t)[k];
@@ -105,110 +110,115 @@ void PlaceMesh::find_leaves(Signs signs, std::optional<float> crease) {
 
 namespace {
 
-// Corners by place: as many as there are, each with its number, 3 * triangle + corner.
-struct CornersByPlace {
-    std::vector<Index> start, corners;
+// Corners with equal keys share a leaf. Further values come last, so that keys which differ by them alone follow each
+// other: material, normal, texture coordinates, colour, further values.
+using LeafKey = std::tuple<Index, Index, float, float, float, float, float, float, Index>;
 
-    CornersByPlace(std::span<const Triangle> triangles, Index places)
-        : start(places + 1, 0), corners(3 * triangles.size()) {
-        for (const Triangle& t : triangles)
-            for (const Index place : t) ++start[place + 1];
-        std::partial_sum(start.begin(), start.end(), start.begin());
-        std::vector<Index> next(start.begin(), start.end() - 1);
-        for (Index t = 0; t < triangles.size(); ++t)
-            for (Index k = 0; k < 3; ++k) corners[next[triangles[t][k]]++] = 3 * t + k;
+bool differ_by_further_alone(LeafKey a, const LeafKey& b) {
+    constexpr std::size_t further = std::tuple_size_v<LeafKey> - 1;
+    if (std::get<further>(a) == std::get<further>(b)) return false;
+    std::get<further>(a) = std::get<further>(b);
+    return a == b;
+}
+
+// The leaves at one place after another.
+class PlaceLeaves {
+public:
+    bool needs_further = false;
+
+    // Sorts the corners at a place by key.
+    template <class KeyOf>
+    void gather(std::span<const Index> corners, KeyOf&& key_of) {
+        keys_.clear();
+        for (const Index corner : corners) keys_.emplace_back(key_of(corner), corner);
+        std::ranges::sort(keys_);
     }
-    std::span<Index> at(Index place) {
-        return std::span(corners).subspan(start[place], start[place + 1] - start[place]);
+
+    // Calls use(corner, leaf) for each, leaves in the order of their first vertices, then of their first corners. Returns
+    // how many leaves there are.
+    template <class VertexOf, class Use>
+    Index number(VertexOf&& vertex_of, Use&& use) {
+        leaves_.clear();
+        for (std::size_t i = 0; i < keys_.size(); ++i) {
+            const auto& [key, corner] = keys_[i];
+            if (i == 0 || key != keys_[i - 1].first) {
+                leaves_.push_back({vertex_of(corner), corner, static_cast<Index>(i)});
+                needs_further |= i > 0 && differ_by_further_alone(key, keys_[i - 1].first);
+            }
+            leaves_.back().vertex = std::min(leaves_.back().vertex, vertex_of(corner));
+        }
+        std::ranges::sort(leaves_, {}, [](const Leaf& leaf) { return std::pair(leaf.vertex, leaf.corner); });
+        for (Index leaf = 0; leaf < leaves_.size(); ++leaf)
+            for (std::size_t i = leaves_[leaf].first;
+                 i < keys_.size() && keys_[i].first == keys_[leaves_[leaf].first].first; ++i)
+                use(keys_[i].second, leaf);
+        return static_cast<Index>(leaves_.size());
     }
+
+private:
+    struct Leaf {
+        Index vertex, corner; // the first ones
+        Index first;          // in keys_
+    };
+    std::vector<std::pair<LeafKey, Index>> keys_;
+    std::vector<Leaf> leaves_;
 };
 
 } // namespace
 
-void PlaceMesh::gather_leaves(const CornerNormals& found) {
-    const Index places = static_cast<Index>(mesh_.positions.size());
-    CornersByPlace by_place(mesh_.triangles, places);
-    const auto vertex_of = [&](Index corner) { return source_corners(corner / 3)[corner % 3]; };
-    const auto material_of = [&](Index corner) {
-        return triangle_materials_.empty() ? 0 : triangle_materials_[corner / 3];
-    };
-    // Corners with equal keys share a leaf. Further values come last, so that keys which differ by them alone follow each
-    // other.
-    using Key = std::tuple<Index, Index, float, float, float, float, float, float, Index>;
-    constexpr std::size_t last = std::tuple_size_v<Key> - 1;
-    const auto differ_by_last_alone = [](Key a, const Key& b) {
-        std::get<last>(a) = std::get<last>(b);
-        return a == b;
-    };
+// Whether leaves at one place differ by further values alone.
+bool PlaceMesh::number_leaves(const CornerNormals& found, const CornersByPlace& corners) {
     const auto key_of = [&](Index corner) {
-        const Index v = vertex_of(corner);
+        const Index v = source_vertex(corner);
         const glm::vec2 uv = source_.uvs.empty() ? glm::vec2(0) : source_.uvs[v];
         const glm::vec4 c = source_.colours.empty() ? glm::vec4(0) : source_.colours[v];
         const Index further = source_.further.empty() ? 0 : source_.further[v];
-        return Key(material_of(corner), found.number[corner], uv.x, uv.y, c.r, c.g, c.b, c.a, further);
+        return LeafKey(material_of(corner), found.number[corner], uv.x, uv.y, c.r, c.g, c.b, c.a, further);
     };
-    struct Leaf {
-        Index vertex, corner; // the first ones
-    };
-    // Within its run, each corner gets the number of its leaf at the place.
-    std::vector<Index> local(by_place.corners.size()), counts(places + 1, 0);
-    std::vector<Leaf> first_corners(by_place.corners.size()); // by place, where its corners are
+    const Index places = static_cast<Index>(mesh_.positions.size());
+    first_leaf_.assign(places + 1, 0);
+    leaf_triangles_.resize(mesh_.triangles.size());
     std::atomic<bool> needs_further = false;
     constexpr Index grain = 1024;
     parallel_loop_over(tbb::blocked_range<Index>(0, places, grain), [&](const auto& range) {
-        std::vector<std::pair<Key, Index>> keys;
-        std::vector<std::tuple<Index, Index, Index>> order; // first vertex, first corner, number of the key
+        PlaceLeaves leaves;
         for (Index place = range.begin(); place < range.end(); ++place) {
-            const Index start = by_place.start[place];
-            keys.clear();
-            for (const Index corner : by_place.at(place)) keys.emplace_back(key_of(corner), corner);
-            std::ranges::sort(keys);
-            order.clear();
-            std::vector<Index>& of_corner = local;
-            for (std::size_t i = 0; i < keys.size(); ++i) {
-                const Index corner = keys[i].second, v = vertex_of(corner);
-                if (i == 0 || keys[i].first != keys[i - 1].first) {
-                    order.emplace_back(v, corner, static_cast<Index>(order.size()));
-                    if (i > 0 && differ_by_last_alone(keys[i].first, keys[i - 1].first)) needs_further = true;
-                }
-                auto& [vertex, first, number] = order.back();
-                if (v < vertex) vertex = v;
-                of_corner[start + i] = number;
+            const std::span<const Index> here = corners.at(place);
+            const auto simple_key = [&](Index corner) {
+                return std::tuple(source_vertex(corner), found.number[corner], material_of(corner));
+            };
+            const auto put = [&](Index corner, Index leaf) { leaf_triangles_[corner / 3][corner % 3] = leaf; };
+            if (std::ranges::all_of(here, [&](Index c) { return simple_key(c) == simple_key(here[0]); })) {
+                for (const Index corner : here) put(corner, 0);
+                first_leaf_[place + 1] = 1;
+            } else {
+                leaves.gather(here, key_of);
+                first_leaf_[place + 1] = leaves.number([&](Index c) { return source_vertex(c); }, put);
             }
-            std::ranges::sort(order);
-            std::vector<Index> rank(order.size());
-            for (Index i = 0; i < order.size(); ++i) {
-                rank[std::get<2>(order[i])] = i;
-                first_corners[start + i] = {std::get<0>(order[i]), std::get<1>(order[i])};
-            }
-            for (std::size_t i = 0; i < keys.size(); ++i) {
-                by_place.corners[start + i] = keys[i].second;
-                of_corner[start + i] = rank[of_corner[start + i]];
-            }
-            counts[place + 1] = static_cast<Index>(order.size());
         }
+        if (leaves.needs_further) needs_further = true;
     });
-    std::partial_sum(counts.begin(), counts.end(), counts.begin());
-    const Index leaves = counts.back();
-    sources_.resize(leaves), normals_.resize(leaves), places_.resize(leaves);
+    std::partial_sum(first_leaf_.begin(), first_leaf_.end(), first_leaf_.begin());
+    return needs_further;
+}
+
+// `leaf_triangles_` has numbers at the place until then.
+void PlaceMesh::describe_leaves(const CornerNormals& found, const CornersByPlace& corners, bool needs_further) {
+    const Index places = static_cast<Index>(mesh_.positions.size()), leaves = first_leaf_.back();
+    constexpr Index none = ~Index{0};
+    sources_.assign(leaves, none), normals_.resize(leaves), places_.resize(leaves);
     if (!triangle_materials_.empty()) materials_.resize(leaves);
     if (needs_further) further_.resize(leaves);
-    leaf_triangles_.resize(mesh_.triangles.size());
-    for (Index place = 0; place < places; ++place) {
-        for (Index i = by_place.start[place]; i < by_place.start[place + 1]; ++i) {
-            const Index corner = by_place.corners[i];
-            leaf_triangles_[corner / 3][corner % 3] = counts[place] + local[i];
-        }
-        for (Index leaf = counts[place]; leaf < counts[place + 1]; ++leaf) {
-            const Leaf& first = first_corners[by_place.start[place] + leaf - counts[place]];
+    parallel_loop(Index{0}, places, [&](Index place) {
+        for (const Index corner : corners.at(place)) {
+            const Index leaf = leaf_triangles_[corner / 3][corner % 3] += first_leaf_[place], v = source_vertex(corner);
+            sources_[leaf] = std::min(sources_[leaf], v);
             places_[leaf] = place;
-            sources_[leaf] = first.vertex;
-            normals_[leaf] = found.normals[found.number[first.corner]];
-            if (!materials_.empty()) materials_[leaf] = material_of(first.corner);
-            if (!further_.empty()) further_[leaf] = source_.further[first.vertex];
+            normals_[leaf] = found.normals[found.number[corner]];
+            if (!materials_.empty()) materials_[leaf] = material_of(corner);
+            if (!further_.empty()) further_[leaf] = source_.further[v];
         }
-    }
-    first_leaf_ = std::move(counts);
+    });
 }
 
 } // namespace unseen::vdtree

@@ -18,13 +18,8 @@ public:
     Index source_triangle(Index t) const { return kept_.empty() ? t : kept_[t]; }
     std::uint64_t dropped() const { return dropped_; }
 
-    // ---- leaves, place by place; to be found once it is known which way the surface faces. `signs`: -1 turns normals
-    // that are computed, or the mesh's own, around.
-    struct Signs {
-        float face = 1, own = 1;
-    };
-    void find_leaves() { find_leaves(Signs{}, {}); }
-    void find_leaves(Signs signs, std::optional<float> crease);
+    // ---- leaves, place by place; to be found once it is known which way the surface faces
+    void find_leaves(const Surface& surface, std::optional<float> crease = {});
     const Creases& creases() const { return creases_; }
 
     Index leaf_count() const { return static_cast<Index>(sources_.size()); }
@@ -42,9 +37,12 @@ private:
     void keep_triangles(std::span<const Index> coincident);
     void number_places(std::span<const Index> coincident);
     void find_materials();
-    CornerNormals corner_normals(Signs signs, std::optional<float> crease) const;
+    CornerNormals corner_normals(const Surface& surface, std::optional<float> crease) const;
     const Triangle& source_corners(Index t) const { return source_.triangles[source_triangle(t)]; }
-    void gather_leaves(const CornerNormals& found);
+    Index source_vertex(Index corner) const { return source_corners(corner / 3)[corner % 3]; }
+    Index material_of(Index corner) const { return triangle_materials_.empty() ? 0 : triangle_materials_[corner / 3]; }
+    bool number_leaves(const CornerNormals& found, const CornersByPlace& corners);
+    void describe_leaves(const CornerNormals& found, const CornersByPlace& corners, bool needs_further);
 
     const MeshView& source_;
     std::uint64_t dropped_ = 0;

@@ -10,7 +10,6 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/vectors.h>
 
-#include "build/parallel_array.h"
 #include "build/spatial_order.h"
 
 namespace unseen::vdtree {
@@ -20,9 +19,10 @@ namespace {
 constexpr std::size_t grain =
     4096; // vertices or triangles of a task; sums are added up by these, on any number of threads
 
-glm::dvec3 area_vector(const MeshView& mesh, const Triangle& t) {
+FaceVector face_vector(const MeshView& mesh, const Triangle& t) {
     const glm::dvec3& a = mesh.positions[t[0]];
-    return glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a) * 0.5;
+    const glm::dvec3 vector = glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
+    return {vector, glm::length(vector)};
 }
 
 bool has_length(glm::vec3 v) {
@@ -44,11 +44,10 @@ double sum(std::size_t count, F&& f) {
         std::plus<double>());
 }
 
-double signed_volume(const MeshView& mesh) {
-    const glm::dvec3 origin = mesh.positions[mesh.triangles[0][0]];
-    return sum(mesh.triangles.size(), [&](std::size_t t) {
-        const Triangle& corners = mesh.triangles[t];
-        return glm::dot(mesh.positions[corners[0]] - origin, area_vector(mesh, corners)) / 3;
+double signed_volume(const MeshView& mesh, std::span<const FaceVector> faces) {
+    return sum(faces.size(), [&](std::size_t t) {
+        const glm::dvec3 from_origin = mesh.positions[mesh.triangles[t][0]] - mesh.positions[mesh.triangles[0][0]];
+        return glm::dot(from_origin, faces[t].vector) / 6;
     });
 }
 
@@ -72,59 +71,20 @@ struct CornerSides {
     Index following, preceding;
 };
 
-// What is collected at the places: the corners of the triangles there, and the sum of these triangles' area
-// vectors, twice.
-struct PlaceCorners {
-    std::vector<Index> start; // one longer
-    ParallelArray<CornerSides> corners;
-    std::vector<glm::dvec3> sums;
-
-    std::span<const CornerSides> around(std::size_t place) const {
-        return std::span<const CornerSides>(corners).subspan(start[place], start[place + 1] - start[place]);
-    }
-};
-
-// Adds to `areas`, by place.
-PlaceCorners collect_corners(const MeshView& mesh, std::span<double> areas) {
-    const std::size_t places = areas.size();
-    PlaceCorners out;
-    out.start.assign(places + 1, 0);
-    out.sums.assign(places, glm::dvec3(0));
-    // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes
-    // time. All sums are made in the order of the triangles.
-    constexpr int most_ranges = 8;
-    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
-    const auto for_each_triangle = [&](auto&& use) {
-        parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
-            const std::size_t begin = places * r / ranges, size = places * (r + 1) / ranges - begin;
-            const auto is_own = [&](std::size_t place) { return place - begin < size; };
-            for (const Triangle& corners : mesh.triangles)
-                if (std::ranges::any_of(corners, is_own)) use(is_own, corners);
-        });
-    };
-    for_each_triangle([&](const auto& is_own, const Triangle& corners) {
-        for (const Index place : corners)
-            if (is_own(place)) ++out.start[place];
-    });
-    std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
-    out.corners = ParallelArray<CornerSides>(out.start.back(), Unfilled());
-    for_each_triangle([&](const auto& is_own, const Triangle& corners) {
-        const glm::dvec3& a = mesh.positions[corners[0]];
-        const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
-        const double sixth = glm::length(vector) / 6; // what each corner has of the triangle's area
-        for (std::size_t k = 0; k < 3; ++k) {
-            if (!is_own(corners[k])) continue;
-            out.corners[--out.start[corners[k]]] = {corners[(k + 1) % 3], corners[(k + 2) % 3]};
-            out.sums[corners[k]] += vector;
-            areas[corners[k]] += sixth;
-        }
-    });
-    return out;
-}
-
 // Looks at the corners at one place after another.
 class Fan {
 public:
+    bool is_regular(Index place, std::span<const Index> corners, std::span<const Triangle> triangles) {
+        sides_.clear();
+        for (const Index corner : corners) {
+            const Triangle& t = triangles[corner / 3];
+            const Index k = corner % 3;
+            sides_.push_back({t[k == 2 ? 0 : k + 1], t[k == 0 ? 2 : k - 1]});
+        }
+        return is_regular(place, sides_);
+    }
+
+private:
     // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
     // precedes once.
     bool is_regular(Index place, std::span<const CornerSides> corners) {
@@ -142,7 +102,6 @@ public:
         return true;
     }
 
-private:
     static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
     static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
 
@@ -160,14 +119,16 @@ private:
         return following_ == preceding_ && std::adjacent_find(following_.begin(), following_.end()) == following_.end();
     }
 
+    std::vector<CornerSides> sides_;
     std::vector<Index> following_, preceding_;
     // Neighbours in the lower halves, stamped with the place where they were seen; at first with no place's stamp.
     std::vector<std::uint64_t> slots_ = std::vector(std::size_t{1} << slot_bits, ~std::uint64_t{0});
 };
 
 Closedness find_closedness(const MeshView& mesh, const Surface& surface) {
-    if (std::ranges::find(surface.irregular, 1) != surface.irregular.end()) return Closedness::open;
-    const double volume = signed_volume(mesh);
+    if (mesh.triangles.empty() || std::ranges::find(surface.irregular, 1) != surface.irregular.end())
+        return Closedness::open;
+    const double volume = signed_volume(mesh, surface.faces);
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
 }
 
@@ -198,18 +159,49 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
     return first;
 }
 
+CornersByPlace::CornersByPlace(std::span<const Triangle> triangles, std::size_t places)
+    : start_(places + 1, 0), corners_(3 * triangles.size(), Unfilled()) {
+    // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes
+    // time.
+    constexpr int most_ranges = 8;
+    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
+    const auto for_each_corner = [&](auto&& use) {
+        parallel_loop(std::size_t{0}, ranges, [&](std::size_t r) {
+            const std::size_t begin = places * r / ranges, size = places * (r + 1) / ranges - begin;
+            for (std::size_t t = triangles.size(); t-- > 0;)
+                for (std::size_t k = 3; k-- > 0;)
+                    if (triangles[t][k] - begin < size) use(start_[triangles[t][k]], static_cast<Index>(3 * t + k));
+        });
+    };
+    for_each_corner([](Index& count, Index) { ++count; });
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
+    for_each_corner([&](Index& end, Index corner) { corners_[--end] = corner; });
+}
+
 Surface analyse_surface(const MeshView& mesh) {
     const std::size_t places = mesh.positions.size();
     Surface surface;
     surface.irregular.resize(places);
-    surface.areas.assign(places, 0);
+    surface.areas.resize(places);
     surface.normals.resize(places);
-    const PlaceCorners corners = collect_corners(mesh, surface.areas);
+    surface.faces = ParallelArray<FaceVector>(mesh.triangles.size(), Unfilled());
+    parallel_loop(std::size_t{0}, mesh.triangles.size(),
+                  [&](std::size_t t) { surface.faces[t] = face_vector(mesh, mesh.triangles[t]); });
+    surface.corners = CornersByPlace(mesh.triangles, places);
     parallel_loop_over(tbb::blocked_range<std::size_t>(0, places, grain), [&](const auto& range) {
         Fan fan;
         for (std::size_t place = range.begin(); place < range.end(); ++place) {
-            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), corners.around(place));
-            surface.normals[place] = glm::vec3(unit(corners.sums[place]));
+            const std::span<const Index> corners = surface.corners.at(place);
+            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), corners, mesh.triangles);
+            glm::dvec3 sum(0);
+            double area = 0;
+            for (const Index corner : corners) {
+                const FaceVector& face = surface.faces[corner / 3];
+                sum += face.vector;
+                area += face.length / 6; // a third of the triangle's
+            }
+            surface.areas[place] = area;
+            surface.normals[place] = glm::vec3(unit(sum));
         }
     });
     surface.closedness = find_closedness(mesh, surface);
@@ -221,7 +213,7 @@ Surface analyse_surface(const MeshView& mesh) {
 bool own_normals_agree(const MeshView& mesh) {
     if (mesh.normals.empty()) return false;
     return sum(mesh.triangles.size(), [&](std::size_t t) {
-               const glm::dvec3 area = area_vector(mesh, mesh.triangles[t]);
+               const glm::dvec3 area = face_vector(mesh, mesh.triangles[t]).vector;
                double agreement = 0;
                for (const Index v : mesh.triangles[t])
                    if (has_length(mesh.normals[v])) agreement += glm::dot(area, unit(glm::dvec3(mesh.normals[v])));
