@@ -100,6 +100,17 @@ UNSEEN_INLINE void add_block(const F* a, const F* b, const Offset<F>& to, const 
     sum[channels * row_size] = a[channels * row_size] + weight_b;
 }
 
+// The same of quadrics with one block of each class. `classes`: a constant where the compiler is to unroll.
+template <class F>
+UNSEEN_INLINE void add_quadrics(const F* a, const F* b, const Offset<F>& to, const F* raised,
+                                const AttributeClasses classes, F* sum) {
+    add_base(a, b, to, sum);
+    for (std::size_t k = 0; k < classes.count; ++k) {
+        const std::size_t first = classes.first_float(k);
+        add_block(a + first, b + first, to, raised + classes.first_channel(k), classes.channels[k], sum + first, sum);
+    }
+}
+
 // The least error by the place, with the best channel values there.
 template <class F>
 struct Form {
@@ -125,6 +136,13 @@ struct Form {
             hx -= g0 * d, hy -= g1 * d, hz -= g2 * d;
             k -= d * d * inverse;
         }
+    }
+    // Of a quadric with one block of each class.
+    template <class G>
+    static UNSEEN_INLINE Form of_all(const G* q, const AttributeClasses classes) {
+        Form form = of_base(q);
+        for (std::size_t k = 0; k < classes.count; ++k) form.eliminate(q + classes.first_float(k), classes.channels[k]);
+        return form;
     }
     UNSEEN_INLINE Offset<F> gradient(const Offset<F>& p) const { // half of it
         return {xx * p.x + xy * p.y + xz * p.z + hx, xy * p.x + yy * p.y + yz * p.z + hy,

@@ -271,16 +271,8 @@ private:
         const float* quadrics = live_.quadrics.data();
         gather(quadrics, a, classes.stride(), qa);
         gather(quadrics, b, classes.stride(), qb);
-        add_base(qa, qb, to, sum);
-        for (std::size_t k = 0; k < classes.count; ++k) {
-            const std::size_t first = classes.first_float(k);
-            add_block(qa + first, qb + first, to, raised + classes.first_channel(k), classes.channels[k], sum + first,
-                      sum);
-        }
-        Form<F> form = Form<F>::of_base(sum);
-        for (std::size_t k = 0; k < classes.count; ++k)
-            form.eliminate(sum + classes.first_float(k), classes.channels[k]);
-        const Minimum<F> best = minimise(form, to, 1);
+        add_quadrics(qa, qb, to, raised, classes, sum);
+        const Minimum<F> best = minimise(Form<F>::of_all(sum, classes), to, 1);
         const F found = best.error + spread(best.at, to, qa[quadric::weight], qb[quadric::weight]);
         std::memcpy(errors, &found, sizeof(F));
     }
@@ -597,16 +589,8 @@ private:
         const glm::vec3 d = offset(p);
         const Offset<float> to{d.x, d.y, d.z};
         for (std::size_t c = 0; c < channels; ++c) raised[c] = live_.references[p.b * channels + c] - references[c];
-        add_base(a, b, to, sum);
-        for (std::size_t k = 0; k < classes.count; ++k) {
-            const std::size_t first = classes.first_float(k);
-            add_block(a + first, b + first, to, raised + classes.first_channel(k), classes.channels[k], sum + first,
-                      sum);
-        }
-        Form<double> form = Form<double>::of_base(sum);
-        for (std::size_t k = 0; k < classes.count; ++k)
-            form.eliminate(sum + classes.first_float(k), classes.channels[k]);
-        const std::optional<Placed> placed = place(form, p, trial);
+        add_quadrics(a, b, to, raised, classes, sum);
+        const std::optional<Placed> placed = place(Form<double>::of_all(sum, classes), p, trial);
         if (!placed) return {};
         move_base(sum, placed->from_a);
         for (std::size_t k = 0; k < classes.count; ++k)
@@ -982,8 +966,8 @@ private:
     std::vector<Partner> partners_;
     std::vector<CodedIndex> curve_, curve_scratch_, order_, order_scratch_;
 
-    // Of components, in a round. The numbers that a cluster's components get: numbers_, from numbers_of_ of it on; none:
-    // they keep theirs.
+    // What a round does to components. A cluster's components get the numbers that lie in numbers_ from numbers_of_ of it on;
+    // none: they keep theirs.
     struct FoundLink {
         Index pair;
         Link link;

@@ -194,17 +194,23 @@ private:
         }
         if (!is_bounded) return;
         const float weight_here = area / (1 + steepest);
+        std::array<Float4, most_class_channels> rows;
         for (std::size_t i = 0; i < channels; ++i) {
-            add_plane(planes, weight_here, gradients[i]);
-            gradients[i] *= weight_here;
+            const glm::vec3& g = gradients[i];
+            add_plane(planes, weight_here, g);
+            rows[i] = Float4{g.x, g.y, g.z} * weight_here;
         }
         for (std::size_t k = 0; k < 3; ++k) {
             if (slots[k] >= own_) continue;
             float* row = live_.is_simple(slots[k])
                              ? live_.quadrics.data() + slots[k] * classes.stride() + classes.first_float(c)
                              : block_of(t[k], slots[k], c);
-            for (std::size_t i = 0; i < channels; ++i, row += row_size)
-                row[gx] += gradients[i].x, row[gy] += gradients[i].y, row[gz] += gradients[i].z;
+            for (std::size_t i = 0; i < channels; ++i, row += row_size) {
+                Float4 sum;
+                std::memcpy(&sum, row, sizeof(sum));
+                sum += rows[i];
+                std::memcpy(row, &sum, sizeof(sum));
+            }
             *row += weight_here; // the block's
         }
     }

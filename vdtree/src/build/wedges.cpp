@@ -11,6 +11,7 @@
 #include "build/parallel_array.h"
 #include "build/spatial_order.h"
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 
@@ -31,29 +32,27 @@ constexpr std::size_t most_wedges_with_dead = 8;
 // Above this many, neighbours in order stand in for the nearest: looking at all pairs takes the square of the time.
 constexpr std::size_t most_compared = 64;
 
-constexpr std::size_t most_classes = 4, most_channels_of_class = 4;
+constexpr std::size_t most_classes = 4;
 enum class Kind { normal, uv, colour, further };
 
-// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g and w d.
+// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g and w d. A
+// channel is a lane.
 struct Component {
+    Double4 x{}, y{}, z{}, d{};
     double weight = 0;
-    std::array<glm::dvec4, most_channels_of_class> linear{}; // w g and w d
 
-    void add(const Component& other, std::size_t channels) {
+    void operator+=(const Component& other) {
+        x += other.x, y += other.y, z += other.z, d += other.d;
         weight += other.weight;
-        for (std::size_t c = 0; c < channels; ++c) linear[c] += other.linear[c];
     }
-    glm::dvec4 value_at(const glm::dvec3& p, std::size_t channels) const {
-        glm::dvec4 value(0);
-        for (std::size_t c = 0; c < channels; ++c)
-            value[static_cast<int>(c)] = (glm::dot(glm::dvec3(linear[c]), p) + linear[c].w) / weight;
-        return value;
+    glm::dvec4 value_at(const glm::dvec3& p) const {
+        const Double4 value = (x * p.x + y * p.y + z * p.z + d) / weight;
+        return {value[0], value[1], value[2], value[3]};
     }
 };
 
 struct Class {
     Kind kind;
-    std::size_t channels;
     double scale; // to lengths in the unit box
 };
 
@@ -82,10 +81,11 @@ struct WedgeValues {
 // States of nodes whose parents are still to come, and the values that have been found. One for each task; what a parent
 // has taken is used again.
 struct Workspace {
-    std::vector<Component>
-        of_leaves;                 // class by class, of the leaves that hang on the task's nodes: of a run of leaves,
-    Index first_leaf = 0;          // which begins here,
-    std::vector<Index> top_leaves; // or, above the parts, of these, ascending
+    // Class by class, of the leaves that hang on the task's nodes: a run of leaves, or, above the parts, these.
+    std::vector<Component> of_leaves;
+    Index first_leaf = 0;
+    bool is_top = false;
+    std::vector<Index> top_leaves; // ascending
     std::deque<NodeState> states;
     std::vector<NodeState*> unused;
     std::vector<WedgeValues> values;
@@ -102,8 +102,6 @@ struct Workspace {
         return state;
     }
 };
-
-constexpr bool same_value(const glm::dvec4& a, const glm::dvec4& b) { return a == b; }
 
 // Filled once.
 class RankSet {
@@ -161,10 +159,10 @@ private:
         unit_places_.resize(shape_.leaves());
         parallel_loop(Index{0}, shape_.leaves(),
                       [&](Index place) { unit_places_[place] = unit_position(interior_ + place); });
-        classes_.push_back({Kind::normal, 3, normal_scale});
-        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, 2, texture_scale * texture_density()});
-        if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, 4, colour_scale});
-        if (!mesh_.further.empty()) classes_.push_back({Kind::further, 0, 0}); // without a value at proxies
+        classes_.push_back({Kind::normal, normal_scale});
+        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, texture_scale * texture_density()});
+        if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, colour_scale});
+        if (!mesh_.further.empty()) classes_.push_back({Kind::further, 0}); // without a value at proxies
     }
 
     // The length in the unit box that one unit of texture coordinates covers, on average; 0 where they cover nothing.
@@ -187,14 +185,20 @@ private:
     const glm::dvec3& place_of(Index leaf) const { return unit_places_[place_node(leaf) - interior_]; }
     NodeId place_node(Index leaf) const { return interior_ + (places_.empty() ? leaf : places_[leaf]); }
 
-    glm::dvec4 value_of(const Class& c, Index leaf) const {
-        switch (c.kind) {
-        case Kind::normal: return {glm::dvec3(mesh_.normals[leaf]), 0};
-        case Kind::uv: return {glm::dvec2(mesh_.uvs[leaf]), 0, 0};
-        case Kind::further: return {mesh_.further[leaf], 0, 0, 0};
+    UNSEEN_INLINE Double4 value_of(Kind kind, Index leaf) const {
+        const auto channels = [](const auto&... values) { return Double4{static_cast<double>(values)...}; };
+        switch (kind) {
+        case Kind::normal: return channels(mesh_.normals[leaf].x, mesh_.normals[leaf].y, mesh_.normals[leaf].z);
+        case Kind::uv: return channels(mesh_.uvs[leaf].x, mesh_.uvs[leaf].y);
+        case Kind::further: return channels(mesh_.further[leaf]);
         case Kind::colour: break;
         }
-        return glm::dvec4(mesh_.colours[leaf]);
+        const glm::vec4& colour = mesh_.colours[leaf];
+        return channels(colour.r, colour.g, colour.b, colour.a);
+    }
+    bool has_same_value(Kind kind, Index leaf, Index other) const {
+        const Double4 a = value_of(kind, leaf), b = value_of(kind, other);
+        return a[0] == b[0] && a[1] == b[1] && a[2] == b[2] && a[3] == b[3];
     }
 
     void list_places() {
@@ -252,9 +256,8 @@ private:
     // In a tree without seams: a node has one wedge, of its number.
     void visit_whole(NodeId node, Workspace& space) {
         NodeState* state = nullptr;
-        const auto add = [&](std::span<const Component> components) {
-            for (std::size_t c = 0; c < classes_.size(); ++c)
-                state->components[c].add(components[c], classes_[c].channels);
+        const auto add = [&](const Component* components) {
+            for (std::size_t c = 0; c < classes_.size(); ++c) state->components[c] += components[c];
         };
         shape_.for_each_child(
             node,
@@ -262,7 +265,7 @@ private:
                 if (!state) {
                     state = states_[child];
                 } else {
-                    add(states_[child]->components);
+                    add(states_[child]->components.data());
                     space.unused.push_back(states_[child]);
                 }
             },
@@ -275,7 +278,7 @@ private:
             });
         const glm::dvec3 at = unit_position(node);
         for (std::size_t c = 0; c < classes_.size(); ++c)
-            put(node, classes_[c].kind, state->components[c].value_at(at, classes_[c].channels));
+            put(node, classes_[c].kind, state->components[c].value_at(at));
         states_[node] = state;
     }
 
@@ -317,7 +320,7 @@ private:
             wedge.root = leaf;
             if (!mesh_.materials.empty()) wedge.material = mesh_.materials[leaf];
             wedge.last = last_[leaf];
-            const std::span<const Component> own = components_of(leaf, space);
+            const Component* own = components_of(leaf, space);
             for (std::size_t c = 0; c < classes_.size(); ++c) {
                 Index& component = wedge.component[c];
                 component = shared_component(classes_[c], c, wedge, std::span(to.wedges).subspan(first_wedge));
@@ -325,7 +328,7 @@ private:
                     component = static_cast<Index>(to.components.size());
                     to.components.push_back(own[c]);
                 } else {
-                    to.components[component].add(own[c], classes_[c].channels);
+                    to.components[component] += own[c];
                 }
             }
             to.wedges.push_back(wedge);
@@ -338,80 +341,70 @@ private:
         // Looking at all pairs would take the square of the time where thousands of leaves meet.
         const std::size_t looked_at = std::min(others.size(), most_compared);
         for (const WedgeState& other : others.last(looked_at))
-            if (same_value(value_of(of, other.root), value_of(of, wedge.root)) &&
+            if (has_same_value(of.kind, other.root, wedge.root) &&
                 (of.kind != Kind::uv || other.material == wedge.material))
                 return other.component[c];
         return none;
     }
 
-    // What the classes have on the triangles at a leaf that hangs on a node of the task.
-    std::span<Component> components_of(Index leaf, Workspace& space) const {
-        const std::size_t at =
-            space.top_leaves.empty()
-                ? leaf - space.first_leaf
-                : static_cast<std::size_t>(std::ranges::lower_bound(space.top_leaves, leaf) - space.top_leaves.begin());
-        return std::span(space.of_leaves).subspan(at * classes_.size(), classes_.size());
+    // Where what the classes have on the triangles at a leaf begins; none: the leaf hangs on no node of the task.
+    Component* components_of(Index leaf, Workspace& space) const {
+        std::size_t at = leaf - space.first_leaf;
+        if (space.is_top) {
+            const auto found = std::ranges::lower_bound(space.top_leaves, leaf);
+            if (found == space.top_leaves.end() || *found != leaf) return nullptr;
+            at = static_cast<std::size_t>(found - space.top_leaves.begin());
+        }
+        at *= classes_.size();
+        return at < space.of_leaves.size() ? &space.of_leaves[at] : nullptr;
     }
 
     void measure_leaves(const TreePart& part, Workspace& space) const {
-        const auto is_own = [&](Index leaf) { return parts_.owns_leaf(part, place_node(leaf) - interior_); };
         std::vector<Index>& top = space.top_leaves;
-        Index count = 0;
-        if (parts_.is_top(part)) {
+        space.is_top = parts_.is_top(part);
+        space.first_leaf = first_leaf(part.first_leaf);
+        std::size_t count = first_leaf(part.leaf_end) - space.first_leaf;
+        if (space.is_top) {
+            const auto is_own = [&](Index leaf) { return parts_.owns_leaf(part, place_node(leaf) - interior_); };
             for (const Index t : part.crossing)
                 std::ranges::copy_if(mesh_.triangles[t], std::back_inserter(top), is_own);
             std::sort(top.begin(), top.end());
             top.erase(std::unique(top.begin(), top.end()), top.end());
-            count = static_cast<Index>(top.size());
-        } else {
-            space.first_leaf = first_leaf(part.first_leaf);
-            count = first_leaf(part.leaf_end) - space.first_leaf;
+            count = top.size();
         }
         space.of_leaves.resize(count * classes_.size());
-        TreeParts::for_each_triangle(part, [&](Index t) {
-            const Triangle& corners = mesh_.triangles[t];
-            std::array<Component*, 3> at{};
-            for (std::size_t k = 0; k < 3; ++k)
-                if (is_own(corners[k])) at[k] = components_of(corners[k], space).data();
-            add_triangle(corners, at);
-        });
+        TreeParts::for_each_triangle(part, [&](Index t) { add_triangle(mesh_.triangles[t], space); });
         constexpr double least_weight = 1e-12; // of leaves on nothing but slivers
-        for (Index i = 0; i < space.of_leaves.size(); ++i) {
+        for (std::size_t i = 0; i < space.of_leaves.size(); ++i) {
             Component& component = space.of_leaves[i];
             if (component.weight > 0) continue;
-            const Class& of = classes_[i % classes_.size()];
-            const Index number = static_cast<Index>(i / classes_.size());
-            const glm::dvec4 value = value_of(of, top.empty() ? space.first_leaf + number : top[number]);
+            const std::size_t number = i / classes_.size();
+            const Index leaf = space.is_top ? top[number] : space.first_leaf + static_cast<Index>(number);
+            component.d = least_weight * value_of(classes_[i % classes_.size()].kind, leaf);
             component.weight = least_weight;
-            for (std::size_t c = 0; c < of.channels; ++c)
-                component.linear[c].w = least_weight * value[static_cast<int>(c)];
         }
     }
 
-    // The linear functions that the classes have on a triangle. `at`: by corner, its classes' components, or none.
-    void add_triangle(const Triangle& t, const std::array<Component*, 3>& at) const {
+    // The linear functions that the classes have on a triangle.
+    void add_triangle(const Triangle& t, Workspace& space) const {
         const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p, cross = glm::cross(e, f);
         const double squared = glm::dot(cross, cross), inverse = 1 / squared, area = std::sqrt(squared) / 6;
         const glm::dvec3 by_e = glm::cross(f, cross) * inverse, by_f = glm::cross(cross, e) * inverse;
+        const std::array at{components_of(t[0], space), components_of(t[1], space), components_of(t[2], space)};
         for (std::size_t c = 0; c < classes_.size(); ++c) {
-            const Class& of = classes_[c];
-            const glm::dvec4 s = value_of(of, t[0]), along_e = value_of(of, t[1]) - s, along_f = value_of(of, t[2]) - s;
-            Component here;
-            double steepest = 0;
-            bool is_bounded = true;
-            for (std::size_t k = 0; k < of.channels; ++k) {
-                const int channel = static_cast<int>(k);
-                const glm::dvec3 gradient = along_e[channel] * by_e + along_f[channel] * by_f;
-                here.linear[k] = glm::dvec4(gradient, s[channel] - glm::dot(gradient, p));
-                const double slope = glm::dot(gradient, gradient);
-                is_bounded &= slope < std::numeric_limits<double>::max(); // false for NaN, too
-                steepest = std::max(steepest, slope);
-            }
-            here.weight = area / (1 + steepest * of.scale * of.scale);
-            if (!is_bounded || !(here.weight > 0)) continue;
-            for (std::size_t k = 0; k < of.channels; ++k) here.linear[k] *= here.weight;
+            const auto [kind, scale] = classes_[c];
+            if (kind == Kind::further) continue;
+            const Double4 s = value_of(kind, t[0]), along_e = value_of(kind, t[1]) - s,
+                          along_f = value_of(kind, t[2]) - s;
+            const Double4 x = along_e * by_e.x + along_f * by_f.x, y = along_e * by_e.y + along_f * by_f.y,
+                          z = along_e * by_e.z + along_f * by_f.z, slope = x * x + y * y + z * z;
+            const double steepest = std::max(std::max(slope[0], slope[1]), std::max(slope[2], slope[3]));
+            const double w = area / (1 + steepest * scale * scale);
+            const bool is_bounded = slope[0] + slope[1] + slope[2] + slope[3] < std::numeric_limits<double>::max();
+            if (!is_bounded || !(w > 0)) continue; // NaN is not, either
+            const Component here{w * x, w * y, w * z, w * (s - (x * p.x + y * p.y + z * p.z)), w};
             for (Component* corner : at)
-                if (corner) corner[c].add(here, of.channels);
+                if (corner) corner[c] += here;
         }
     }
 
@@ -463,7 +456,7 @@ private:
             const Index x = top(space.component_parent, to.component[c]),
                         y = top(space.component_parent, from.component[c]);
             if (x == y) continue;
-            state.components[std::min(x, y)].add(state.components[std::max(x, y)], classes_[c].channels);
+            state.components[std::min(x, y)] += state.components[std::max(x, y)];
             space.component_parent[std::max(x, y)] = std::min(x, y);
         }
     }
@@ -598,7 +591,7 @@ private:
     WedgeValues values_of(const WedgeState& wedge, const NodeState& state, const glm::dvec3& at) const {
         WedgeValues values{};
         for (std::size_t c = 0; c < classes_.size(); ++c)
-            values.of[c] = state.components[wedge.component[c]].value_at(at, classes_[c].channels);
+            values.of[c] = state.components[wedge.component[c]].value_at(at);
         return values;
     }
     WedgeValues values_of(WedgeState wedge, const NodeState& state, const glm::dvec3& at, Workspace& space) const {
