@@ -20,8 +20,8 @@ namespace {
 // A normal that turns by one radian, a colour that goes from 0 to 1, and a texture that slides by a length on the surface
 // count as these shares of the extent, or of the length. They weigh triangles on which a value changes fast, and say which
 // wedges are alike.
-constexpr double normal_scale = 0.005;
-constexpr double colour_scale = 0.005;
+constexpr float normal_scale = 0.005f;
+constexpr float colour_scale = 0.005f;
 constexpr double texture_scale = 0.3;
 
 // Wedges whose triangles have all vanished by the time that their node was made are drawn in mixed cuts only. They are
@@ -51,9 +51,15 @@ struct Component {
     }
 };
 
+// The same at a leaf, through its place and its value.
+struct LeafSlopes {
+    Float4 x{}, y{}, z{};
+    float weight = 0;
+};
+
 struct Class {
     Kind kind;
-    double scale; // to lengths in the unit box
+    float scale; // to lengths in the unit box
 };
 
 // A wedge of the node at hand. Its leaves are known by one of them, the root of a union.
@@ -82,7 +88,7 @@ struct WedgeValues {
 // has taken is used again.
 struct Workspace {
     // Class by class, of the leaves that hang on the task's nodes: a run of leaves, or, above the parts, these.
-    std::vector<Component> of_leaves;
+    std::vector<LeafSlopes> slopes;
     Index first_leaf = 0;
     bool is_top = false;
     std::vector<Index> top_leaves; // ascending
@@ -156,11 +162,12 @@ private:
         const double extent = box.extent();
         centre_ = box.low + box.size() * 0.5;
         scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
+        float_scale_ = static_cast<float>(scale_);
         unit_places_.resize(shape_.leaves());
         parallel_loop(Index{0}, shape_.leaves(),
                       [&](Index place) { unit_places_[place] = unit_position(interior_ + place); });
         classes_.push_back({Kind::normal, normal_scale});
-        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, texture_scale * texture_density()});
+        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, static_cast<float>(texture_scale * texture_density())});
         if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, colour_scale});
         if (!mesh_.further.empty()) classes_.push_back({Kind::further, 0}); // without a value at proxies
     }
@@ -185,8 +192,8 @@ private:
     const glm::dvec3& place_of(Index leaf) const { return unit_places_[place_node(leaf) - interior_]; }
     NodeId place_node(Index leaf) const { return interior_ + (places_.empty() ? leaf : places_[leaf]); }
 
-    UNSEEN_INLINE Double4 value_of(Kind kind, Index leaf) const {
-        const auto channels = [](const auto&... values) { return Double4{static_cast<double>(values)...}; };
+    UNSEEN_INLINE Float4 value_of(Kind kind, Index leaf) const {
+        const auto channels = [](const auto&... values) { return Float4{static_cast<float>(values)...}; };
         switch (kind) {
         case Kind::normal: return channels(mesh_.normals[leaf].x, mesh_.normals[leaf].y, mesh_.normals[leaf].z);
         case Kind::uv: return channels(mesh_.uvs[leaf].x, mesh_.uvs[leaf].y);
@@ -197,7 +204,7 @@ private:
         return channels(colour.r, colour.g, colour.b, colour.a);
     }
     bool has_same_value(Kind kind, Index leaf, Index other) const {
-        const Double4 a = value_of(kind, leaf), b = value_of(kind, other);
+        const Float4 a = value_of(kind, leaf), b = value_of(kind, other);
         return a[0] == b[0] && a[1] == b[1] && a[2] == b[2] && a[3] == b[3];
     }
 
@@ -256,16 +263,14 @@ private:
     // In a tree without seams: a node has one wedge, of its number.
     void visit_whole(NodeId node, Workspace& space) {
         NodeState* state = nullptr;
-        const auto add = [&](const Component* components) {
-            for (std::size_t c = 0; c < classes_.size(); ++c) state->components[c] += components[c];
-        };
         shape_.for_each_child(
             node,
             [&](NodeId child) {
                 if (!state) {
                     state = states_[child];
                 } else {
-                    add(states_[child]->components.data());
+                    for (std::size_t c = 0; c < classes_.size(); ++c)
+                        state->components[c] += states_[child]->components[c];
                     space.unused.push_back(states_[child]);
                 }
             },
@@ -274,7 +279,7 @@ private:
                     state = space.take();
                     state->components.resize(classes_.size());
                 }
-                add(components_of(place, space));
+                for (std::size_t c = 0; c < classes_.size(); ++c) state->components[c] += component_of(c, place, space);
             });
         const glm::dvec3 at = unit_position(node);
         for (std::size_t c = 0; c < classes_.size(); ++c)
@@ -320,15 +325,14 @@ private:
             wedge.root = leaf;
             if (!mesh_.materials.empty()) wedge.material = mesh_.materials[leaf];
             wedge.last = last_[leaf];
-            const Component* own = components_of(leaf, space);
             for (std::size_t c = 0; c < classes_.size(); ++c) {
                 Index& component = wedge.component[c];
                 component = shared_component(classes_[c], c, wedge, std::span(to.wedges).subspan(first_wedge));
                 if (component == none) {
                     component = static_cast<Index>(to.components.size());
-                    to.components.push_back(own[c]);
+                    to.components.push_back(component_of(c, leaf, space));
                 } else {
-                    to.components[component] += own[c];
+                    to.components[component] += component_of(c, leaf, space);
                 }
             }
             to.wedges.push_back(wedge);
@@ -348,7 +352,7 @@ private:
     }
 
     // Where what the classes have on the triangles at a leaf begins; none: the leaf hangs on no node of the task.
-    Component* components_of(Index leaf, Workspace& space) const {
+    LeafSlopes* slopes_of(Index leaf, Workspace& space) const {
         std::size_t at = leaf - space.first_leaf;
         if (space.is_top) {
             const auto found = std::ranges::lower_bound(space.top_leaves, leaf);
@@ -356,7 +360,22 @@ private:
             at = static_cast<std::size_t>(found - space.top_leaves.begin());
         }
         at *= classes_.size();
-        return at < space.of_leaves.size() ? &space.of_leaves[at] : nullptr;
+        return at < space.slopes.size() ? &space.slopes[at] : nullptr;
+    }
+
+    // Leaves on nothing but slivers have their own value.
+    Component component_of(std::size_t c, Index leaf, Workspace& space) const {
+        constexpr double least_weight = 1e-30;
+        const LeafSlopes& slopes = slopes_of(leaf, space)[c];
+        const glm::dvec3& at = place_of(leaf);
+        Component out;
+        out.x = __builtin_convertvector(slopes.x, Double4);
+        out.y = __builtin_convertvector(slopes.y, Double4);
+        out.z = __builtin_convertvector(slopes.z, Double4);
+        out.weight = slopes.weight > 0 ? static_cast<double>(slopes.weight) : least_weight;
+        out.d = out.weight * __builtin_convertvector(value_of(classes_[c].kind, leaf), Double4) -
+                (out.x * at.x + out.y * at.y + out.z * at.z);
+        return out;
     }
 
     void measure_leaves(const TreePart& part, Workspace& space) const {
@@ -372,39 +391,34 @@ private:
             top.erase(std::unique(top.begin(), top.end()), top.end());
             count = top.size();
         }
-        space.of_leaves.resize(count * classes_.size());
+        space.slopes.resize(count * classes_.size());
         TreeParts::for_each_triangle(part, [&](Index t) { add_triangle(mesh_.triangles[t], space); });
-        constexpr double least_weight = 1e-12; // of leaves on nothing but slivers
-        for (std::size_t i = 0; i < space.of_leaves.size(); ++i) {
-            Component& component = space.of_leaves[i];
-            if (component.weight > 0) continue;
-            const std::size_t number = i / classes_.size();
-            const Index leaf = space.is_top ? top[number] : space.first_leaf + static_cast<Index>(number);
-            component.d = least_weight * value_of(classes_[i % classes_.size()].kind, leaf);
-            component.weight = least_weight;
-        }
     }
 
     // The linear functions that the classes have on a triangle.
     void add_triangle(const Triangle& t, Workspace& space) const {
-        const glm::dvec3 p = place_of(t[0]), e = place_of(t[1]) - p, f = place_of(t[2]) - p, cross = glm::cross(e, f);
-        const double squared = glm::dot(cross, cross), inverse = 1 / squared, area = std::sqrt(squared) / 6;
-        const glm::dvec3 by_e = glm::cross(f, cross) * inverse, by_f = glm::cross(cross, e) * inverse;
-        const std::array at{components_of(t[0], space), components_of(t[1], space), components_of(t[2], space)};
+        const glm::vec3 p = positions_[place_node(t[0])], e = (positions_[place_node(t[1])] - p) * float_scale_,
+                        f = (positions_[place_node(t[2])] - p) * float_scale_, cross = glm::cross(e, f);
+        const float squared = glm::dot(cross, cross), inverse = 1 / squared, area = std::sqrt(squared) / 6;
+        if (!(squared >= std::numeric_limits<float>::min())) return; // floats do not know its normal
+        const glm::vec3 by_e = glm::cross(f, cross) * inverse, by_f = glm::cross(cross, e) * inverse;
+        const std::array at{slopes_of(t[0], space), slopes_of(t[1], space), slopes_of(t[2], space)};
         for (std::size_t c = 0; c < classes_.size(); ++c) {
             const auto [kind, scale] = classes_[c];
             if (kind == Kind::further) continue;
-            const Double4 s = value_of(kind, t[0]), along_e = value_of(kind, t[1]) - s,
-                          along_f = value_of(kind, t[2]) - s;
-            const Double4 x = along_e * by_e.x + along_f * by_f.x, y = along_e * by_e.y + along_f * by_f.y,
-                          z = along_e * by_e.z + along_f * by_f.z, slope = x * x + y * y + z * z;
-            const double steepest = std::max(std::max(slope[0], slope[1]), std::max(slope[2], slope[3]));
-            const double w = area / (1 + steepest * scale * scale);
-            const bool is_bounded = slope[0] + slope[1] + slope[2] + slope[3] < std::numeric_limits<double>::max();
+            const Float4 s = value_of(kind, t[0]), along_e = value_of(kind, t[1]) - s,
+                         along_f = value_of(kind, t[2]) - s;
+            const Float4 x = along_e * by_e.x + along_f * by_f.x, y = along_e * by_e.y + along_f * by_f.y,
+                         z = along_e * by_e.z + along_f * by_f.z, slope = x * x + y * y + z * z;
+            const float steepest = std::max(std::max(slope[0], slope[1]), std::max(slope[2], slope[3]));
+            const float w = area / (1 + steepest * scale * scale);
+            const bool is_bounded = slope[0] + slope[1] + slope[2] + slope[3] < std::numeric_limits<float>::max();
             if (!is_bounded || !(w > 0)) continue; // NaN is not, either
-            const Component here{w * x, w * y, w * z, w * (s - (x * p.x + y * p.y + z * p.z)), w};
-            for (Component* corner : at)
-                if (corner) corner[c] += here;
+            for (LeafSlopes* corner : at) {
+                if (!corner) continue;
+                corner[c].x += w * x, corner[c].y += w * y, corner[c].z += w * z;
+                corner[c].weight += w;
+            }
         }
     }
 
@@ -533,7 +547,7 @@ private:
             return std::numeric_limits<double>::infinity();
         double squared = 0;
         for (std::size_t c = 0; c < classes_.size(); ++c) {
-            const glm::dvec4 difference = (values[i].of[c] - values[j].of[c]) * classes_[c].scale;
+            const glm::dvec4 difference = (values[i].of[c] - values[j].of[c]) * static_cast<double>(classes_[c].scale);
             squared += glm::dot(difference, difference);
         }
         return std::sqrt(squared);
@@ -724,7 +738,8 @@ private:
     NodeId interior_;
     bool splits_; // nodes may have several wedges
     glm::dvec3 centre_{0};
-    double scale_ = 1;                    // mesh units to the unit box
+    double scale_ = 1; // mesh units to the unit box
+    float float_scale_ = 1;
     std::vector<glm::dvec3> unit_places_; // by place
     std::vector<Class> classes_;
 
