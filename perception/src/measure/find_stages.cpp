@@ -144,11 +144,6 @@ public:
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
             for (WedgeId& corner : t) corner = tree.wedge_of_leaf(corner);
-        if (tree.has_seams()) {
-            nodes_.resize(tree.wedge_count());
-            for (NodeId node = 0; node < tree.node_count(); ++node)
-                std::fill(nodes_.begin() + tree.first_wedge(node), nodes_.begin() + tree.wedge_end(node), node);
-        }
         for (std::size_t i = 0; i < direction_count; ++i) cameras_.push_back(stage_camera(tree.bounding_sphere(), i));
     }
 
@@ -239,10 +234,9 @@ private:
         folded_.resize(interior_);
         for (NodeId node = 0; node < interior_; ++node) folded_[node] = goes_on(node) ? folded_[parents_[node]] : node;
         for (Triangle& t : triangles_)
-            for (WedgeId& corner : t) {
-                const NodeId node = nodes_.empty() ? corner : nodes_[corner];
-                if (goes_on(node)) corner = tree_.wedge_above(folded_[parents_[node]], corner);
-            }
+            for (WedgeId& corner : t)
+                if (const NodeId node = tree_.node_of_wedge(corner); goes_on(node))
+                    corner = tree_.wedge_above(folded_[parents_[node]], corner);
         // Two corners of one triangle in one node are one wedge.
         std::erase_if(triangles_, uses_a_vertex_twice);
     }
@@ -267,7 +261,6 @@ private:
     NodeId interior_;
     std::span<const NodeId> parents_;
     std::vector<Triangle> triangles_; // as folded, over wedges
-    std::vector<NodeId> nodes_;       // by wedge; empty: they have the same numbers
     std::vector<NodeId> folded_;      // by interior node: where it has gone
     std::vector<StageCamera> cameras_;
     tbb::enumerable_thread_specific<StageSurfaces> surfaces_;

@@ -15,6 +15,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/team.h>
 
+#include "build/attribute_scales.h"
 #include "build/progress_counter.h"
 #include "build/quadric.h"
 #include "build/quadric_contraction.h"
@@ -32,17 +33,6 @@ constexpr Index largest_part = 1 << 15;
 // choose from, are a small share.
 constexpr Index part_target = largest_part / 32;
 
-// A normal that turns by one radian counts as this share of the model's extent. Half as much lets the surface of smooth
-// models stray 10% less for their triangles, but their shading looks worse; with twice as much it strays 25% farther.
-constexpr double normal_scale = 0.005;
-// One unit of relative luminance, and a colour that goes from 0 to 1, count as these shares of the extent. From 0.01 to
-// 0.2, the triangles that the perceptual fold test leaves differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times
-// as far for its triangles, for luminance then drowns the shape.
-constexpr double luminance_scale = 0.01;
-constexpr double colour_scale = 0.005;
-// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on
-// the texture, and most of a displacement is seen whatever it is.
-constexpr double texture_scale = 0.3;
 // Attributes count as if they were within this many extents, so that stray values stay finite when squared.
 constexpr double largest_value = 1e3;
 
@@ -260,7 +250,11 @@ private:
         for (const double a : input_.areas) largest = std::max(largest, a);
         largest *= scale_ * scale_;
         area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
-        texture_unit_ = texture_density() * texture_scale;
+        if (!input_.leaves.uvs.empty())
+            texture_unit_ =
+                texture_scale * texture_density(input_.leaves.triangles, input_.leaves.uvs, [&](Index leaf) {
+                    return input_.mesh.positions[input_.leaves.places[leaf]] * scale_;
+                });
         classes_.channels[classes_.count++] = 3;
         if (texture_unit_ > 0) classes_.channels[classes_.count++] = 2;
         if (!input_.leaves.colours.empty()) classes_.channels[classes_.count++] = 4;
@@ -293,22 +287,6 @@ private:
             if (slot != std::exchange(last_slot, slot)) push_position(slot);
             push_leaf(number);
         }
-    }
-
-    // The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
-    double texture_density() const {
-        const LeafView& leaves = input_.leaves;
-        if (leaves.uvs.empty()) return 0;
-        double surface = 0, texture = 0;
-        for (const Triangle& t : leaves.triangles) {
-            const auto p = [&](std::size_t k) { return input_.mesh.positions[leaves.places[t[k]]] * scale_; };
-            const auto uv = [&](std::size_t k) { return glm::dvec2(leaves.uvs[t[k]]); };
-            surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
-            const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
-            texture += std::abs(e.x * f.y - e.y * f.x);
-        }
-        const double density = std::sqrt(surface / texture);
-        return density > 0 && std::isfinite(density) ? density : 0;
     }
 
     void list_triangles() {

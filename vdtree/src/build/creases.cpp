@@ -23,8 +23,8 @@ constexpr std::size_t block_size = 4096; // places of a task
 constexpr double made_degrees = 30, organic_degrees = 60, largest_ratio_of_made = 2.5;
 
 // Scans of organic forms have a few edges above 60 degrees, which are noise: at places with 0.07 to 0.35% of the area
-// (armadillo, bunny, dragon, igea). Hard, they would make seams in a surface without any. Forms with folds or made parts have
-// 0.7% and more (horse, beast, gargoyle).
+// (armadillo, bunny, dragon, igea). Hard, they would make seams in a surface without any. Forms with folds or made
+// parts have 0.7% and more (horse, beast, gargoyle).
 constexpr double least_creased_share = 0.005;
 
 // Turned things have sides whose angles divide 360 degrees (12 sides: 30), and floats store their corners with errors.
@@ -34,8 +34,8 @@ constexpr double slack_degrees = 0.05;
 constexpr double lost_height = 0x1p-24;
 
 // Normals of one place that differ by less are one. In controllers' files equal ones differ by up to 0.1 degrees, for
-// exporters computed each by itself; one such model has a third of the normals then. A quarter of a degree changes light
-// that falls at 45 degrees by 0.4%, less than anybody sees; whole degrees join what is meant to differ.
+// exporters computed each by itself; one such model has a third of the normals then. A quarter of a degree changes
+// light that falls at 45 degrees by 0.4%, less than anybody sees; whole degrees join what is meant to differ.
 constexpr double same_degrees = 0.25;
 
 // Beyond so many normals at one place they are searched by a grid.
@@ -141,8 +141,9 @@ public:
     // Unites corners across edges. Corners in smoothing groups take no part.
     void unite(double least_cosine, CornerSets& groups) {
         for_each_edge([&](std::span<EdgeOfCorner> edges, Index neighbour) {
-            const auto solid = std::stable_partition(edges.begin(), edges.end(),
-                                                     [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); });
+            const auto is_solid = [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); };
+            auto solid = std::ranges::find_if_not(edges, is_solid);
+            if (solid != edges.end()) solid = std::stable_partition(solid, edges.end(), is_solid);
             const auto faces = static_cast<std::size_t>(solid - edges.begin());
             if (faces == 2 && is_smooth(edges[0].corner, edges[1].corner, least_cosine))
                 groups.unite(edges[0].corner, edges[1].corner);

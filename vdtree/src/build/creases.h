@@ -22,8 +22,9 @@ struct CornerInput {
 };
 
 struct CornerNormals {
-    // By corner, 3 a triangle: the number of its normal. Places that triangles use have consecutive numbers in their own
-    // order, so a number belongs to one place; where has_creases is false and every place is used, numbers are places.
+    // By corner, 3 a triangle: the number of its normal. Places that triangles use have consecutive numbers in their
+    // own order, so a number belongs to one place; where has_creases is false and every place is used, numbers are
+    // places.
     std::vector<Index> number;
     std::vector<glm::vec3> normals; // by number; unit length, or zero where there is no area
     bool has_creases = false;       // some place has more than one normal
@@ -34,13 +35,13 @@ struct CornerNormals {
 // Finds the normal of every corner.
 //
 // A corner's own normal is kept. Any other is the area-weighted mean of the faces around the place that share a normal
-// with the corner's face. Any two faces that meet at an edge share if the angle between them is at most the crease angle.
-// All faces around a place share if each is within half that angle of their mean. Smoothing groups, where stated, decide
-// in place of the angle. Faces without an area join their neighbours'.
-// Normals of a place that are nearly the same become one.
+// with the corner's face. Any two faces that meet at an edge share if the angle between them is at most the crease
+// angle. All faces around a place share if each is within half that angle of their mean. Smoothing groups, where
+// stated, decide in place of the angle. Faces without an area join their neighbours'. Normals of a place that are
+// nearly the same become one.
 //
-// Cost: linear but for sorting the corners of places with hard edges; parallel. The result does not depend on the number of
-// threads.
+// Cost: linear but for sorting the corners of places with hard edges; parallel. The result does not depend on the
+// number of threads.
 CornerNormals find_corner_normals(const CornerInput& input);
 
 // Fails if an angle is asked for that is not one from 0 to 180 degrees.

@@ -134,8 +134,8 @@ public:
         std::ranges::sort(keys_);
     }
 
-    // Calls use(corner, leaf) for each, leaves in the order of their first vertices, then of their first corners. Returns
-    // how many leaves there are.
+    // Calls use(corner, leaf) for each, leaves in the order of their first vertices, then of their first corners.
+    // Returns how many leaves there are.
     template <class VertexOf, class Use>
     Index number(VertexOf&& vertex_of, Use&& use) {
         leaves_.clear();

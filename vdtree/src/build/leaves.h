@@ -10,7 +10,8 @@ namespace unseen::vdtree {
 // Triangles with two corners at one position are left out, and so are vertices that no other triangle uses.
 class PlaceMesh {
 public:
-    // The source must be valid and outlive this. Cost: linear, but for sorting the corners at places with several leaves.
+    // The source must be valid and outlive this. Cost: linear, but for sorting the corners at places with several
+    // leaves.
     explicit PlaceMesh(const MeshView& source);
 
     // ---- over places, which are numbered by their first vertices

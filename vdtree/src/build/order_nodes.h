@@ -11,8 +11,8 @@ struct NodeOrder {
     std::vector<NodeId> node_of_cluster; // by cluster that is no vertex; no_node for those with one child
 };
 
-// Depth-first pre-order, children in the order of their clusters, passing over clusters with one child. Cost: two passes
-// over the clusters.
+// Depth-first pre-order, children in the order of their clusters, passing over clusters with one child. Cost: two
+// passes over the clusters.
 NodeOrder order_nodes(const Clustering& clustering, Index vertices);
 
 struct TriangleOrder {

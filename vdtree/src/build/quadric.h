@@ -10,8 +10,8 @@
 // channel values are not stored: the best s for a given x is linear in x (Hoppe 1999), which leaves a form in x alone.
 //
 // An attribute class (normal, texture coordinates, colour) may have several values at one place, on the two sides of a
-// seam. Each is a component of the cluster with a block of its own: only the s differ, so what is known of x is one base
-// for all of them.
+// seam. Each is a component of the cluster with a block of its own: only the s differ, so what is known of x is one
+// base for all of them.
 //
 // Positions are relative to the cluster's own place and channel values to its own reference, so floats suffice: what
 // is subtracted is never larger than the cluster.
@@ -25,8 +25,8 @@
 
 namespace unseen::vdtree {
 
-// Where the numbers of a quadric's base lie, x'Mx + 2 h'x + k and the weight, and those of a channel's row and a block's
-// weight: G'x + D - W s is half the derivative by s.
+// Where the numbers of a quadric's base lie, x'Mx + 2 h'x + k and the weight, and those of a channel's row and a
+// block's weight: G'x + D - W s is half the derivative by s.
 namespace quadric {
 enum : std::size_t { xx, xy, xz, yy, yz, zz, hx, hy, hz, k, weight, base_size };
 enum : std::size_t { gx, gy, gz, d, row_size };
@@ -188,10 +188,9 @@ struct Minimum {
 };
 
 // Where a sum whose parts lie at 0 and `to` is least. In flat directions it stays at the middle of the two. Each step
-// minimises the form plus a small weight times the squared distance from the step before. So steep directions are as good
-// as exact after few steps, and flat ones have hardly moved. A minimum that is farther from the
-// middle than the two are from each other is not trusted: then, and wherever they are better, the middle and the two
-// ends are tried.
+// minimises the form plus a small weight times the squared distance from the step before. So steep directions are as
+// good as exact after few steps, and flat ones have hardly moved. A minimum that is farther from the middle than the
+// two are from each other is not trusted: then, and wherever they are better, the middle and the two ends are tried.
 template <class F>
 UNSEEN_INLINE Minimum<F> minimise(const Form<F>& form, const Offset<F>& to, int steps) {
     constexpr float least_lift = 1e-30f; // where there is no form at all

@@ -20,8 +20,8 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Weight of the squared distance between a cluster's places and its proxy, against that from the planes. It puts what the
-// planes do not care for in order, and does not take part in placing.
+// Weight of the squared distance between a cluster's places and its proxy, against that from the planes. It puts what
+// the planes do not care for in order, and does not take part in placing.
 constexpr float compactness = 1e-4f;
 // Across a gap that no edge bridges, the full squared distance counts: joining two parts moves both.
 constexpr float gap_weight = 1;
@@ -38,9 +38,9 @@ constexpr std::size_t rounds_to_absorb = 4;
 // thousands of triangles with coordinates of their own, both sides of a seam may drift apart.
 constexpr std::size_t most_components = 24;
 
-// Whether a merge turns triangles over is tested from when one in so many clusters of a part is left, and always among so
-// few. From the start contraction would take a sixth more instructions (bunny), for what is small and rare there; cuts
-// repair it.
+// Whether a merge turns triangles over is tested from when one in so many clusters of a part is left, and always among
+// so few. From the start contraction would take a sixth more instructions (bunny), for what is small and rare there;
+// cuts repair it.
 constexpr std::size_t tested_share = 4, always_tested = 2048;
 
 constexpr Index none = std::numeric_limits<Index>::max();
@@ -534,8 +534,8 @@ private:
         glm::dvec3 place;
     };
 
-    // Where the form is least; where that turns a triangle over, at an end or the middle, if that costs hardly more; none,
-    // where all do. Where nothing is tested, at the first.
+    // Where the form is least; where that turns a triangle over, at an end or the middle, if that costs hardly more;
+    // none, where all do. Where nothing is tested, at the first.
     std::optional<Placed> place(const Form<double>& form, ClusterPair p, const Trial& trial) {
         constexpr double most_costly = 1.5; // times the pair's error, which puts it in order
         constexpr int steps = 3;            // see minimise(): what is 100 times as steep as flat is exact to 1e-6
@@ -643,8 +643,8 @@ private:
         }
     }
 
-    // Pairs that were refused often are not tested any more, or a part of the surface that cannot go on would wait for all
-    // others; nor are the last clusters of a component, whose triangles have to turn.
+    // Pairs that were refused often are not tested any more, or a part of the surface that cannot go on would wait for
+    // all others; nor are the last clusters of a component, whose triangles have to turn.
     bool is_tested(ClusterPair p, bool gap) {
         constexpr std::uint8_t patience = 6; // refusals
         constexpr Index last_clusters = 4;
@@ -771,8 +771,8 @@ private:
             if (components[k] != no_component) components[k] = new_component(cluster_before, components[k]);
     }
 
-    // Links of all pairs that have become one go with it. Linear: the pairs from before are put in the order of their lower
-    // cluster now, and a mark says which pair leads to its partners.
+    // Links of all pairs that have become one go with it. Linear: the pairs from before are put in the order of their
+    // lower cluster now, and a mark says which pair leads to its partners.
     void renumber_links() {
         first_before_.assign(live_.size() + 1, 0);
         const auto for_each_before = [&](auto&& f) {
@@ -824,19 +824,21 @@ private:
             LinkRange& range = c_.links_of_pairs[found.pair];
             c_.links[range.first + range.count++] = found.link;
         }
-        for (LinkRange& range : c_.links_of_pairs) {
+        for (std::size_t i = 0; i < c_.pairs.size(); ++i) {
+            if (pair_errors_[i] >= 0) continue; // its clusters are as before, and so are its links
+            LinkRange& range = c_.links_of_pairs[i];
             const auto begin = c_.links.begin() + range.first, end = begin + range.count;
             std::sort(begin, end);
             range.count = static_cast<Index>(std::unique(begin, end) - begin);
         }
     }
 
-    // Closes what nothing links any more, of the clusters that were made in this round, or of all; and the lightest where
-    // there are too many. Tidies up the list of components.
+    // Closes what nothing links any more, of the clusters that were made in this round, or of all; and the lightest
+    // where there are too many. Tidies up the list of components.
     void close_components(bool all) {
         find_linked();
-        std::vector<ClassComponent> list;
-        list.reserve(live_.components.size());
+        std::vector<ClassComponent>& list = tidy_;
+        list.clear();
         numbers_of_.assign(live_.size(), none);
         numbers_.clear();
         for (Index s = 0; s < live_.size(); ++s) {
@@ -966,8 +968,8 @@ private:
     std::vector<Partner> partners_;
     std::vector<CodedIndex> curve_, curve_scratch_, order_, order_scratch_;
 
-    // What a round does to components. A cluster's components get the numbers that lie in numbers_ from numbers_of_ of it on;
-    // none: they keep theirs.
+    // What a round does to components. A cluster's components get the numbers that lie in numbers_ from numbers_of_ of
+    // it on; none: they keep theirs.
     struct FoundLink {
         Index pair;
         Link link;
@@ -978,7 +980,7 @@ private:
     std::vector<Index> numbers_of_, numbers_, first_before_, in_order_, order_of_components_;
     std::vector<FoundLink> found_links_;
     std::vector<std::uint8_t> linked_; // by component
-    std::vector<ClassComponent> chosen_;
+    std::vector<ClassComponent> chosen_, tidy_;
 };
 
 void append(LiveClusters& to, const LiveClusters& from) {

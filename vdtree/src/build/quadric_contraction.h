@@ -2,17 +2,17 @@
 // of.
 //
 // A mesh's places ("slots") are numbered so that every part is a range of them. contract_part() takes one part's own
-// places, those of other parts that share a triangle with them, and these triangles, and contracts pairs of its own until
-// few are left. join() puts two neighbouring ranges together: edges between them, on which neither could contract, become
-// contractible, and contraction goes on. Both depend on nothing but their arguments, so the parts of a mesh may be
-// contracted in any order, by any thread or process; all that they take and give are contiguous arrays of plain numbers.
-// Triangles are never cut: a cluster is a set of slots, and parts fit each other without seams.
+// places, those of other parts that share a triangle with them, and these triangles, and contracts pairs of its own
+// until few are left. join() puts two neighbouring ranges together: edges between them, on which neither could
+// contract, become contractible, and contraction goes on. Both depend on nothing but their arguments, so the parts of a
+// mesh may be contracted in any order, by any thread or process; all that they take and give are contiguous arrays of
+// plain numbers. Triangles are never cut: a cluster is a set of slots, and parts fit each other without seams.
 //
-// A place has one or several leaves, the distinct tuples of attributes of the corners there. In each attribute class, the
-// leaves that share a value form one component. When two clusters merge, two of their components become one if corners of
-// one triangle of the mesh link them, whether the triangle has vanished or not. So both sides of a seam stay apart, and
-// what is alike on both does not drift apart. Most clusters have one component of each class, and so has every cluster of a
-// mesh without seams: these are kept and judged side by side; only the others have lists.
+// A place has one or several leaves, the distinct tuples of attributes of the corners there. In each attribute class,
+// the leaves that share a value form one component. When two clusters merge, two of their components become one if
+// corners of one triangle of the mesh link them, whether the triangle has vanished or not. So both sides of a seam stay
+// apart, and what is alike on both does not drift apart. Most clusters have one component of each class, and so has
+// every cluster of a mesh without seams: these are kept and judged side by side; only the others have lists.
 //
 // Lengths are in units of the mesh's extent ("unit box"), weights are areas over the largest area of a place.
 #pragma once
@@ -50,9 +50,9 @@ inline constexpr Index no_merge = 0xffffffffu;
 struct LiveCluster {
     Index name;      // a slot in the cluster, under which merges know it
     float deviation; // see Merge
-    // Merges, known by the cluster that they joined; or no_merge. `made_by`: the one that made the cluster. `vanishing`:
-    // the one at which the last triangles of its connected part go, or, of several parts that were joined across gaps,
-    // of the part that is to stay longest.
+    // Merges, known by the cluster that they joined; or no_merge. `made_by`: the one that made the cluster.
+    // `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that were joined
+    // across gaps, of the part that is to stay longest.
     Index made_by = no_merge, vanishing = no_merge;
 };
 
@@ -69,8 +69,8 @@ struct LiveClusters {
     std::vector<glm::dvec3> places;
     std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
     std::vector<float> quadrics;   // as many floats each as AttributeClasses::stride() says, see quadric.h
-    // A cluster with several components of a class has all its components here, of every class: first one of each class,
-    // then the others. Of its quadric only the base counts.
+    // A cluster with several components of a class has all its components here, of every class: first one of each
+    // class, then the others. Of its quadric only the base counts.
     struct Several {
         Index first = 0, count = 0; // 0: it has one of each class
     };
@@ -90,8 +90,8 @@ struct Merge {
     glm::dvec3 place;
 };
 
-// The merges of a contraction, not those of the parts that were joined. Round by round, and in a round by ascending error;
-// two merges of one round do not touch the same cluster.
+// The merges of a contraction, not those of the parts that were joined. Round by round, and in a round by ascending
+// error; two merges of one round do not touch the same cluster.
 struct MergeRecord {
     std::vector<Merge> merges;
     std::vector<Index> round_ends; // by round: the number of merges up to its end

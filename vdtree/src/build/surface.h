@@ -38,8 +38,8 @@ struct Surface {
     std::vector<std::uint8_t> irregular;
     // By vertex: a third of the area of the triangles around.
     std::vector<double> areas;
-    // By vertex: the area-weighted mean of the normals of the faces around it; unit length, or zero where there is no face
-    // with an area. Turned outward on an inside-out surface.
+    // By vertex: the area-weighted mean of the normals of the faces around it; unit length, or zero where there is no
+    // face with an area. Turned outward on an inside-out surface.
     std::vector<glm::vec3> normals;
     // From what all this was found: 44 bytes a triangle.
     CornersByPlace corners;

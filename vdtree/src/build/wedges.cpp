@@ -8,6 +8,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "build/attribute_scales.h"
 #include "build/parallel_array.h"
 #include "build/spatial_order.h"
 #include <unseen/vdtree/internal/parallel.h>
@@ -16,13 +17,6 @@
 namespace unseen::vdtree {
 
 namespace {
-
-// A normal that turns by one radian, a colour that goes from 0 to 1, and a texture that slides by a length on the surface
-// count as these shares of the extent, or of the length. They weigh triangles on which a value changes fast, and say which
-// wedges are alike.
-constexpr float normal_scale = 0.005f;
-constexpr float colour_scale = 0.005f;
-constexpr double texture_scale = 0.3;
 
 // Wedges whose triangles have all vanished by the time that their node was made are drawn in mixed cuts only. They are
 // united with the nearest wedge of their material if it is this near (shares of the extent, by the scales above), or
@@ -35,8 +29,8 @@ constexpr std::size_t most_compared = 64;
 constexpr std::size_t most_classes = 4;
 enum class Kind { normal, uv, colour, further };
 
-// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g and w d. A
-// channel is a lane.
+// What one class has on all triangles at a wedge: for each channel s = g.p + d on a triangle, the sums of w g and w d.
+// A channel is a lane.
 struct Component {
     Double4 x{}, y{}, z{}, d{};
     double weight = 0;
@@ -59,7 +53,8 @@ struct LeafSlopes {
 
 struct Class {
     Kind kind;
-    float scale; // to lengths in the unit box
+    float
+        scale; // to lengths in the unit box: weighs triangles on which a value changes fast, and says which wedges are alike
 };
 
 // A wedge of the node at hand. Its leaves are known by one of them, the root of a union.
@@ -84,8 +79,8 @@ struct WedgeValues {
     std::array<glm::dvec4, most_classes> of;
 };
 
-// States of nodes whose parents are still to come, and the values that have been found. One for each task; what a parent
-// has taken is used again.
+// States of nodes whose parents are still to come, and the values that have been found. One for each task; what a
+// parent has taken is used again.
 struct Workspace {
     // Class by class, of the leaves that hang on the task's nodes: a run of leaves, or, above the parts, these.
     std::vector<LeafSlopes> slopes;
@@ -166,24 +161,14 @@ private:
         unit_places_.resize(shape_.leaves());
         parallel_loop(Index{0}, shape_.leaves(),
                       [&](Index place) { unit_places_[place] = unit_position(interior_ + place); });
-        classes_.push_back({Kind::normal, normal_scale});
-        if (!mesh_.uvs.empty()) classes_.push_back({Kind::uv, static_cast<float>(texture_scale * texture_density())});
-        if (!mesh_.colours.empty()) classes_.push_back({Kind::colour, colour_scale});
-        if (!mesh_.further.empty()) classes_.push_back({Kind::further, 0}); // without a value at proxies
-    }
-
-    // The length in the unit box that one unit of texture coordinates covers, on average; 0 where they cover nothing.
-    double texture_density() const {
-        double surface = 0, texture = 0;
-        for (const Triangle& t : mesh_.triangles) {
-            const glm::dvec3 a = place_of(t[0]), cross = glm::cross(place_of(t[1]) - a, place_of(t[2]) - a);
-            const glm::dvec2 uv(mesh_.uvs[t[0]]), e = glm::dvec2(mesh_.uvs[t[1]]) - uv,
-                                                  f = glm::dvec2(mesh_.uvs[t[2]]) - uv;
-            surface += glm::length(cross);
-            texture += std::abs(e.x * f.y - e.y * f.x);
-        }
-        const double density = std::sqrt(surface / texture);
-        return density > 0 && std::isfinite(density) ? density : 0;
+        const auto add_class = [&](Kind kind, double scale) { classes_.push_back({kind, static_cast<float>(scale)}); };
+        add_class(Kind::normal, normal_scale);
+        if (!mesh_.uvs.empty())
+            add_class(Kind::uv,
+                      texture_scale * texture_density(mesh_.triangles, mesh_.uvs,
+                                                      [&](Index leaf) -> const glm::dvec3& { return place_of(leaf); }));
+        if (!mesh_.colours.empty()) add_class(Kind::colour, colour_scale);
+        if (!mesh_.further.empty()) add_class(Kind::further, 0); // without a value at proxies
     }
 
     Index first_leaf(Index place) const { return mesh_.first_leaf.empty() ? place : mesh_.first_leaf[place]; }

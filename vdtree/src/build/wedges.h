@@ -1,10 +1,10 @@
 // The wedges of all nodes, and what they look like.
 //
 // Two leaves under a node are of one wedge if corners of one triangle join them; a triangle that has vanished joins its
-// corners, too. Within each class of attributes (normals, texture coordinates, colours) wedges that had a value in common
-// at some place go on sharing it, so that a hard edge stays continuous in the texture, and a seam in the normal. The value
-// of a class at a proxy is that of a quadric (Garland and Heckbert 1998; Hoppe 1999): the weighted mean of the linear
-// functions that the class has on its triangles, where the proxy is.
+// corners, too. Within each class of attributes (normals, texture coordinates, colours) wedges that had a value in
+// common at some place go on sharing it, so that a hard edge stays continuous in the texture, and a seam in the normal.
+// The value of a class at a proxy is that of a quadric (Garland and Heckbert 1998; Hoppe 1999): the weighted mean of
+// the linear functions that the class has on its triangles, where the proxy is.
 #pragma once
 
 #include <unseen/vdtree/internal/tree_parts.h>

@@ -31,7 +31,8 @@ struct ChromaRange {
 bool has_chroma(const vdtree::VertexTree& tree);
 
 // By interior node: the chroma of the ring and of the subtree's proxies. Includes the children's. Empty where
-// has_chroma() is false. Cost: one pass over the triangles and the nodes, in parallel; so a tree for which nobody asks pays nothing. Fails where VertexTree::check() does.
+// has_chroma() is false. Cost: one pass over the triangles and the nodes, in parallel; so a tree for which nobody asks
+// pays nothing. Fails where VertexTree::check() does.
 Result<std::vector<ChromaRange>> ring_chroma(const vdtree::VertexTree& tree);
 
 // How a vertex is drawn: its colour scaled to its luminance.
