@@ -51,15 +51,18 @@ bool is_stated(glm::vec3 v) {
 // ---- what is known of faces
 
 struct FaceNormals {
-    ParallelArray<glm::vec3> normals;    // by triangle; unit length; zero: no area
-    ParallelArray<double> least_cosines; // by place: of the angles between its faces with an area and the mean of all
+    ParallelArray<glm::vec3> normals;   // by triangle; unit length; zero: no area
+    ParallelArray<float> least_cosines; // by place: of the angles between its faces with an area and the mean of all
 };
 
 bool has_area(glm::vec3 normal) { return normal != glm::vec3(0); }
 
+// -1: computed normals are turned around.
+float face_sign(const CornerInput& in) { return in.surface.closedness == Closedness::closed_inward ? -1 : 1; }
+
 FaceNormals find_face_normals(const CornerInput& in) {
     FaceNormals out{ParallelArray<glm::vec3>(in.triangles.size(), Unfilled()),
-                    ParallelArray<double>(in.positions.size(), Unfilled())};
+                    ParallelArray<float>(in.positions.size(), Unfilled())};
     const double least_height = in.positions.empty() ? 0 : box_around(in.positions).extent() * lost_height;
     parallel_loop(std::size_t{0}, in.triangles.size(), [&](std::size_t t) {
         const Triangle& corners = in.triangles[t];
@@ -67,17 +70,15 @@ FaceNormals find_face_normals(const CornerInput& in) {
         const auto squared = [](const glm::dvec3& v) { return glm::dot(v, v); };
         const double longest = std::sqrt(std::max({squared(b - a), squared(c - b), squared(a - c)}));
         const FaceVector& face = in.surface.faces[t];
-        out.normals[t] = face.length > longest * least_height ? glm::vec3(unit(face.vector)) : glm::vec3(0);
+        const bool has_area = face.length > longest * least_height && std::isfinite(face.length);
+        out.normals[t] = has_area ? glm::vec3(face.vector * (1 / face.length)) : glm::vec3(0);
     });
     parallel_loop(std::size_t{0}, in.positions.size(), [&](std::size_t place) {
-        const std::span<const Index> corners = in.surface.corners.at(place);
-        glm::dvec3 sum(0);
-        for (const Index corner : corners) sum += in.surface.faces[corner / 3].vector;
-        const glm::dvec3 mean = unit(sum);
-        double least = 1;
-        for (const Index corner : corners) {
-            const glm::vec3 normal = out.normals[corner / 3];
-            if (has_area(normal)) least = std::min(least, glm::dot(glm::dvec3(normal), mean));
+        const glm::vec3 mean = face_sign(in) * in.surface.normals[place];
+        float least = 1;
+        for (const Index corner : in.surface.corners.at(place)) {
+            const glm::vec3& normal = out.normals[corner / 3];
+            if (const float cosine = glm::dot(normal, mean); cosine < least && has_area(normal)) least = cosine;
         }
         out.least_cosines[place] = least;
     });
@@ -276,7 +277,7 @@ EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces) {
         CornerFan fan(in, faces);
         EdgeCounts counts;
         for (std::size_t place = places.begin(); place < places.end(); ++place) {
-            if (faces.least_cosines[place] >= no_edges) continue;
+            if (static_cast<double>(faces.least_cosines[place]) >= no_edges) continue;
             fan.look_at(in.surface.corners.at(place));
             fan.for_each_edge([&](std::span<const EdgeOfCorner> edges, Index neighbour) {
                 if (edges.size() != 2 || neighbour < place || edges[0].follows == edges[1].follows) return;
@@ -382,7 +383,8 @@ public:
         const std::span<const Index> corners = in_.surface.corners.at(place);
         if (corners.empty()) return;
         area += in_.surface.areas[place];
-        const bool is_one = in_.smoothing.empty() && (is_smooth_ || faces_.least_cosines[place] >= within_);
+        const bool is_one =
+            in_.smoothing.empty() && (is_smooth_ || static_cast<double>(faces_.least_cosines[place]) >= within_);
         if (is_one && in_.own.empty()) {
             for (const Index corner : corners) number_[corner] = static_cast<Index>(normals.size());
             normals.push_back(in_.surface.normals[place]);
@@ -400,8 +402,8 @@ public:
             }
             const Index g = is_one ? 0 : groups_.find(static_cast<Index>(i));
             if (first_[g] == none)
-                first_[g] = static_cast<Index>(
-                    different_.number_of(is_one ? in_.surface.normals[place] : face_sign_ * glm::vec3(unit(sums_[g]))));
+                first_[g] = static_cast<Index>(different_.number_of(
+                    is_one ? in_.surface.normals[place] : face_sign(in_) * glm::vec3(unit(sums_[g]))));
             number_[corner] = first_[g];
         }
         if (different_.count() > 1) creased_area += in_.surface.areas[place];
@@ -432,7 +434,6 @@ private:
     DifferentNormals different_{normals};
     const bool is_smooth_;
     const double least_cosine_, within_, flat_ = cosine_of(slack_degrees);
-    const float face_sign_ = in_.surface.closedness == Closedness::closed_inward ? -1 : 1;
     CornerSets groups_;
     std::vector<glm::dvec3> sums_; // by the group's first corner
     std::vector<Index> first_;     // likewise: the number of its normal

@@ -277,18 +277,23 @@ private:
         std::memcpy(errors, &found, sizeof(F));
     }
     template <class F>
-    UNSEEN_INLINE void errors_of_all(std::span<const ClusterPair> pairs, float* errors) const {
+    UNSEEN_INLINE void errors_of_all(std::span<const ClusterPair> pairs, const AttributeClasses classes,
+                                     float* errors) const {
         constexpr std::size_t lanes = sizeof(F) / sizeof(float);
         for (std::size_t i = 0; i < pairs.size(); i += lanes) {
             ClusterPair some[lanes];
             float found[lanes];
             const std::size_t count = std::min(lanes, pairs.size() - i);
             for (std::size_t l = 0; l < lanes; ++l) some[l] = pairs[i + std::min(l, count - 1)];
-            if (classes_ == only_normals) errors_of<F>(some, only_normals, found);
-            else if (classes_ == normals_and_uvs) errors_of<F>(some, normals_and_uvs, found);
-            else errors_of<F>(some, classes_, found);
+            errors_of<F>(some, classes, found);
             std::copy_n(found, count, errors + i);
         }
+    }
+    template <class F>
+    UNSEEN_INLINE void errors_of_all(std::span<const ClusterPair> pairs, float* errors) const {
+        if (classes_ == only_normals) errors_of_all<F>(pairs, only_normals, errors);
+        else if (classes_ == normals_and_uvs) errors_of_all<F>(pairs, normals_and_uvs, errors);
+        else errors_of_all<F>(pairs, classes_, errors);
     }
     UNSEEN_AVX2 void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const {
         errors_of_all<Float8>(pairs, errors);

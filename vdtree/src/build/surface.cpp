@@ -64,62 +64,54 @@ std::uint64_t hash(glm::dvec3 p) {
     return mix(bits(p.x) + mix(bits(p.y) + mix(bits(p.z)) * 3) * 5);
 }
 
-// ---- around each position
-
-// The other corners of a triangle at a place: the following and the preceding one.
-struct CornerSides {
-    Index following, preceding;
-};
+// ---- around each place
 
 // Looks at the corners at one place after another.
 class Fan {
 public:
-    bool is_regular(Index place, std::span<const Index> corners, std::span<const Triangle> triangles) {
-        sides_.clear();
-        for (const Index corner : corners) {
-            const Triangle& t = triangles[corner / 3];
-            const Index k = corner % 3;
-            sides_.push_back({t[k == 2 ? 0 : k + 1], t[k == 0 ? 2 : k - 1]});
-        }
-        return is_regular(place, sides_);
-    }
+    explicit Fan(std::span<const Triangle> triangles) : triangles_(triangles) {}
 
-private:
     // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
     // precedes once.
-    bool is_regular(Index place, std::span<const CornerSides> corners) {
+    bool is_regular(Index place, std::span<const Index> corners) {
         const std::uint64_t stamp = std::uint64_t{place} << 32;
-        for (const CornerSides& corner : corners) {
-            std::uint64_t& seen = slot(corner.following);
+        for (const Index corner : corners) {
+            const Index following = at(corner, 1);
+            std::uint64_t& seen = slot(following);
             if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(corners); // seen twice, or two in one slot
-            seen = stamp | corner.following;
+            seen = stamp | following;
         }
-        for (const CornerSides& corner : corners) {
-            std::uint64_t& seen = slot(corner.preceding);
-            if (seen != (stamp | corner.preceding)) return false;
+        for (const Index corner : corners) {
+            const Index preceding = at(corner, 2);
+            std::uint64_t& seen = slot(preceding);
+            if (seen != (stamp | preceding)) return false;
             seen = stamp | nobody; // only once
         }
         return true;
     }
 
+private:
     static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
     static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
 
     std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
 
-    bool is_regular_by_sorting(std::span<const CornerSides> corners) {
+    // The place at a corner's triangle so many corners farther.
+    Index at(Index corner, Index farther) const { return triangles_[corner / 3][(corner % 3 + farther) % 3]; }
+
+    bool is_regular_by_sorting(std::span<const Index> corners) {
         following_.clear();
         preceding_.clear();
-        for (const CornerSides& corner : corners) {
-            following_.push_back(corner.following);
-            preceding_.push_back(corner.preceding);
+        for (const Index corner : corners) {
+            following_.push_back(at(corner, 1));
+            preceding_.push_back(at(corner, 2));
         }
         std::sort(following_.begin(), following_.end());
         std::sort(preceding_.begin(), preceding_.end());
         return following_ == preceding_ && std::adjacent_find(following_.begin(), following_.end()) == following_.end();
     }
 
-    std::vector<CornerSides> sides_;
+    std::span<const Triangle> triangles_;
     std::vector<Index> following_, preceding_;
     // Neighbours in the lower halves, stamped with the place where they were seen; at first with no place's stamp.
     std::vector<std::uint64_t> slots_ = std::vector(std::size_t{1} << slot_bits, ~std::uint64_t{0});
@@ -189,10 +181,10 @@ Surface analyse_surface(const MeshView& mesh) {
                   [&](std::size_t t) { surface.faces[t] = face_vector(mesh, mesh.triangles[t]); });
     surface.corners = CornersByPlace(mesh.triangles, places);
     parallel_loop_over(tbb::blocked_range<std::size_t>(0, places, grain), [&](const auto& range) {
-        Fan fan;
+        Fan fan(mesh.triangles);
         for (std::size_t place = range.begin(); place < range.end(); ++place) {
             const std::span<const Index> corners = surface.corners.at(place);
-            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), corners, mesh.triangles);
+            surface.irregular[place] = !fan.is_regular(static_cast<Index>(place), corners);
             glm::dvec3 sum(0);
             double area = 0;
             for (const Index corner : corners) {

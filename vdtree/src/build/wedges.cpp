@@ -337,7 +337,7 @@ private:
     }
 
     // Where what the classes have on the triangles at a leaf begins; none: the leaf hangs on no node of the task.
-    LeafSlopes* slopes_of(Index leaf, Workspace& space) const {
+    UNSEEN_INLINE LeafSlopes* slopes_of(Index leaf, Workspace& space) const {
         std::size_t at = leaf - space.first_leaf;
         if (space.is_top) {
             const auto found = std::ranges::lower_bound(space.top_leaves, leaf);
