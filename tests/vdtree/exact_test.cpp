@@ -100,12 +100,12 @@ TEST(VerifyExactly, NamesWhatIsWrong) {
         for (auto& b : bounds) b.slabs.hi[3] = static_cast<std::int8_t>(b.slabs.hi[3] - 2);
         g.bounds = std::move(bounds);
     });
-    expect_fault("farther than the displacement", [&](vdtree::TreeGeometry& g) {
+    expect_fault("farther from the proxy than the displacement", [&](vdtree::TreeGeometry& g) {
         auto displacement = copied(tree.displacement());
         displacement.back() *= 0.5f; // of two leaves
         g.displacement = std::move(displacement);
     });
-    expect_fault("a leaf moves farther", [&](vdtree::TreeGeometry& g) {
+    expect_fault("a triangle's plane is farther", [&](vdtree::TreeGeometry& g) {
         auto displacement = copied(tree.displacement());
         displacement[0] = std::nanf("");
         g.displacement = std::move(displacement);

@@ -8,6 +8,7 @@
 #include <CGAL/Exact_rational.h>
 
 #include <unseen/vdtree/internal/normal_mask.h>
+#include <unseen/vdtree/internal/triangle_plane.h>
 
 namespace unseen::exact {
 
@@ -31,6 +32,11 @@ constexpr double cell_margin = 1e-5;
 constexpr double sure_angle = 1e-8;
 
 constexpr int slab_units = 127; // of NormalSlabs in 1
+
+// Of a distance from a plane, as a share of the way to a point on it: vdtree::plane_normal()'s rounding.
+constexpr double plane_rounding = 0x1p-24;
+
+constexpr Index most_leaves_measured = 4096; // of a node: verify()'s
 
 Rational exactly(float value) { return Rational(static_cast<double>(value)); }
 
@@ -156,10 +162,6 @@ private:
             expect(contains(support, s.centre, s.radius), "a child's support sphere sticks out.");
             expect(contains(ring, r.centre, r.radius), "a child's ring sphere sticks out.");
         });
-        const Sphere reach{proxy, tree_.displacement()[node]};
-        for (Index leaf = tree_.first_leaf()[node]; leaf < tree_.leaf_end()[node]; ++leaf)
-            expect(contains(reach, tree_.positions()[tree_.wedge_of_leaf(leaf)], 0),
-                   "a leaf moves farther than the displacement.");
     }
 
     // At the lowest node that moves a corner; nesting carries it to the nodes above.
@@ -170,6 +172,7 @@ private:
             expect(contains(tree_.bounding_sphere(), corners[k], 0), "the bounding sphere does not contain a corner.");
         }
         Normal normal(corners);
+        check_displacements(t, corners, normal);
         for (const Index leaf : tree_.triangles()[t]) {
             NodeId node = tree_.parents()[tree_.place_of_leaf(leaf)];
             while (node != vdtree::no_node && tree_.support_spheres()[node].radius == 0) node = tree_.parents()[node];
@@ -182,6 +185,30 @@ private:
                    "its normal is outside of the slabs of a corner's parent.");
             expect(is_near(tree_.mask(node), normal), "its normal is missing in the mask of a corner's parent.");
         }
+    }
+
+    // In the nodes above its corners that have few leaves, as verify() does.
+    void check_displacements(Index t, const std::array<glm::vec3, 3>& corners, Normal& normal) {
+        const glm::dvec3 a(corners[0]), unit = vdtree::plane_normal(a, glm::dvec3(corners[1]), glm::dvec3(corners[2]));
+        if (unit == glm::dvec3(0)) return; // too thin to have a plane
+        for (std::size_t k = 0; k < 3; ++k)
+            for (NodeId node = tree_.parents()[tree_.place_of_leaf(tree_.triangles()[t][k])];
+                 node != vdtree::no_node && tree_.leaf_end()[node] - tree_.first_leaf()[node] <= most_leaves_measured;
+                 node = tree_.parents()[node]) {
+                ++done_.comparisons;
+                const glm::dvec3 way = glm::dvec3(tree_.position(node)) - glm::dvec3(corners[k]);
+                const float most = tree_.displacement()[node];
+                if (std::abs(glm::dot(unit, way)) + plane_rounding * glm::length(way) <= static_cast<double>(most))
+                    continue;
+                ++done_.in_rationals;
+                expect(std::isfinite(most) && is_off_by(normal.exact(), corners[k], tree_.position(node), most),
+                       "a triangle's plane is farther from the proxy than the displacement.");
+            }
+    }
+    // At most by so much from the plane.
+    static bool is_off_by(const Vector& normal, glm::vec3 on_plane, glm::vec3 point, float most) {
+        const Rational off = dot(normal, minus(exactly(point), exactly(on_plane))), distance = exactly(most);
+        return off * off <= distance * distance * dot(normal, normal);
     }
 
     // Whether lo / 127 <= normal . axis / (|normal| |axis|) <= hi / 127 along all axes.

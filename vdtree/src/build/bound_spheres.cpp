@@ -10,12 +10,6 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Displacements of nodes with more leaves than this are bounded through their children's: looking for the farthest of
-// very many leaves again in each of their ancestors would cost the square of their number where trees are deep.
-constexpr Index most_measured_leaves = 4096;
-// So many leaves are looked at one by one sooner than their nodes.
-constexpr Index few_leaves = 12;
-
 // Share of the radius: spheres that stick out by less do not move the centre any more. A smaller share would not pay,
 // because the spheres of children add more.
 constexpr double node_slack = 1e-3;
@@ -99,73 +93,6 @@ private:
     std::size_t lanes_ = 0;
 };
 
-class DisplacementWorker {
-public:
-    DisplacementWorker(const BoundInput& input, std::span<const Sphere> support, std::span<float> out)
-        : in_(input), support_(support), out_(out) {}
-
-    void operator()(NodeId node) {
-        proxy_ = in_.position(node);
-        farthest_ = 0;
-        const TreeShape& shape = in_.shape;
-        shape.for_each_child(
-            node, [&](NodeId child) { farthest_ = std::max(farthest_, static_cast<double>(out_[child])); },
-            [](Index) {});
-        if (shape.leaf_end[node] - shape.first_leaf[node] <= most_measured_leaves) {
-            measure(node);
-        } else {
-            shape.for_each_child(
-                node, [&](NodeId child) { farthest_ = std::max(farthest_, bound(child)); },
-                [&](Index leaf) { measure_leaf(leaf); });
-        }
-        out_[node] = round_up(farthest_);
-    }
-
-private:
-    void measure_leaf(Index leaf) { farthest_ = std::max(farthest_, glm::distance(proxy_, in_.leaf_position(leaf))); }
-
-    // No leaf under the node is farther from the proxy.
-    double bound(NodeId node) const {
-        return std::min(glm::distance(proxy_, in_.position(node)) + out_[node],
-                        glm::distance(proxy_, glm::dvec3(support_[node].centre)) + support_[node].radius);
-    }
-
-    // Looks where a farther leaf may be, likely places first.
-    void measure(NodeId node) {
-        const TreeShape& shape = in_.shape;
-        if (shape.leaf_end[node] - shape.first_leaf[node] <= few_leaves) {
-            for (Index leaf = shape.first_leaf[node]; leaf < shape.leaf_end[node]; ++leaf) measure_leaf(leaf);
-            return;
-        }
-        NodeId likely = no_node;
-        double most = farthest_;
-        shape.for_each_child(
-            node,
-            [&](NodeId child) {
-                const double reach = bound(child);
-                if (reach > most) {
-                    most = reach;
-                    likely = child;
-                }
-            },
-            [&](Index leaf) { measure_leaf(leaf); });
-        if (likely == no_node) return;
-        measure(likely);
-        shape.for_each_child(
-            node,
-            [&](NodeId child) {
-                if (child != likely && bound(child) > farthest_) measure(child);
-            },
-            [](Index) {});
-    }
-
-    const BoundInput& in_;
-    std::span<const Sphere> support_;
-    std::span<float> out_;
-    glm::dvec3 proxy_;
-    double farthest_;
-};
-
 } // namespace
 
 NodeSpheres bound_spheres(const BoundInput& input) {
@@ -182,12 +109,6 @@ Sphere bound_corners(const BoundInput& input) {
     for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf)
         if (!input.rings.around(leaf).empty()) corners.push_back(input.leaf_position(leaf));
     return round_outward(smallest_sphere(corners));
-}
-
-std::vector<float> bound_displacements(const BoundInput& input, std::span<const Sphere> support) {
-    std::vector<float> displacement(input.shape.interior());
-    input.parts.bottom_up([&] { return DisplacementWorker(input, support, displacement); });
-    return displacement;
 }
 
 } // namespace unseen::vdtree

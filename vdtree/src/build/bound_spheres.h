@@ -1,4 +1,4 @@
-// Spheres around what each node supports and what surrounds it, and how far its leaves are from its proxy.
+// Spheres around what each node supports and what surrounds it.
 #pragma once
 
 #include "tree/leaf_rings.h"
@@ -25,9 +25,5 @@ NodeSpheres bound_spheres(const BoundInput& input);
 
 // Around the corners of all triangles.
 Sphere bound_corners(const BoundInput& input);
-
-// By interior node: the largest distance of a supported leaf from the proxy, and never less than a child's. Exact but
-// for rounding up, except in nodes with very many leaves, which are bounded through their children.
-std::vector<float> bound_displacements(const BoundInput& input, std::span<const Sphere> support);
 
 } // namespace unseen::vdtree

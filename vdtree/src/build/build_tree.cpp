@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <tbb/global_control.h>
 
+#include "build/bound_displacements.h"
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
 #include "build/leaves.h"
@@ -314,7 +315,7 @@ private:
 
         NodeSpheres spheres = bound_spheres(input);
         g_->bounding_sphere = bound_corners(input);
-        g_->displacement = bound_displacements(input, spheres.support);
+        g_->displacement = bound_displacements(input, order_.triangles, irregular, spheres.support);
         const ParallelArray<Directions> facing =
             bound_facing(input, order_.triangles, irregular, spheres.support, ancestors);
         g_->support_spheres = std::move(spheres.support);

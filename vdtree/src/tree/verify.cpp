@@ -5,6 +5,7 @@
 
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/triangle_plane.h>
 
 namespace unseen::vdtree {
 
@@ -41,6 +42,7 @@ public:
                                                                 "."};
         for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
             check_rings(g_.triangles[t]);
+            check_displacements(g_.triangles[t]);
             check_wedges(g_.triangles[t]);
             if (!fault_.empty())
                 return Error{ErrorCode::malformed_data, "Triangle " + std::to_string(t) + ": " + fault_};
@@ -59,12 +61,6 @@ private:
         expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
         for (WedgeId w = tree_.first_wedge(node); w < tree_.wedge_end(node); ++w) check_wedge(node, w);
-        const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
-        for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
-            const glm::vec3 p = g_.positions[tree_.wedge_of_leaf(leaf)];
-            expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
-                   "a leaf moves farther than the displacement.");
-        }
     }
 
     void check_wedge(NodeId node, WedgeId w) {
@@ -116,6 +112,19 @@ private:
             expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]),
                    "a child's texture sticks out.");
         });
+    }
+
+    // That no node above a corner has its proxy farther from the triangle's plane.
+    void check_displacements(const Triangle& t) {
+        std::array<glm::dvec3, 3> at;
+        for (std::size_t k = 0; k < 3; ++k) at[k] = glm::dvec3(g_.positions[tree_.wedge_of_leaf(t[k])]);
+        const glm::dvec3 normal = plane_normal(at[0], at[1], at[2]);
+        for (std::size_t k = 0; k < 3; ++k)
+            for (NodeId node = g_.parents[tree_.place_of_leaf(t[k])];
+                 node != no_node && g_.leaf_end[node] - g_.first_leaf[node] <= most_leaves_measured;
+                 node = g_.parents[node])
+                expect(std::abs(glm::dot(normal, glm::dvec3(tree_.position(node)) - at[k])) <= g_.displacement[node],
+                       "a triangle's plane is farther from the proxy than the displacement.");
     }
 
     // That the lowest node which moves a corner knows the whole triangle; nesting carries it to the nodes above.

@@ -90,8 +90,9 @@ Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterio
 // if the eye is inside the sphere.
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
 
-// Vertex displacement: folds if no supported vertex moves by more than this many pixels, seen from the nearest point of
-// the support's sphere. Unfolds if the eye is inside the sphere, except where nothing moves.
+// Displacement of the surface (VertexTree::displacement()): folds if the surface moves by at most this many pixels, seen
+// from the nearest point of the support's sphere: from the original to the cut, and back. Sliding within the surface does
+// not count, nor what it does to textures. Unfolds if the eye is inside the sphere.
 Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
 
 // ---- viewpoints

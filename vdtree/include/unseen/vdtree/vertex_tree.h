@@ -353,7 +353,10 @@ public:
     std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
     std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance; empty without one
     std::span<const Unorm16> adaptation_luminance() const noexcept;  // middle of ring_luminance, saturated up the tree
-    std::span<const float> displacement() const noexcept; // largest distance of a supported place from the proxy
+    // How far the surface moves when the node folds, mesh units: bounds the distance from it to the original surface and
+    // back, in cuts without turned triangles (Cut::unfold_turned()). Vertices that slide in the surface, along its edges
+    // or its borders do not count.
+    std::span<const float> displacement() const noexcept;
 
     // The input: by leaf its first vertex, by triangle its number, and its ranges (groups, materials). The last two are
     // empty if the input had no ranges.
@@ -454,8 +457,8 @@ private:
     explicit SoundTree(VertexTree tree) : VertexTree(std::move(tree)) {}
 };
 
-// Checks what the tree promises, except for attributes: spheres, slabs, intervals and displacements (of a node's first
-// 4096 leaves) contain what they should and nest, and triangles vanish at their nodes. The error names the first offender.
+// Checks what the tree promises, except for attributes: spheres, slabs, intervals and displacements (of nodes with up
+// to 4096 leaves) contain what they should and nest, and triangles vanish at their nodes. The error names the first offender.
 // Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 

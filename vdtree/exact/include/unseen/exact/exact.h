@@ -16,7 +16,7 @@ struct Verification {
 // Checks in rational numbers, without slack, what vdtree::verify() checks in doubles with a slack of 1e-14:
 //   Each support sphere contains the proxy, the leaves and its children's spheres. Each ring sphere contains the proxy, its
 //   children's spheres, and the corners of all triangles at its leaves. The bounding sphere contains all corners.
-//   No leaf (verify() checks the first 4096) is farther from the proxy than the displacement.
+//   No plane of these triangles is farther from the proxy than the displacement, in nodes of up to 4096 leaves.
 //   Slabs contain the normals of these triangles; masks have a cell within 1e-5 of each, which vdtree::facing() allows for.
 // verify() already checks all other promises exactly, because they compare stored numbers; call it first. The error names
 // the first offender. Cost: leaves times depth, some 20 ns each; a microsecond for each comparison in rationals.

@@ -42,7 +42,7 @@ struct Tradeoff {
     double measuring_s = 0;                 // of the errors of folds, before all points; next to 0 where they are kept
 };
 
-// The largest distance between a vertex of the full model and the vertex that replaces it in the cuts, world units.
+// How far the surfaces of the cuts may be from those of the full models, world units: VertexTree::displacement().
 double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts);
 
 // Measures the most informative points first: the full model, the default test at several thresholds, the others,
