@@ -2,6 +2,8 @@
 #include <unseen/perception/fold_measurement.h>
 
 #include <ctime>
+#include <iostream>
+#include <map>
 #include <numbers>
 
 #include <unseen/perception/criterion.h>
@@ -187,6 +189,58 @@ Mesh disc(int spokes, double height) {
 }
 
 // Spokes are neighbours, however many meet at the hub; what lies over them is not.
+// By default, from nearby: also where the neighbours, folded, turn triangles over that lie in the same plane.
+Index kept_by_default(const Mesh& mesh) {
+    const VertexTree tree = support::measured(support::built(mesh));
+    const Sphere ball = tree.bounding_sphere();
+    const View view = frame_sphere(tree.origin() + glm::dvec3(ball.centre), ball.radius,
+                                   glm::normalize(glm::dvec3(1, 2, 3)), 0.9, {});
+    const auto criterion = require(error_distances(tree, view, {}));
+    Cut cut(tree);
+    EXPECT_TRUE(cut.follow(*criterion, {.eye = eye_in_tree(tree, view, {})}));
+    cut.unfold_turned();
+    return cut.triangle_count();
+}
+
+// A plate n x n x 1 squares, with a square hole through its middle where asked.
+Mesh plate(int n, bool has_hole) {
+    Mesh mesh;
+    std::map<std::tuple<int, int, int>, Index> known;
+    const auto at = [&](glm::ivec3 p) {
+        const auto [found, is_new] = known.try_emplace({p.x, p.y, p.z}, static_cast<Index>(mesh.positions.size()));
+        if (is_new) mesh.positions.emplace_back(p);
+        return found->second;
+    };
+    const auto is_solid = [&](int x, int y) {
+        const bool is_in_hole = 3 * x >= n && 3 * x < 2 * n && 3 * y >= n && 3 * y < 2 * n;
+        return x >= 0 && x < n && y >= 0 && y < n && !(has_hole && is_in_hole);
+    };
+    const auto square = [&](glm::ivec3 p, glm::ivec3 u, glm::ivec3 v) {
+        mesh.triangles.push_back({at(p), at(p + u), at(p + u + v)});
+        mesh.triangles.push_back({at(p), at(p + u + v), at(p + v)});
+    };
+    const glm::ivec3 x1(1, 0, 0), y1(0, 1, 0), z1(0, 0, 1);
+    for (int x = 0; x < n; ++x)
+        for (int y = 0; y < n; ++y) {
+            if (!is_solid(x, y)) continue;
+            square({x, y, 1}, x1, y1), square({x, y, 0}, y1, x1);
+            if (!is_solid(x - 1, y)) square({x, y, 0}, z1, y1);
+            if (!is_solid(x + 1, y)) square({x + 1, y, 0}, y1, z1);
+            if (!is_solid(x, y - 1)) square({x, y, 0}, x1, z1);
+            if (!is_solid(x, y + 1)) square({x, y + 1, 0}, z1, x1);
+        }
+    return mesh;
+}
+
+TEST(Planes, FoldByDefault) {
+    const Index cube = kept_by_default(shapes::cube(24)), whole = kept_by_default(plate(48, false)),
+                pierced = kept_by_default(plate(48, true));
+    std::cout << "cube " << cube << ", plate " << whole << ", with a hole " << pierced << '\n';
+    EXPECT_LE(cube, 32u);     // 12 of 6,912 would do
+    EXPECT_LE(whole, 48u);    // 12 of 9,600
+    EXPECT_LE(pierced, 160u); // 32 of 8,576
+}
+
 TEST(Contacts, AreFoundAroundHubs) {
     const auto contacts_of = [](const Mesh& mesh) {
         const VertexTree tree = support::built(mesh);

@@ -14,6 +14,7 @@ using namespace vdtree;
 using namespace measurement;
 
 constexpr Index none = 0xffffffffu;
+constexpr float least_beside = 1e-4f;  // share of the width: a hundred times the rounding of distances
 constexpr Index leaves_of_part = 4096; // of a subtree that one task measures
 
 // Measures every fold of trees that are the same except for their luminances. These decide which neighbours are folded
@@ -179,14 +180,23 @@ private:
         scratch.aside = tree_.has_seams() ? seam_width * width : 0.0f;
         if constexpr (is_textured) texture_->look_at(node, crossing_[node], width, scratch.texture);
         Difference worst;
-        const Difference mean = compare_surfaces(scratch, worst);
+        Difference mean = compare_surfaces(scratch, worst);
+        FoldRecord drawn;
+        const bool is_shown = draw(node, scratch, width, drawn, records);
+        raise(record.shift, drawn.shift);
+        if (worst.distance > least_beside * width && worst.distance > beside_the_ring * drawn.shift) {
+            add_surroundings(
+                tree_, std::span<const Point>(points_), node, crossing_[node], stand_in,
+                [&](NodeId place) { return mesh_.around(place - interior_); }, ring);
+            worst = {};
+            mean = compare_surfaces(scratch, worst);
+        }
         raise(record.farthest, worst.distance), raise(record.mean_distance, mean.distance);
         raise(record.extent, extent);
         raise(record.border, border_.shift(node, crossing_[node], stand_in));
         for (std::size_t i = 0; i < luminances; ++i)
             raise(records[i].largest_luminance, worst.luminance[i]),
                 raise(records[i].mean_luminance, mean.luminance[i]);
-        const bool is_shown = draw(node, scratch, width, record, records);
         facing.is_height_field &= is_shown;
         if constexpr (is_textured) {
             if (!is_shown || tree_.bounds()[node].ring.radius > factors::longest_ring * width)
@@ -208,8 +218,8 @@ private:
 
     // Raises the worst errors to those between the surfaces; returns the mean ones.
     Difference compare_surfaces(Scratch& scratch, Difference& worst) {
-        scratch.before_surface.assign(scratch.ring.before);
-        scratch.after_surface.assign(scratch.ring.after);
+        scratch.before_surface.assign(scratch.ring.before, scratch.ring.around);
+        scratch.after_surface.assign(scratch.ring.after, scratch.ring.around);
         Mean over_leaves, over_before, over_after;
         scratch.points.clear();
         for (const Sample& sample : scratch.samples) scratch.points.add(sample.point, sample.sheet);
@@ -231,8 +241,8 @@ private:
                                   are_equal(scratch.ring.after, scratch.ring.fine_after));
         if (scratch.compares_fine) {
             Mean over_fine_before, over_fine_after;
-            scratch.before_surface.assign(scratch.ring.fine_before);
-            scratch.after_surface.assign(scratch.ring.fine_after);
+            scratch.before_surface.assign(scratch.ring.fine_before, scratch.ring.fine_around);
+            scratch.after_surface.assign(scratch.ring.fine_after, scratch.ring.fine_around);
             compare(scratch.ring.fine_before, scratch.after_surface, scratch, worst, over_fine_before);
             compare(scratch.ring.fine_after, scratch.before_surface, scratch, worst, over_fine_after);
             mean.include(over_fine_before.value());

@@ -12,7 +12,7 @@
 
 namespace unseen::perception::measurement {
 
-inline constexpr int revision = 3; // one more where the same settings give other numbers
+inline constexpr int revision = 4; // one more where the same settings give other numbers
 
 // ---- points
 // Leaves of a node for its parent: the worst in distance, the worst in luminance.
@@ -20,6 +20,11 @@ inline constexpr std::size_t witness_count = 4;
 inline constexpr std::uint32_t spread_count = 8;          // leaves compared besides, at equal steps through the support
 inline constexpr std::size_t triangles_compared = 16;     // of each surface, at equal steps
 inline constexpr std::uint32_t most_wedges_compared = 16; // of a child: poles have as many as triangles
+// Points this many times farther than heights change lie beside the ring, where a triangle is turned over: then the
+// triangles around count, too. A cone's tip is 1.3 times as far as the mean.
+inline constexpr float beside_the_ring = 4;
+inline constexpr std::uint32_t most_leaves_around = 4096; // of neighbours whose triangles may be looked at
+inline constexpr unsigned no_sheet = 0xffff;              // of triangles around a ring
 // A share of the width that a fold changes. Surfaces whose distances from a point differ by less meet at a seam, and the
 // point's own side counts. Some hundred times what rounding makes of distances.
 inline constexpr float seam_width = 1e-3f;
@@ -89,6 +94,8 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        spread_count,
                                                        triangles_compared,
                                                        most_wedges_compared,
+                                                       beside_the_ring,
+                                                       most_leaves_around,
                                                        seam_width,
                                                        most_fine_triangles,
                                                        much_more,

@@ -75,8 +75,12 @@ class Surface {
 public:
     using Block = typename ComparedPoints<count>::Block;
 
-    void assign(std::span<const RingTriangle<count>> ring) {
+    void assign(std::span<const RingTriangle<count>> ring, std::span<const RingTriangle<count>> around = {}) {
         triangles_.clear();
+        add(ring);
+        add(around);
+    }
+    void add(std::span<const RingTriangle<count>> ring) {
         for (const auto& [corner, inside, sheet] : ring) {
             std::size_t first = 0;
             Products products(corner, first);
@@ -313,7 +317,8 @@ private:
 template <std::size_t channels>
 struct Ring {
     std::vector<RingTriangle<channels>> before, after, fine_before, fine_after;
-    std::vector<vdtree::NodeId> shown; // corners of the crossing triangles, folded
+    std::vector<RingTriangle<channels>> around, fine_around; // see add_surroundings()
+    std::vector<vdtree::NodeId> shown;                       // corners of the crossing triangles, folded
     struct Child {
         vdtree::Index first_leaf;
         vdtree::NodeId node;
@@ -321,7 +326,7 @@ struct Ring {
     std::vector<Child> children;
 
     void clear() {
-        for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
+        for (auto* surface : {&before, &after, &fine_before, &fine_after, &around, &fine_around}) surface->clear();
         shown.clear();
         children.clear();
     }
@@ -395,6 +400,70 @@ NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<ch
         if (are_distinct(shown)) add(ring.after, after);
     }
     return turned;
+}
+
+// Adds to a ring that was laid out the triangles next to it, which the fold leaves alone: where one of the ring's is turned
+// over, the ring lies over these. `triangles_at`: those at a place. None where the neighbours have too many leaves.
+template <std::size_t channels, class StandIn, class TrianglesAt>
+void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<channels>> points, vdtree::NodeId node,
+                      std::span<const vdtree::Index> crossing, const StandIn& stand_in, const TrianglesAt& triangles_at,
+                      Ring<channels>& ring) {
+    using vdtree::Index, vdtree::NodeId;
+    const std::span<const vdtree::Triangle> triangles = tree.triangles();
+    const Index begin = tree.first_leaf()[node], end = tree.leaf_end()[node];
+    std::vector<NodeId> neighbours, places; // with and without folds
+    std::size_t count = 0;
+    const auto keep_once = [](auto& values) {
+        std::ranges::sort(values);
+        const auto again = std::ranges::unique(values);
+        values.erase(again.begin(), again.end());
+    };
+    for (const NodeId shown : ring.shown)
+        if (shown != node) neighbours.push_back(shown);
+    keep_once(neighbours);
+    for (const NodeId neighbour : neighbours)
+        count += tree.is_place(neighbour) ? 1 : tree.leaf_end()[neighbour] - tree.first_leaf()[neighbour];
+    if (count > measurement::most_leaves_around) return;
+    for (const Index t : crossing)
+        for (const Index leaf : triangles[t])
+            if (leaf - begin >= end - begin) places.push_back(tree.place_of_leaf(leaf));
+    keep_once(places);
+    const auto add = [&](std::vector<Index>& found, const auto& node_of, std::vector<RingTriangle<channels>>& to) {
+        keep_once(found);
+        for (const Index t : found) {
+            RingTriangle<channels> triangle;
+            std::array<NodeId, 3> nodes;
+            bool is_of_ring = false;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const Index leaf = triangles[t][k];
+                is_of_ring |= leaf - begin < end - begin;
+                if (is_of_ring) break;
+                nodes[k] = node_of(leaf);
+                triangle.corner[k] = points[tree.wedge_at(nodes[k], leaf)];
+            }
+            triangle.sheet = measurement::no_sheet;
+            if (!is_of_ring && are_distinct(nodes)) to.push_back(triangle);
+        }
+    };
+    std::vector<Index> found;
+    const auto find_at = [&](NodeId place) {
+        const std::span<const Index> at = triangles_at(place);
+        found.insert(found.end(), at.begin(), at.end());
+    };
+    for (const NodeId neighbour : neighbours) {
+        if (tree.is_place(neighbour)) {
+            find_at(neighbour);
+            continue;
+        }
+        for (Index leaf = tree.first_leaf()[neighbour]; leaf < tree.leaf_end()[neighbour]; ++leaf)
+            if (leaf == tree.first_leaf()[neighbour] || tree.place_of_leaf(leaf) != tree.place_of_leaf(leaf - 1))
+                find_at(tree.place_of_leaf(leaf));
+    }
+    add(found, stand_in, ring.around);
+    found.clear();
+    for (const NodeId place : places) find_at(place);
+    add(
+        found, [&](Index leaf) { return tree.place_of_leaf(leaf); }, ring.fine_around);
 }
 
 // The mean distance of the ring's other corners from the proxy.
