@@ -119,6 +119,7 @@ Mesh with_document(Mesh mesh) {
 void make_trees(const fs::path& folder) {
     const std::pair<const char*, Mesh> meshes[] = {{"ball", shapes::bumpy_sphere(1)},
                                                    {"open", shapes::grid(4)},
+                                                   {"locked", shapes::placed(shapes::grid(4), 0.1, {0.3, 1, 2})},
                                                    {"triangle", shapes::single_triangle()},
                                                    {"attributes", shapes::with_attributes(shapes::icosphere(1))},
                                                    {"document", with_document(shapes::icosphere(1))},
@@ -127,7 +128,8 @@ void make_trees(const fs::path& folder) {
                                                    {"box_document", with_document(shapes::cube(2))},
                                                    {"box_values", with_values(shapes::cube(2))}};
     for (const auto& [name, mesh] : meshes) {
-        const auto tree = build_tree(mesh.view());
+        const bool is_locked = std::string_view(name) == "locked";
+        const auto tree = build_tree(mesh.view(), {.border_weight = is_locked ? never_folds : 1});
         if (!tree) throw std::runtime_error(tree.error().message);
         expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
         const auto marked = tree->with_attribute("mark", AttributeDomain::interior_node,

@@ -55,9 +55,11 @@ public:
 
     // The first fault, or nothing.
     std::string run() {
+        const ClustererKind clusterer = in_.below(2) ? ClustererKind::octree : ClustererKind::quadric;
+        const float border_weights[] = {1, 4, never_folds};
         auto tree =
             build_tree(make_mesh().view(),
-                       {.clusterer = in_.below(2) ? ClustererKind::octree : ClustererKind::quadric, .threads = 1});
+                       {.clusterer = clusterer, .border_weight = border_weights[in_.below(3)], .threads = 1});
         if (!tree) return "no tree: " + tree.error().message;
         tree_.emplace(std::move(*tree));
         cut_.emplace(*tree_);
@@ -65,6 +67,7 @@ public:
         for (int step = 0; step < most_steps && !in_.empty(); ++step) {
             std::string fault = take_step();
             if (fault.empty()) fault = fault_in_cut(*cut_);
+            if (fault.empty() && tree_->is_locked() && !cut_->is_unfolded(VertexTree::root())) fault = "a lock broke";
             if (fault.empty() && in_.below(2) && triangles_of(cut_->indices()) != gathered(*cut_))
                 fault = "the index buffer is not the cut's";
             if (!fault.empty()) return "step " + std::to_string(step) + ": " + fault;
@@ -251,7 +254,7 @@ private:
         if (in_.below(3) == 0) options.hysteresis = static_cast<float>(in_.between(1, 2));
         const auto stats = cut_->follow(*criterion_, viewpoint, options);
         if (!stats) return "refused: " + stats.error().message;
-        if (stats->triangles > *options.triangle_budget || stats->triangles != cut_->triangle_count())
+        if (stats->triangles > std::max(*options.triangle_budget, tree_->locked_triangles()) || stats->triangles != cut_->triangle_count())
             return "the budget was exceeded";
         if (options.hysteresis > 1) return {};
         Cut fresh(*tree_);

@@ -191,6 +191,38 @@ TEST(DamagedWedges, OfOtherLengthsAreRefused) {
         }
 }
 
+// Weights of folds and the places that never fold: looked at when the file is opened.
+TEST(DamagedProtection, IsRefusedOrLeadsNobodyOutOfBounds) {
+    const support::TempFolder folder;
+    const auto file = folder / "tree.vdt";
+    Mesh mesh = shapes::grid(4);
+    for (glm::dvec3& p : mesh.positions) p += 0.1;
+    mesh.weights.assign(mesh.positions.size(), 2);
+    ASSERT_TRUE(write_tree(file, built(mesh, {.border_weight = never_folds})));
+    const TreeFile honest = TreeFile::parse(support::read_bytes(file));
+    const auto is_refused = [&](const TreeFile& damaged) {
+        support::write_bytes(file, damaged.bytes());
+        const auto read = read_tree(file), mapped = map_tree(file);
+        EXPECT_EQ(read.has_value(), mapped.has_value());
+        return !read || !support::use_everything(*read) || !support::use_everything(*mapped);
+    };
+    ASSERT_FALSE(is_refused(honest));
+    for (std::size_t i = 0; i < TreeFile(honest)["fold_weights"].count(); ++i)
+        for (const float now : {0.0f, -1.0f, 1e9f, std::numeric_limits<float>::quiet_NaN(), 3.0f}) {
+            TreeFile damaged = honest;
+            damaged["fold_weights"].set(i, now);
+            EXPECT_EQ(is_refused(damaged), i > 1 || now != 3.0f) << i << ": " << now;
+        }
+    for (const char* section : {"fold_weights", "locked_positions"}) {
+        TreeFile damaged = honest;
+        damaged[section].data.resize(2 * damaged[section].element_bytes);
+        EXPECT_EQ(is_refused(damaged), section == std::string("fold_weights"));
+    }
+    TreeFile damaged = honest;
+    damaged["locked_positions"].set(1, std::numeric_limits<double>::infinity());
+    EXPECT_TRUE(is_refused(damaged));
+}
+
 // What passes costs nothing more, and is what was written.
 TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
     const auto tree = require(mapped(honest()));

@@ -191,6 +191,7 @@ std::vector<std::string> written_endings() {
 
 ReadResult finish_reading(const MeshSource& source, ReadResult result) {
     settle_bad_parts(source, result);
+    if (result.source_vertices == 0) result.source_vertices = result.mesh.positions.size();
     // Before the checks: they would accept a mesh without triangles.
     if (result.mesh.triangles.empty()) fail("it holds no triangles; give a file with faces.");
     if (const Result<void> valid = validate(result.mesh.view()); !valid) throw Fault{valid.error().message};

@@ -469,6 +469,7 @@ private:
 
     void split_vertices() {
         Mesh& mesh = result_.mesh;
+        result_.source_vertices = mesh.positions.size();
         VertexTable table(mesh.positions.size(), uvs_, normals_);
         for (std::size_t i = 0; i < triangle_corners_.size(); ++i)
             mesh.triangles[i / 3][i % 3] = table.find(triangle_corners_[i]);

@@ -13,6 +13,7 @@
 #include "build/order_nodes.h"
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
+#include "build/protection.h"
 #include "build/spatial_order.h"
 #include "build/surface.h"
 #include "build/wedges.h"
@@ -241,6 +242,7 @@ private:
         prelit_ = options_.prelit && (!source_.colours.empty() || is_textured());
         surface_ = analyse_surface(places_->mesh());
         places_->find_leaves(surface_, options_.crease);
+        weights_ = place_weights(*places_, source_, surface_.corners, options_.border_weight);
         surface_.corners = {};
         surface_.faces = {};
         uvs_ = select(source_.uvs, places_->sources());
@@ -250,6 +252,9 @@ private:
     // What clusterers see. By place, normals and luminances are the means of the leaves there.
     Result<Clustering> with_cluster_input(const Clusterer& clusterer) const {
         const std::size_t places = places_->mesh().positions.size();
+        constexpr std::ptrdiff_t fewest = 2; // places that may fold
+        if (!weights_.empty() && std::ranges::count_if(weights_, may_fold) < fewest)
+            return Clustering{std::vector<Index>(places + 1, static_cast<Index>(places)), {}};
         std::vector<float> leaf_luminance(places_->leaf_count()), luminance(places);
         parallel_loop(std::size_t{0}, leaf_luminance.size(), [&](std::size_t leaf) {
             leaf_luminance[leaf] =
@@ -276,13 +281,14 @@ private:
         const LeafView leaves{
             places_->triangles(), places_->places(),       leaf_luminance, places_->normals(), colours_, uvs_,
             places_->materials(), !source_.normals.empty()};
-        return clusterer(ClusterInput{places_->mesh(), luminance, normals, surface_.areas, leaves});
+        return clusterer(ClusterInput{places_->mesh(), luminance, normals, surface_.areas, leaves, weights_});
     }
 
     Result<Clustering> cluster(const Clusterer& clusterer) const {
         Result<Clustering> clustering = with_cluster_input(clusterer);
         if (clustering)
             if (const auto valid = check(*clustering, places_->mesh().positions.size()); !valid) return valid.error();
+        if (clustering && !std::ranges::all_of(weights_, may_fold)) return with_locked_apart(*clustering, weights_);
         return clustering;
     }
 
@@ -295,6 +301,9 @@ private:
         positions_ =
             place_proxies(nodes_.shape, *parts_, {mesh.positions, surface_.areas, nodes_.leaf_of_vertex, g_->origin},
                           {clustering.positions, nodes_.node_of_cluster});
+        g_->fold_weights = fold_weights(nodes_, weights_);
+        g_->locked_positions = locked_positions(nodes_, weights_, mesh.positions, g_->origin);
+        release(weights_);
         release(surface_.areas); // bounding is what takes most memory
         release(surface_.normals);
         release(nodes_.node_of_cluster);
@@ -434,6 +443,7 @@ private:
 
     bool prelit_ = false;
     Surface surface_;
+    std::vector<float> weights_; // by place; empty: 1 for all
     std::vector<glm::vec2> uvs_; // by leaf, as the next
     std::vector<glm::vec4> colours_;
     NodeOrder nodes_;
@@ -453,6 +463,8 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
     if (const auto valid = check_attributes(mesh); !valid) return valid.error();
     if (const auto valid = check(options.light); !valid) return valid.error();
     if (const auto valid = check_crease(options.crease); !valid) return valid.error();
+    if (!is_fold_weight(options.border_weight))
+        return invalid_argument("The weight of borders must be from 1 to 1000, or infinite: they never fold.");
     if (options.threads < 0 || options.threads_alone < 0)
         return invalid_argument("The number of threads must be 0 or more.");
     return {};

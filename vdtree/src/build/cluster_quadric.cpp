@@ -17,6 +17,7 @@
 
 #include "build/attribute_scales.h"
 #include "build/progress_counter.h"
+#include "build/protection.h"
 #include "build/quadric.h"
 #include "build/quadric_contraction.h"
 #include "build/spatial_order.h"
@@ -46,6 +47,7 @@ Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
 // Places ("slots") in an order in which every part is a range, and the leaves in the order of their slots.
 struct SpatialNumbering {
     std::size_t parts = 1;            // a power of two
+    Index folding = 0;                // slots that the parts have; then come places that never fold, in no part
     std::vector<Index> place_of_slot; // vertex of the mesh
     std::vector<Index> first_leaf;    // by slot, one longer: into `leaves`
     std::vector<Index> leaves;        // by number in the order: the input's leaf
@@ -134,10 +136,10 @@ Error strange_message() {
 }
 
 // Each member has put its own slots in order: all get those of all, by way of member 0.
-Result<void> share_slots(std::vector<Index>& slots, const Members& members) {
+Result<void> share_slots(std::span<Index> slots, const Members& members) {
     const auto own_slots = [&](std::size_t member) {
         const Index begin = part_begin(members.first_part(member), members.parts, slots.size());
-        return std::span(slots).subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) -
+        return slots.subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) -
                                                    begin);
     };
     const auto receive = [&](std::size_t member, std::span<Index> to) {
@@ -154,7 +156,7 @@ Result<void> share_slots(std::vector<Index>& slots, const Members& members) {
     for (std::size_t member = 1; member < members.count(); ++member)
         if (!receive(member, own_slots(member))) return strange_message();
     for (std::size_t member = 1; member < members.count(); ++member)
-        members.team->send(static_cast<int>(member), std::as_bytes(std::span(slots)));
+        members.team->send(static_cast<int>(member), std::as_bytes(slots));
     return {};
 }
 
@@ -165,6 +167,11 @@ std::size_t part_count(std::size_t slots) {
     return parts;
 }
 
+Index folding_places(const ClusterInput& input) {
+    const auto all = static_cast<Index>(input.mesh.positions.size());
+    return input.weights.empty() ? all : static_cast<Index>(std::ranges::count_if(input.weights, may_fold));
+}
+
 Result<SpatialNumbering> number_by_space(const ClusterInput& input, const Members& members) {
     SpatialNumbering n;
     n.parts = members.parts;
@@ -172,10 +179,14 @@ Result<SpatialNumbering> number_by_space(const ClusterInput& input, const Member
     const Index slots = static_cast<Index>(input.mesh.positions.size()), leaves = static_cast<Index>(places.size());
     n.place_of_slot.resize(slots);
     std::iota(n.place_of_slot.begin(), n.place_of_slot.end(), Index{0});
-    KdPartition(input.mesh.positions, n.place_of_slot, n.parts)
+    n.folding = folding_places(input);
+    if (n.folding < slots)
+        std::ranges::stable_partition(n.place_of_slot, [&](Index place) { return may_fold(input.weights[place]); });
+    const std::span<Index> folding = std::span(n.place_of_slot).first(n.folding);
+    KdPartition(input.mesh.positions, folding, n.parts)
         .run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
     if (members.count() > 1)
-        if (const auto shared = share_slots(n.place_of_slot, members); !shared) return shared.error();
+        if (const auto shared = share_slots(folding, members); !shared) return shared.error();
 
     n.first_leaf.assign(slots + 1, 0);
     n.leaves.resize(leaves);
@@ -277,9 +288,10 @@ private:
         };
         for (Index s = first_slot; s < first_slot + out.own_slots; ++s) {
             push_position(s);
+            if (!input_.weights.empty()) out.weights.push_back(input_.weights[numbering_.place_of_slot[s]]);
             for (Index i = numbering_.first_leaf[s]; i < numbering_.first_leaf[s + 1]; ++i) push_leaf(i);
         }
-        Index last_slot = static_cast<Index>(slots());
+        Index last_slot = static_cast<Index>(input_.mesh.positions.size());
         for (const Index number : out.ghost_leaves) {
             const Index slot = static_cast<Index>(
                 std::upper_bound(numbering_.first_leaf.begin(), numbering_.first_leaf.end(), number) -
@@ -292,7 +304,7 @@ private:
     void list_triangles() {
         const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
         first_triangle_.assign(parts + 1, 0);
-        std::vector<Index> part_of(input_.mesh.positions.size());
+        std::vector<Index> part_of(input_.mesh.positions.size(), static_cast<Index>(parts));
         parallel_loop(std::size_t{0}, parts, [&](std::size_t part) {
             const Index end = part_begin(part + 1, parts, slots());
             for (Index s = part_begin(part, parts, slots()); s < end; ++s)
@@ -302,9 +314,9 @@ private:
             for (std::size_t t = 0; t < count; ++t) {
                 const Triangle& tri = input_.mesh.triangles[t];
                 const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
-                f(t, a);
-                if (b != a) f(t, b);
-                if (c != a && c != b) f(t, c);
+                if (a < parts) f(t, a);
+                if (b != a && b < parts) f(t, b);
+                if (c != a && c != b && c < parts) f(t, c);
             }
         };
         for_each_use([&](std::size_t, Index part) { ++first_triangle_[part + 1]; });
@@ -327,7 +339,7 @@ private:
         for (int k = 0; k < 3; ++k) push(leaves.colours[leaf][k] * colour_scale);
     }
 
-    std::size_t slots() const { return input_.mesh.positions.size(); }
+    std::size_t slots() const { return numbering_.folding; }
 
     const ClusterInput& input_;
     const SpatialNumbering& numbering_;
@@ -480,7 +492,9 @@ public:
             write_level(level);
             level = {};
         }
-        result_.parents.back() = static_cast<Index>(result_.parents.size() - 1);
+        const auto root = static_cast<Index>(result_.parents.size() - 1);
+        result_.parents.back() = root;
+        for (std::size_t s = numbering_.folding; s < places(); ++s) result_.parents[numbering_.place_of_slot[s]] = root;
         for (Index c = 0; c < result_.deviations.size(); ++c)
             raise(result_.parents[places() + c], result_.deviations[c]);
         return std::move(result_);
@@ -550,7 +564,7 @@ private:
 } // namespace
 
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
-    const std::size_t slots = input.mesh.positions.size();
+    const std::size_t slots = folding_places(input);
     const Members members{team, part_count(slots)};
     if (!members.has_part()) return Clustering();
     ProgressCounter counter(progress, (slots - 1) / members.count()); // each counts its own merges

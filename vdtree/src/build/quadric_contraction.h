@@ -41,6 +41,7 @@ struct PartMesh {
     std::size_t uv_class = most_classes, normal_class = most_classes; // which classes these are; most_classes: none
     float normal_scale = 1;                                           // length of the values of a unit normal
     std::vector<Index> materials;                                     // by local leaf; empty: there is only one
+    std::vector<float> weights;      // by own slot, as ClusterInput has them; empty: 1 for all
     std::vector<Triangle> triangles; // over local leaves: every triangle that touches an own one
     double area_scale = 1;           // from areas in the unit box to weights
 };

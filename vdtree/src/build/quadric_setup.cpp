@@ -40,6 +40,7 @@ public:
             result_.outside.push_back({part_.ghost_leaves[i], corner(part_.own_leaves + static_cast<Index>(i))});
         add_triangles();
         find_edges();
+        for (Index s = 0; s < part_.weights.size(); ++s) weigh(s, part_.weights[s] * part_.weights[s]);
         return std::move(result_);
     }
 
@@ -66,6 +67,14 @@ private:
             while (end < part_.own_leaves && slot(end) == slot(leaf)) ++end;
             make_components(leaf, end);
         }
+    }
+
+    // A distance counts as if it were so many times as long; errors are its square.
+    void weigh(Index s, float factor) {
+        for (std::size_t i = 0; i < stride_; ++i) quadric_of(s)[i] *= factor;
+        if (live_.is_simple(s)) return;
+        for (Index k = 0; k < live_.several[s].count; ++k)
+            for (float& value : live_.components[live_.several[s].first + k].block) value *= factor;
     }
 
     // Of the place that has the leaves `first` .. `end` - 1. At first every component has its leaves' value as reference.

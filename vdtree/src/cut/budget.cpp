@@ -48,7 +48,16 @@ public:
 
     // From the roots down; the result of all ways.
     BudgetDecision run() {
-        for (std::uint32_t tree = 0; tree < sources_.size(); ++tree) ask(tree, VertexTree::root(), infinity);
+        for (std::uint32_t number = 0; number < sources_.size(); ++number) {
+            if (!tree(number).is_locked()) {
+                ask(number, VertexTree::root(), infinity);
+                continue;
+            }
+            const Entry root{infinity, infinity, number, VertexTree::root()};
+            triangles_ += triangles_of(root);
+            take(root);
+            ask_children({&root, 1});
+        }
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
         return run_buckets();
     }
@@ -357,7 +366,11 @@ private:
 
 } // namespace
 
-BudgetDecision decide_budget(std::span<const CostSource* const> sources, const BudgetLimits& limits) {
+BudgetDecision decide_budget(std::span<const CostSource* const> sources, const BudgetLimits& given) {
+    BudgetLimits limits = given;
+    std::uint64_t locked = 0; // is there in any cut
+    for (const CostSource* source : sources) locked += source->tree.locked_triangles();
+    limits.triangles = std::max(limits.triangles, locked);
     if (auto decision = Budgeter(sources, limits).run_from_guess()) return std::move(*decision);
     return Budgeter(sources, limits).run();
 }

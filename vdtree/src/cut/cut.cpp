@@ -4,6 +4,7 @@
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/vectors.h>
+#include <unseen/vdtree/internal/vertex_tree_data.h>
 
 #include "cut/budget.h"
 #include "cut/cut_state.h"
@@ -31,7 +32,8 @@ public:
         tests_ += nodes.size();
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             float& cost = found.cost[i];
-            cost = cost >= 0 ? cost : std::numeric_limits<float>::infinity();
+            const bool is_finite = cost >= 0 && !(nodes[i] == VertexTree::root() && tree.is_locked());
+            cost = is_finite ? cost * weight_of(nodes[i]) : std::numeric_limits<float>::infinity();
             found.unfolded[i / 64] |= std::uint64_t{cost > 1} << (i % 64);
         }
         if (found.seen_cost != found.cost) std::copy_n(found.cost, nodes.size(), found.seen_cost);
@@ -39,6 +41,8 @@ public:
     std::uint64_t tests() const { return tests_; }
 
 private:
+    float weight_of(NodeId node) const { return node < tree.fold_weights().size() ? tree.fold_weights()[node] : 1; }
+
     const FoldCriterion& criterion_;
     mutable std::uint64_t tests_ = 0;
 };
@@ -85,6 +89,19 @@ std::vector<MeshRange> ranges_left(const VertexTree& tree, const std::vector<std
         if (left.triangle_count > 0) ranges.push_back(std::move(left));
     }
     return ranges;
+}
+
+// Places that never fold are where the mesh has them, to the last bit.
+void put_locked(const VertexTree& tree, std::span<const Index> vertex_of_wedge, std::vector<glm::dvec3>& positions) {
+    const auto& locked = tree.data().geometry->locked_positions;
+    std::size_t next = 0;
+    if (!locked.empty())
+        tree.for_each_child(VertexTree::root(), [&](NodeId child) {
+            if (!tree.is_place(child) || next == locked.size()) return;
+            for (WedgeId w = tree.first_wedge(child); w < tree.wedge_end(child); ++w)
+                if (vertex_of_wedge[w] != no_node) positions[vertex_of_wedge[w]] = locked[next];
+            ++next;
+        });
 }
 
 } // namespace
@@ -262,6 +279,7 @@ ExtractedMesh extract_with_sources(const Cut& cut) {
     }
     mesh.positions.reserve(out.wedges.size());
     for (const WedgeId w : out.wedges) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[w]));
+    put_locked(tree, vertex_of_wedge, mesh.positions);
     const auto gather = [&](auto values, auto& to) {
         if (values.empty()) return;
         to.reserve(out.wedges.size());

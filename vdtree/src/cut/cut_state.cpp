@@ -51,7 +51,11 @@ struct CutState::Indices {
 
 CutState::CutState(const VertexTree& tree)
     : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), proxy_(tree.leaf_count(), VertexTree::root()),
-      revision_(first_revision()) {}
+      revision_(first_revision()) {
+    if (!tree.is_locked()) return;
+    set_unfolded(VertexTree::root());
+    for (const NodeId child : children_of(VertexTree::root())) assign(child);
+}
 CutState::~CutState() = default;
 
 AdjustStats CutState::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
@@ -111,7 +115,7 @@ bool CutState::unfold(NodeId node) {
 
 bool CutState::fold(NodeId node) {
     assert(!tree_.is_place(node));
-    if (!test_bit(unfolded_, node)) return false;
+    if (!test_bit(unfolded_, node) || is_locked(node)) return false;
     tree_.for_each_child(node, [&]([[maybe_unused]] NodeId child) { assert(!is_unfolded(child)); });
     make_stale();
     set_folded(node);
@@ -129,6 +133,11 @@ bool CutState::unfold_ancestors(NodeId node) {
 
 bool CutState::fold_subtree(NodeId node) {
     if (tree_.is_place(node) || !test_bit(unfolded_, node)) return false;
+    if (is_locked(node)) {
+        bool changed = false;
+        tree_.for_each_child(node, [&](NodeId child) { changed |= fold_subtree(child); });
+        return changed;
+    }
     make_stale();
     for (NodeId below = node; below < unchecked_links(tree_).subtree_end[node]; ++below)
         if (test_bit(unfolded_, below)) set_folded(below);
@@ -223,6 +232,7 @@ void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
 }
 
 void CutState::apply_unfold(NodeId node, std::span<const NodeId> children) {
+    if (is_locked(node)) return; // it always is
     set_unfolded(node);
     changes_.push_back({node, false});
     for (const NodeId child : children) assign(child);
@@ -230,6 +240,7 @@ void CutState::apply_unfold(NodeId node, std::span<const NodeId> children) {
 }
 
 void CutState::apply_fold(NodeId node, std::span<const NodeId> children) {
+    if (is_locked(node)) return;
     set_folded(node);
     changes_.push_back({node, true});
     if (is_patching()) indices_->buffer.fold(node, children);
@@ -275,6 +286,7 @@ bool CutState::are_few_changes(std::span<const std::uint64_t> unfolded) const {
 }
 
 void CutState::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    if (tree_.is_locked()) set_bit(unfolded, VertexTree::root());
     if (!are_few_changes(unfolded)) return become(std::move(unfolded), stats);
     begin_changes();
     replay(unfolded);
@@ -282,6 +294,7 @@ void CutState::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats
 }
 
 void CutState::change_further(std::vector<std::uint64_t> unfolded) {
+    if (tree_.is_locked()) set_bit(unfolded, VertexTree::root());
     if (are_few_changes(unfolded)) return replay(unfolded);
     const std::vector<FoldChange> before = std::move(changes_);
     AdjustStats ignored; // all changes are counted at the end

@@ -86,6 +86,7 @@ public:
     std::uint64_t byte_size() const noexcept;
 
 private:
+    bool is_locked(NodeId node) const noexcept { return node == VertexTree::root() && tree_.is_locked(); }
     void set_unfolded(NodeId node);
     void set_folded(NodeId node);
     void assign(NodeId node);

@@ -150,8 +150,70 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
 
 } // namespace
 
+namespace {
+
+float radius_of(const VertexTree& tree, const DistanceCriterion::Parts& parts, NodeId node) {
+    return parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring.radius
+                                                             : tree.support_spheres()[node].radius;
+}
+
+// Gives a row of one switch distance and no least cost to some nodes.
+Result<void> give_row(DistanceCriterion::Parts& parts, NodeId nodes, float switch_distance,
+                      std::span<const std::uint64_t> which) {
+    const std::size_t row = parts.switch_distance.size() / parts.eccentricity_bins;
+    if (row > std::numeric_limits<std::uint16_t>::max())
+        return invalid_argument("The criterion has no room for a row more.");
+    parts.classes.resize(nodes); // empty: the first row for all
+    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins, switch_distance);
+    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
+    const auto number = static_cast<std::uint16_t>(row);
+    for (NodeId node = 0; node < nodes; ++node)
+        if (test_bit(which, node)) parts.classes[node] = {number, number};
+    return {};
+}
+
+// See keeping().
+Result<void> keep(const VertexTree& tree, DistanceCriterion::Parts& parts, std::span<const std::uint64_t> kept) {
+    // With lights there are no classes: those that are kept are outlines of the scene's contrast.
+    const NodeId nodes = tree.interior_count();
+    if (!parts.lit)
+        if (const auto given = give_row(parts, nodes, DistanceCriterion::always_visible, kept); !given)
+            return given.error();
+    if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
+    const bool has_lengths = !parts.silhouette_lengths.empty(), has_facing = !parts.facing.empty();
+    for (NodeId node = 0; node < nodes; ++node) {
+        if (!has_lengths) parts.silhouette_lengths.push_back(radius_of(tree, parts, node));
+        if (!has_facing) parts.facing.push_back(tree.bounds()[node].slabs);
+        if (!test_bit(kept, node)) continue;
+        parts.silhouette_lengths[node] = kept_length;
+        parts.facing[node] = NormalSlabs::everything(); // whatever faces the eye
+    }
+    return {};
+}
+
+// Folds of protected nodes count as if they were as many times as large.
+void weigh(const VertexTree& tree, DistanceCriterion::Parts& parts) {
+    const auto weights = tree.fold_weights();
+    if (std::exchange(parts.is_weighted, true) || weights.size() <= 1) return;
+    for (NodeId node = 0; parts.lengths.size() < weights.size(); ++node)
+        parts.lengths.push_back(radius_of(tree, parts, node));
+    constexpr float largest = kept_length / 2; // what is kept anyway stays so; an infinite root is kept besides
+    for (auto* lengths : {&parts.lengths, &parts.silhouette_lengths})
+        for (std::size_t i = 0; i < lengths->size(); ++i)
+            if (float& length = (*lengths)[i]; length > 0 && length < largest)
+                length = std::min(length * weights[i], largest);
+}
+
+} // namespace
+
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
+    weigh(tree, parts);
+    if (tree.is_locked()) {
+        std::vector<std::uint64_t> root(words_for(tree.interior_count()));
+        set_bit(root, VertexTree::root());
+        if (const auto kept = keep(tree, parts, root); !kept) return kept.error();
+    }
     for (float& switch_distance : parts.switch_distance)
         switch_distance = std::clamp(switch_distance, never_visible, always_visible);
     const bool uses_silhouettes = std::any_of(parts.classes.begin(), parts.classes.end(),
@@ -170,21 +232,6 @@ double radians_of_pixels(const View& view, double pixels) { return pixels / pixe
 // One bit a node, for the nodes that the criterion is for.
 bool are_of(const VertexTree& tree, const DistanceCriterion& criterion, std::span<const std::uint64_t> nodes) {
     return criterion.interior_count() == tree.interior_count() && nodes.size() == words_for(tree.interior_count());
-}
-
-// Gives a row of one switch distance and no least cost to some nodes.
-Result<void> give_row(DistanceCriterion::Parts& parts, NodeId nodes, float switch_distance,
-                      std::span<const std::uint64_t> which) {
-    const std::size_t row = parts.switch_distance.size() / parts.eccentricity_bins;
-    if (row > std::numeric_limits<std::uint16_t>::max())
-        return invalid_argument("The criterion has no room for a row more.");
-    parts.classes.resize(nodes); // empty: the first row for all
-    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins, switch_distance);
-    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
-    const auto number = static_cast<std::uint16_t>(row);
-    for (NodeId node = 0; node < nodes; ++node)
-        if (test_bit(which, node)) parts.classes[node] = {number, number};
-    return {};
 }
 
 } // namespace
@@ -219,23 +266,7 @@ Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterio
     if (!are_of(tree, criterion, kept))
         return invalid_argument("The criterion, or what is to be kept, is not of this tree.");
     DistanceCriterion::Parts parts = criterion.parts();
-    // With lights there are no classes: those that are kept are outlines of the scene's contrast.
-    const NodeId nodes = tree.interior_count();
-    if (!parts.lit)
-        if (const auto given = give_row(parts, nodes, DistanceCriterion::always_visible, kept); !given)
-            return given.error();
-    if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
-    const bool has_lengths = !parts.silhouette_lengths.empty(), has_facing = !parts.facing.empty();
-    for (NodeId node = 0; node < nodes; ++node) {
-        if (!has_lengths)
-            parts.silhouette_lengths.push_back(parts.spheres == DistanceCriterion::Spheres::ring
-                                                   ? tree.bounds()[node].ring.radius
-                                                   : tree.support_spheres()[node].radius);
-        if (!has_facing) parts.facing.push_back(tree.bounds()[node].slabs);
-        if (!test_bit(kept, node)) continue;
-        parts.silhouette_lengths[node] = kept_length;
-        parts.facing[node] = NormalSlabs::everything(); // whatever faces the eye
-    }
+    if (const auto done = keep(tree, parts, kept); !done) return done.error();
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

@@ -94,12 +94,14 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("mask_at", g.mask_at);
     f("mask_records", g.mask_records);
     f("displacement", g.displacement);
+    f("fold_weights", g.fold_weights);
     f("support_range", l.support_range);
     f("ring_range", l.ring_range);
     f("adaptation", l.adaptation);
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
+    f("locked_positions", g.locked_positions);
     f("document", g.document);
     f("texture", g.texture);
     f("texels", g.texels);
@@ -113,13 +115,17 @@ bool is_of_seams(std::string_view name) {
     return name == "several" || name == "extra_wedges" || name == "further" || name == "leaf_ranks" ||
            name == "wedge_ranks";
 }
-bool is_optional(std::string_view name) { return is_of_texture(name) || is_of_seams(name) || name == "document"; }
+bool is_optional(std::string_view name) {
+    return is_of_texture(name) || is_of_seams(name) || name == "document" || name == "fold_weights" ||
+           name == "locked_positions";
+}
 
 template <class T>
 constexpr std::uint32_t component_bytes() {
     if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
     else if constexpr (std::is_same_v<T, Unorm16> || std::is_same_v<T, PackedRange> || std::is_same_v<T, PackedNormal>)
         return 2;
+    else if constexpr (std::is_same_v<T, glm::dvec3>) return 8;
     else if constexpr (std::is_same_v<T, Texel> || std::is_same_v<T, std::byte>) return 1;
     else return 4; // vectors, spheres and triangles of 4-byte components; of NodeBounds, the sphere
 }
@@ -511,6 +517,7 @@ private:
             {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
         for (const auto& [holds, name] : checks)
             if (!holds) return fail("Section " + std::string(name) + " has the wrong length.");
+        if (const std::string fault = fault_in_fold_weights(g); !fault.empty()) return fail(fault);
         if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
         return {};
     }

@@ -41,13 +41,17 @@ Result<void> validate(const MeshView& mesh) {
     for (const auto& [name, length] : {std::pair("normals", mesh.normals.size()),
                                        {"colours", mesh.colours.size()},
                                        {"UVs", mesh.uvs.size()},
-                                       {"numbers of further values", mesh.further.size()}})
+                                       {"numbers of further values", mesh.further.size()},
+                                       {"weights", mesh.weights.size()}})
         if (length != 0 && length != vertices)
             return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
                            " vertices; give one for each vertex or none.");
     if (!mesh.smoothing.empty() && mesh.smoothing.size() != mesh.triangles.size())
         return invalid("The mesh has " + std::to_string(mesh.smoothing.size()) + " smoothing groups for " +
                        std::to_string(mesh.triangles.size()) + " triangles; give one for each triangle or none.");
+    if (const auto wrong = std::ranges::find_if_not(mesh.weights, is_fold_weight); wrong != mesh.weights.end())
+        return invalid("The weight of vertex " + std::to_string(wrong - mesh.weights.begin()) +
+                       " of the mesh must be from 1 to 1000, or infinite for what never folds.");
     if (Result<void> checked = validate(mesh.texture); !checked) return checked;
     if (!mesh.texture.empty() && mesh.uvs.empty())
         return invalid(

@@ -4,6 +4,7 @@
 
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/tree_shape.h>
+#include <unseen/vdtree/internal/vectors.h>
 
 #include "tree/mask_pool.h"
 
@@ -199,6 +200,19 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
         return "A source vertex is out of range.";
     if (std::ranges::any_of(g.source_triangles, [&](Index t) { return t >= g.triangles.size() + g.dropped_triangles; }))
         return "A source triangle is out of range.";
+    return {};
+}
+
+std::string fault_in_fold_weights(const TreeGeometry& g) {
+    const auto& w = g.fold_weights;
+    if (w.size() > 1 && w.size() != g.first_leaf.size()) return "Section fold_weights has the wrong length.";
+    for (std::size_t node = 0; node < w.size(); ++node) {
+        if (!is_fold_weight(w[node]) || (node > 0 && w[node] == never_folds) ||
+            (node > 0 && !(g.parents[node] < node && w[node] <= w[g.parents[node]])))
+            return "The weight of the folds of node " + std::to_string(node) + " is out of range.";
+    }
+    if (!std::ranges::all_of(g.locked_positions, is_finite<double>))
+        return "Section locked_positions has a value that is not finite.";
     return {};
 }
 

@@ -29,6 +29,9 @@ const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept;
 // in order everywhere nothing that is made of the tree can lead out of bounds then. Cost: one pass over the arrays.
 std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l);
 
+// The same of the sections of protected trees, which are looked at when a file is opened: mapped ones, too.
+std::string fault_in_fold_weights(const TreeGeometry& g);
+
 class NodeChecks {
 public:
     // Checks the arrays of a file, which must stay in place.

@@ -52,10 +52,12 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
                                  std::move(support),
                                  view_of(g.mask_at),
                                  view_of(g.displacement),
+                                 view_of(g.fold_weights),
                                  view_of(g.mask_records),
                                  view_of(g.triangles),
                                  view_of(g.source_triangles),
                                  view_of(g.source_vertices),
+                                 {}, // nobody writes the mesh
                                  view_of(g.document),
                                  view_of(g.texture),
                                  view_of(g.texels),

@@ -229,6 +229,7 @@ VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)
                g.subtree_end},
               g.first_triangle,
               g.triangles};
+    is_locked_ = !g.fold_weights.empty() && std::isinf(g.fold_weights[root()]);
 }
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
@@ -258,6 +259,7 @@ std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
 }
 std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light->adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
+std::span<const float> VertexTree::fold_weights() const noexcept { return data_->geometry->fold_weights; }
 
 std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
 Index VertexTree::source_vertex_count() const noexcept { return data_->geometry->source_vertex_count; }

@@ -45,6 +45,9 @@ struct ClusterInput {
     std::span<const glm::vec3> normals; // unit length or zero
     std::span<const double> areas;      // a third of the area of the triangles around it, mesh units squared
     LeafView leaves;
+    // Factors of what folds cost, see MeshView::weights; empty: 1 for all. What becomes of vertices that never fold
+    // does not matter, for they are taken out of their clusters.
+    std::span<const float> weights = {};
 };
 
 // A clusterer of the caller's own. Called once, on the calling thread. Every vertex must reach the root. Clusters may
@@ -77,6 +80,10 @@ struct BuildOptions {
     // more than 2.5 times as many edges above 30 degrees as above 60. Then no edge is hard if those above 60 degrees
     // are at places with less than 0.5% of the area, as noise of scans is.
     std::optional<float> crease = {};
+    // Like MeshView::weights, for the ends of edges that one triangle has; seams are no such edges. If borders never fold,
+    // meshes that share one still fit each other however each is simplified: positions there stay the mesh's, in double
+    // precision.
+    float border_weight = 1;
     int threads = 0;                  // 0: one for each core. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader dropped; added to the tree's count
     Progress progress = {};

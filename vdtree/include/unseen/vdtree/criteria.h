@@ -50,7 +50,8 @@ public:
         // Under lights, in place of `classes`; switch distances must grow with contrasts and luminances.
         std::shared_ptr<const LitClasses> lit = {};
         std::size_t eccentricity_bins = 1;
-        double bin_degrees = 1; // bin b holds b * bin_degrees up to the next; the last one everything beyond
+        bool is_weighted = false; // the lengths have been multiplied with VertexTree::fold_weights(), as create() does
+        double bin_degrees = 1;   // bin b holds b * bin_degrees up to the next; the last one everything beyond
     };
     // Switch distances of folds that are visible from nowhere, and from everywhere.
     static constexpr float never_visible = -1;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -72,7 +73,15 @@ struct MeshView {
     // By vertex, or empty: a number that vertices share whose values in the document are equal. Others stay apart, so that
     // cuts can be written with these values.
     std::span<const Index> further = {};
+    // By vertex, or empty: what is to be kept more than the rest. A fold counts as if it were so many times as large, from 1
+    // (as usual) to largest_fold_weight; or never_folds: the vertex is in every cut, where it was, and triangles with two
+    // such corners are. Of vertices at one position the largest weight counts.
+    std::span<const float> weights = {};
 };
+inline constexpr float largest_fold_weight = 1000, never_folds = std::numeric_limits<float>::infinity();
+inline bool is_fold_weight(float weight) {
+    return (weight >= 1 && weight <= largest_fold_weight) || weight == never_folds;
+}
 
 // A triangle soup that owns its arrays.
 struct Mesh {
@@ -86,9 +95,11 @@ struct Mesh {
     std::vector<std::byte> document;
     std::vector<Index> smoothing;
     std::vector<Index> further;
+    std::vector<float> weights;
 
     MeshView view() const {
-        return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document, smoothing, further};
+        return {positions,      triangles, normals,   colours, uvs,    ranges,
+                texture.view(), document,  smoothing, further, weights};
     }
 };
 

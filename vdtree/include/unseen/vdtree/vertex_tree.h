@@ -358,6 +358,14 @@ public:
     // or its borders do not count.
     std::span<const float> displacement() const noexcept;
 
+    // Protection, see MeshView::weights and BuildOptions::border_weight. What is multiplied with the cost of a node's fold, at least the children's: by
+    // interior node; one value: the root's, and 1 for all others; empty: 1 for all.
+    std::span<const float> fold_weights() const noexcept;
+    // Whether the root never folds. The places that never fold are among its children: no cut has fewer triangles than
+    // vanish there.
+    bool is_locked() const noexcept { return is_locked_; }
+    Index locked_triangles() const noexcept { return is_locked_ ? links_.triangles_of(root()) : 0; }
+
     // The input: by leaf its first vertex, by triangle its number, and its ranges (groups, materials). The last two are
     // empty if the input had no ranges.
     std::span<const Index> source_vertices() const noexcept;
@@ -427,6 +435,7 @@ private:
 
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
+    bool is_locked_ = false;
     // Views of data_, kept here because they are read node by node.
     struct Links : WedgeLinks<std::span<const NodeId>> {
         std::span<const Index> first_triangle;

@@ -64,6 +64,7 @@ struct Material {
 
 struct ReadResult {
     vdtree::Mesh mesh;
+    std::uint64_t source_vertices = 0;    // vertices of the file: the mesh's first ones, in its order
     std::uint64_t source_faces = 0;       // faces of the file before triangulation
     std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
     std::vector<Message> warnings;        // what was lost or repaired, one sentence each

@@ -64,6 +64,9 @@ struct GeometryArrays : WedgeArrays<Storage> {
     Storage<Sphere> support_spheres;
     Storage<std::uint32_t> mask_at; // into mask_records
     Storage<float> displacement;
+    // What is multiplied with what folds cost, nested; only the root's may be infinite: it never folds. Empty: 1 for all;
+    // one: the root's, and 1 for the others.
+    Storage<float> fold_weights;
 
     Storage<std::uint8_t> mask_records; // see mask_pool.h
 
@@ -72,6 +75,8 @@ struct GeometryArrays : WedgeArrays<Storage> {
     Storage<Index> source_triangles; // empty without ranges
 
     Storage<Index> source_vertices; // by leaf
+    // The mesh's, of the places among the root's children, in their order, if the root never folds and floats round some.
+    Storage<glm::dvec3> locked_positions;
     Storage<std::byte> document;    // MeshView::document
 
     // Textured trees only.
