@@ -40,6 +40,7 @@ constexpr OptionName option_names[] = {
     {"load.without_textures", "--texture none"},
     {"load.prelit", "--prelit"},
     {"load.crease", "--crease"},
+    {"load.protect", "--protect"},
     {"load.as = ", "--as "},
     {"load.unit_metres", "--unit"},
     {"Follower::set_glide()", "--geomorph"},

@@ -37,13 +37,14 @@ using session::Goal;
 using session::name_of;
 
 struct TextureOptions {
-    std::string file;            // instead of the materials'
-    bool is_left_out = false;    // --no-texture
-    meshio::LeftOut drop;        // of glTF files
-    bool skips_bad = false;      // --skip-bad
-    bool is_unwelded = false;    // --no-weld
-    bool is_prelit = false;      // --prelit, of colours as well
-    std::optional<float> crease; // --crease, degrees
+    std::string file;                         // instead of the materials'
+    bool is_left_out = false;                 // --no-texture
+    meshio::LeftOut drop;                     // of glTF files
+    bool skips_bad = false;                   // --skip-bad
+    bool is_unwelded = false;                 // --no-weld
+    bool is_prelit = false;                   // --prelit, of colours as well
+    std::optional<float> crease;              // --crease, degrees
+    std::vector<session::Protection> protect; // --protect and --lock-borders
 };
 
 // What is not given follows from the model and the display, see session/session.h.

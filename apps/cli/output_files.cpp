@@ -76,7 +76,11 @@ Result<void> make_folder(const fs::path& folder) {
 } // namespace
 
 std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display) {
-    return {model, view.setup, view.lights, view.texture.file, display.file, display.observer, display.csf};
+    std::vector<std::string> files = {model,        view.setup,       view.lights, view.texture.file,
+                                      display.file, display.observer, display.csf};
+    for (const session::Protection& protection : view.texture.protect)
+        if (protection.kind == session::Protection::Kind::vertices) files.push_back(protection.name);
+    return files;
 }
 
 Message with_file_name(const Error& error) {

@@ -175,4 +175,27 @@ std::string creases_text(const vdtree::Creases& creases) {
     return "above " + rounded(static_cast<double>(creases.degrees), 4) + " degrees" + why;
 }
 
+namespace {
+
+// The largest weight of what folds at all.
+float largest_fold_weight_of(const vdtree::VertexTree& tree) {
+    float largest = 1;
+    for (const float weight : tree.fold_weights())
+        if (weight < vdtree::never_folds) largest = std::max(largest, weight);
+    return largest;
+}
+
+} // namespace
+
+Json protection_json(const vdtree::VertexTree& tree) {
+    return {{"locked_triangles", tree.locked_triangles()}, {"largest_weight", largest_fold_weight_of(tree)}};
+}
+
+std::string protection_text(const vdtree::VertexTree& tree) {
+    std::string text = tree.is_locked() ? grouped(tree.locked_triangles()) + " triangles never fold" : "";
+    if (const float weight = largest_fold_weight_of(tree); weight > 1)
+        text += (text.empty() ? "" : ", ") + std::string("weights up to ") + rounded(static_cast<double>(weight), 4);
+    return text.empty() ? "nothing" : text;
+}
+
 } // namespace unseen::app

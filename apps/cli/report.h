@@ -72,5 +72,7 @@ std::string texture_text(const vdtree::VertexTree& tree);
 // How normals were found: {"source": "rule", "degrees": 30}; "above 30 degrees, as its edges suggest".
 Json creases_json(const vdtree::Creases& creases);
 std::string creases_text(const vdtree::Creases& creases);
+Json protection_json(const vdtree::VertexTree& tree);
+std::string protection_text(const vdtree::VertexTree& tree);
 
 } // namespace unseen::app

@@ -72,6 +72,7 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
     options.weld = !texture.is_unwelded;
     options.prelit = texture.is_prelit;
     options.crease = texture.crease;
+    options.protect = texture.protect;
     options.messages = terminal_messages();
     options.messages.progress = std::ref(bar);
     return options;

@@ -62,6 +62,24 @@ const std::vector<Rule>& rules() {
     return all;
 }
 
+// "borders", "material=NAME" or a file, each with ":WEIGHT" behind it or not.
+session::Protection protection_of(const std::string& text) {
+    session::Protection protection;
+    const std::size_t colon = text.rfind(':');
+    const auto weight =
+        colon == text.npos ? std::nullopt : number_from<float>(std::string_view(text).substr(colon + 1));
+    if (weight) protection.weight = *weight;
+    if (!vdtree::is_fold_weight(protection.weight))
+        refuse("--protect: the weight of '" + text + "' must be from 1 to 1000; without one nothing of it folds.");
+    const std::string what = weight ? text.substr(0, colon) : text;
+    constexpr std::string_view of_material = "material=";
+    if (what == "borders") return protection;
+    const bool is_material = what.starts_with(of_material);
+    protection.kind = is_material ? session::Protection::Kind::material : session::Protection::Kind::vertices;
+    protection.name = is_material ? what.substr(of_material.size()) : what;
+    return protection;
+}
+
 // What the parser takes for a value of the file: one word for each number of an array.
 std::vector<std::string> words_of(const Json& value) {
     std::vector<std::string> words;
@@ -234,11 +252,26 @@ void Setup::add_files() {
             "where that would facet an organic form)")
         ->type_name("DEGREES|smooth")
         ->group(in_file_alone);
+    group
+        .add_option_function<std::vector<std::string>>(
+            "--protect",
+            [&o](const std::vector<std::string>& all) {
+                for (const std::string& text : all) o.protect.push_back(protection_of(text));
+            },
+            "What to keep more than the rest; may be repeated: 'borders' (--lock-borders), so that parts of a mesh "
+            "which share a border fit each other however they are simplified; the triangles of a material; or the "
+            "vertices of a text file with a number a line for each vertex of the mesh, from 0 (as usual) to 1. With a "
+            "weight, 1 to 1000, folds there count as so many times as large; without one there are none")
+        ->type_name("borders|material=NAME|FILE[:WEIGHT]")
+        ->allow_extra_args(false);
+    group.add_flag_function("--lock-borders", [&o](std::int64_t) { o.protect.emplace_back(); })->group("");
     group.add_flag("--prelit", o.is_prelit,
                    "Colours and images have light baked in (default: they are reflectance, and are lit)");
     mark(group, files);
-    group.add_flag("--skip-bad", o.skips_bad,
-                   "Leave out faces with vertices that are missing, or have NaN or infinite coordinates");
+    group
+        .add_flag("--skip-bad", o.skips_bad,
+                  "Leave out faces with vertices that are missing, or have NaN or infinite coordinates")
+        ->group(in_file_alone);
     mark(group, skip_bad);
     group.add_flag("--no-cache", view_.no_cache,
                    "Build and measure the mesh's tree anew, and do not keep it (default: see 'unseen cache')");

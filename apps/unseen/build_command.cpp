@@ -73,7 +73,8 @@ Json to_json(const vdtree::VertexTree& tree, double seconds, const Json& repair)
             {"fold_errors", perception::has_fold_measurement(tree)},
             {"lit_fold_errors", perception::has_lit_folds(tree)},
             {"texture", texture_json(tree)},
-            {"creases", creases_json(tree.creases())}};
+            {"creases", creases_json(tree.creases())},
+            {"protected", protection_json(tree)}};
 }
 
 void print_details(const vdtree::VertexTree& tree) {
@@ -85,7 +86,8 @@ void print_details(const vdtree::VertexTree& tree) {
                  {"bytes", grouped(tree.byte_size())},
                  {"bytes a triangle", rounded(bytes_per_triangle, 4)},
                  {"texture", texture_text(tree)},
-                 {"hard edges", creases_text(tree.creases())}});
+                 {"hard edges", creases_text(tree.creases())},
+                 {"protected", protection_text(tree)}});
 }
 
 meshio::ReadOptions reading(const BuildArguments& a) {
@@ -101,6 +103,7 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     options.threads = a.threads;
     options.prelit = a.texture.is_prelit;
     options.crease = a.texture.crease;
+    options.border_weight = session::border_weight(a.texture.protect);
     if (team && team->size() > 1) {
         options.team = team;
         options.threads = a.threads > 0 ? a.threads : std::max(1, team->cores() / team->members_on_machine());
@@ -124,7 +127,8 @@ Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const
                                         .without_textures = texture.is_left_out,
                                         .drop = texture.drop,
                                         .skip_bad = texture.skips_bad,
-                                        .weld = !texture.is_unwelded},
+                                        .weld = !texture.is_unwelded,
+                                        .protect = texture.protect},
                                        options);
 }
 
@@ -134,6 +138,9 @@ template <class ReadFile>
 Result<meshio::ReadResult> read_source(const BuildArguments& a, ReadFile&& read_file, Repaired& repair) {
     Result<meshio::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
     if (!read) return read.error();
+    if (a.repairs && !read->mesh.weights.empty())
+        return Error{ErrorCode::invalid_argument,
+                     "--repair makes other vertices than those that --protect names: repair the mesh first."};
     if (a.repairs) {
         auto repaired = repair_by_cgal(std::move(read->mesh), a.gap, a.largest_hole);
         if (!repaired) return Error{repaired.error().code, a.mesh + ": " + repaired.error().message};
@@ -307,6 +314,8 @@ Command build_command(CLI::App& app, Setup& setup) {
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
                  "  unseen build part.stl -o part.vdt --crease 45\n"
+                 "  unseen build tile.obj -o tile.vdt --lock-borders\n"
+                 "  unseen build car.glb -o car.vdt --protect material=badge --protect material=glass:4\n"
                  "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
                  "  unseen build parts.stl -o parts.vdt --repair --largest-hole 0.02" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));

@@ -85,8 +85,10 @@ std::uint64_t fingerprint(const vdtree::MeshView& mesh, const vdtree::BuildOptio
     hash.add(mesh.uvs);
     hash.add(mesh.smoothing);
     hash.add(mesh.further);
+    hash.add(mesh.weights);
     hash.add_word(static_cast<std::uint64_t>(options.clusterer));
     hash.add_word(std::bit_cast<std::uint32_t>(options.crease.value_or(-1.0f))); // never negative
+    hash.add_word(std::bit_cast<std::uint32_t>(options.border_weight));
     return hash.value();
 }
 

@@ -180,6 +180,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                    {"prelit", "colours", tree->is_prelit(), text_of_colours(*tree)},
                    {"texture", "texture", texture_json(*tree), texture_text(*tree)},
                    {"creases", "hard edges", creases_json(tree->creases()), creases_text(tree->creases())},
+                   {"protected", "protected", protection_json(*tree), protection_text(*tree)},
                    {"arrays", "", arrays_json(*arrays)},
                    count_of("ranges", "groups and materials", tree->ranges().size())};
     if (a.verify) facts.push_back(is_sound);

@@ -74,6 +74,9 @@ TEST_F(CacheTest, WhatATreeDependsOnBuildsItAnew) {
     for (const char* crease : {"30", "60", "smooth"})
         EXPECT_EQ(origin("plain.obj", {"--crease", crease}), "built") << "an option";
     EXPECT_EQ(origin("plain.obj", {"--crease", "180"}), "cache") << "the same angle";
+    for (const char* what : {"borders", "borders:4", "material=paint", "material=paint:4"})
+        EXPECT_EQ(origin("plain.obj", {"--protect", what}), "built") << "an option";
+    EXPECT_EQ(origin("plain.obj", {"--lock-borders"}), "cache") << "the same option";
     EXPECT_EQ(origin("plain.obj", {"--triangles", "50%"}), "cache") << "not of the tree";
     write_text(path("my paints.mtl"), "newmtl paint\nKd 0.6 0.5 0.5\n");
     EXPECT_EQ(origin("plain.obj"), "built") << "a library";

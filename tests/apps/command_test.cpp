@@ -318,6 +318,25 @@ TEST_F(BuildTest, RefusesCreasesThatAreNoAngleOrComeTooLate) {
                 fails(1, AllOf(HasSubstr("m.vdt is a tree"), HasSubstr("Give --crease with the mesh"))));
 }
 
+TEST_F(BuildTest, RefusesProtectionThatIsNoneOrComesTooLate) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl 'red'\nf 1 2 3\nusemtl blue\nf 1 3 2\n");
+    write_text(path("few.txt"), "1\n0\n");
+    write_text(path("bad.txt"), "1\n0\n1.5\n");
+    const auto build = [&](const std::string& what) {
+        return run({"build", "m.obj", "-o", "m.vdt", "--protect", what});
+    };
+    for (const char* bad : {"borders:0.5", "material=blue:-1", "few.txt:1001", "borders:nan"})
+        EXPECT_THAT(build(bad), fails(2, HasSubstr("must be from 1 to 1000"))) << bad;
+    EXPECT_THAT(build("material=blu"),
+                fails(1, HasSubstr("m.obj: --protect: there is no material 'blu'; there are ''red'', 'blue'.")));
+    EXPECT_THAT(build("nowhere.txt"), fails(1, HasSubstr("'nowhere.txt': there is no such file")));
+    EXPECT_THAT(build(path("few.txt").string()), fails(1, HasSubstr("few.txt has 2 numbers for 3 vertices")));
+    EXPECT_THAT(build(path("bad.txt").string()), fails(1, HasSubstr("bad.txt:3: '1.5' must be a number from 0 to 1")));
+    ASSERT_EQ(build("material=blue").status, 0);
+    EXPECT_THAT(run({"simplify", "m.vdt", "-o", "o.ply", "--lock-borders"}),
+                fails(1, AllOf(HasSubstr("m.vdt is a tree"), HasSubstr("Give --protect with the mesh"))));
+}
+
 TEST_F(BuildTest, SaysWhereHardEdgesComeFrom) {
     const std::string box = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n",
                       faces = "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
@@ -773,7 +792,8 @@ TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
                            "--drop skins",     "--no-weld",
                            "--prelit",         "--skip-bad",
                            "--crease smooth",  "--no-cache",
-                           "--as model"};
+                           "--as model",       "--protect borders",
+                           "--lock-borders"};
     const std::string setup = run({"help", "setup"}).out;
     for (const std::string& verb : verbs) {
         const auto parse = [&](const std::string& more) {
@@ -791,10 +811,12 @@ TEST_F(UsageTest, OptionsOfTheSetupActOrAreRefused) {
             const std::string first =
                 option.substr(option.rfind("--"), option.find(' ', option.rfind("--")) - option.rfind("--"));
             const bool is_field =
-                std::set<std::string>{"--black", "--ambient", "--fill-light", "--no-weld", "--crease"}.contains(first);
-            const std::string shown = first == "--no-shadows"   ? "--shadows"
-                                      : first == "--no-texture" ? "--texture"
-                                                                : first;
+                std::set<std::string>{"--black", "--ambient", "--fill-light", "--no-weld", "--crease", "--skip-bad"}
+                    .contains(first);
+            const std::string shown = first == "--no-shadows"     ? "--shadows"
+                                      : first == "--no-texture"   ? "--texture"
+                                      : first == "--lock-borders" ? "--protect"
+                                                                  : first;
             const std::string named = is_field ? shown.substr(2) : shown;
             if (help.find("\n  " + shown) != std::string::npos) continue; // the verb's own
             const bool acts =

@@ -520,4 +520,64 @@ TEST_F(BoxTest, GetsTheNormalsThatItIsDrawnWith) {
         EXPECT_TRUE(attributes.contains("NORMAL")) << name;
 }
 
+class ProtectTest : public CommandTest {
+protected:
+    static constexpr int n = 24;
+
+    // Hills of n x n squares, the left half of glass; paints.txt marks its vertices.
+    void SetUp() override {
+        CommandTest::SetUp();
+        std::string vertices, glass = "usemtl glass\n", paint = "usemtl paint\n", marks;
+        for (int i = 0; i <= n; ++i)
+            for (int j = 0; j <= n; ++j) {
+                vertices += "v " + std::to_string(j) + ' ' + std::to_string(std::sin(0.7 * i) * std::cos(0.9 * j)) +
+                            ' ' + std::to_string(i) + '\n';
+                marks += j <= n / 2 ? "1\n" : "0\n";
+            }
+        for (int i = 0; i < n; ++i)
+            for (int j = 0; j < n; ++j) {
+                const auto at = [&](int row, int column) { return std::to_string(row * (n + 1) + column + 1) + ' '; };
+                (j < n / 2 ? glass : paint) += "f " + at(i, j) + at(i + 1, j) + at(i + 1, j + 1) + "\nf " + at(i, j) +
+                                               at(i + 1, j + 1) + at(i, j + 1) + '\n';
+            }
+        write_text(path("hills.obj"), vertices + glass + paint);
+        write_text(path("marks.txt"), marks);
+    }
+
+    // How many triangles of glass are left.
+    std::size_t glass(const Words& more, const std::string& triangles = "60%") {
+        Words words = {"simplify", "hills.obj",   "-o", "out.obj", "--triangles",
+                       triangles,  "--direction", "0",  "1",       "1"};
+        words.insert(words.end(), more.begin(), more.end());
+        said_ = succeed(words).err;
+        for (const auto& [name, faces] : read_obj(read_text(path("out.obj"))).faces)
+            if (name.ends_with("glass")) return faces.size();
+        return 0;
+    }
+    std::string said_;
+};
+
+TEST_F(ProtectTest, KeepsMaterialsAndVerticesByTheirWeights) {
+    const std::size_t free = glass({}), twice = glass({"--protect", "material=glass:2"}),
+                      often = glass({"--protect", "material=glass:8"}), all = glass({"--protect", "material=glass"});
+    EXPECT_LT(free, twice);
+    EXPECT_LE(twice, often);
+    EXPECT_EQ(all, 1u * n * n) << "every triangle of it";
+    const std::string marks = path("marks.txt").string();
+    EXPECT_EQ(glass({"--protect", marks}), all);
+    EXPECT_EQ(glass({"--protect", marks + ":2"}), twice);
+    EXPECT_EQ(glass({"--protect", "material=paint:2", "--protect", "material=glass:2"}, "60%"), free) << "all the same";
+}
+
+TEST_F(ProtectTest, SaysWhereTheBudgetCannotBeMet) {
+    EXPECT_EQ(glass({"--protect", "material=glass"}, "50"), 1u * n * n);
+    EXPECT_THAT(said_, HasSubstr("triangles never fold, for --protect says so"));
+    const Outcome info = succeed({"simplify", "hills.obj", "-o", "out.obj", "--triangles", "10", "--lock-borders"});
+    EXPECT_THAT(info.err, HasSubstr(std::to_string(4 * n) + " triangles never fold"));
+    EXPECT_THAT(info.out, HasSubstr("kept 96 of"));
+    succeed({"build", "hills.obj", "-o", "hills.vdt", "--lock-borders"});
+    EXPECT_THAT(succeed({"info", "hills.vdt"}).out, HasSubstr("96 triangles never fold"));
+    EXPECT_THAT(succeed({"lod", "hills.obj", "-o", "hills.glb", "--lock-borders"}).err, Not(HasSubstr("error")));
+}
+
 } // namespace material_command_test

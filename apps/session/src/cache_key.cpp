@@ -12,6 +12,7 @@
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/vdtree/internal/input_file.h>
 #include <unseen/vdtree/internal/names.h>
+#include <unseen/vdtree/internal/number_text.h>
 
 #include "textures.h"
 
@@ -154,8 +155,8 @@ Names names_in(const fs::path& file, std::string_view mesh, const fs::path& sear
 
 } // namespace
 
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit,
-                           const std::optional<float>& crease, bool measures, bool conserves_light) {
+std::string mesh_cache_key(const vdtree::Mesh& mesh, const vdtree::BuildOptions& building, bool measures,
+                           bool conserves_light) {
     Hash hash;
     const auto add_all = [&](const auto& values) {
         hash.add({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0])});
@@ -163,11 +164,12 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
     add_all(std::as_bytes(perception::measurement_settings()));
     const std::uint64_t numbers[] = {revision,
                                      std::endian::native == std::endian::little,
-                                     prelit,
-                                     bits_of(crease),
+                                     building.prelit,
+                                     bits_of(building.crease),
+                                     bits_of(building.border_weight),
                                      measures,
                                      conserves_light,
-                                     dropped_triangles,
+                                     building.dropped_before,
                                      static_cast<std::uint64_t>(mesh.texture.width),
                                      static_cast<std::uint64_t>(mesh.texture.height),
                                      static_cast<std::uint64_t>(mesh.texture.wrap_u),
@@ -176,6 +178,7 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_trian
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     add_all(mesh.positions), add_all(mesh.triangles), add_all(mesh.normals), add_all(mesh.colours), add_all(mesh.uvs);
     add_all(mesh.texture.texels), add_all(mesh.document), add_all(mesh.smoothing), add_all(mesh.further);
+    add_all(mesh.weights);
     for (const vdtree::MeshRange& range : mesh.ranges) {
         const std::uint64_t place[] = {static_cast<std::uint64_t>(range.kind), range.first_triangle,
                                        range.triangle_count};
@@ -213,6 +216,14 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
                                      options.weld};
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     hash.add(file.extension().string());
+    for (const Protection& protection : options.protect) {
+        hash.add(std::to_string(static_cast<int>(protection.kind)) + " " + number_text(protection.weight));
+        hash.add(protection.name);
+        if (protection.kind != Protection::Kind::vertices) continue;
+        const auto weights = read_regular_file(protection.name);
+        if (!weights) return std::nullopt;
+        hash.add(*weights);
+    }
 
     const auto mesh = read_regular_file(file);
     if (!mesh) return std::nullopt;

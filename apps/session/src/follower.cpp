@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "session_state.h"
@@ -60,6 +61,7 @@ public:
         if (!prepared) return prepared.error();
         if (const auto taken = take_up_trees(); !taken) return taken.error();
         const bool folds = request.goal.kind != Goal::Kind::full;
+        tell_of_locks(request.goal);
         if (folds) {
             if (const auto made = make_recipes(*prepared); !made) return made.error();
         } else {
@@ -85,6 +87,13 @@ public:
         }
         report.extract_ms = vdtree::ms_since(adapted);
         return report;
+    }
+
+    // In every cut, whatever the goal.
+    vdtree::Index locked_triangles() const {
+        vdtree::Index sum = 0;
+        for (const Object& object : session_->scene.objects) sum += object.tree.locked_triangles();
+        return sum;
     }
 
     Result<void> set_glide(double seconds) {
@@ -248,7 +257,18 @@ private:
         return {};
     }
 
+    void tell_of_locks(const Goal& goal) {
+        const vdtree::Index locked = locked_triangles();
+        if (goal.kind != Goal::Kind::budget || goal.triangles >= locked || !session_->messages.warning) return;
+        if (std::exchange(has_told_of_locks_, true)) return;
+        session_->messages.warning(
+            Message::of("{} triangles never fold, for {load.protect} says so: that is the least, "
+                        "and more than the {} that are asked for.",
+                        {grouped(locked), grouped(goal.triangles)}));
+    }
+
     std::shared_ptr<Session::State> session_;
+    bool has_told_of_locks_ = false;
     std::vector<Followed> objects_;
     ShadowMemory shadows_;
     std::optional<double> glide_s_;
@@ -280,7 +300,8 @@ Result<Simplification> Session::simplify(const vdtree::View& view, const Request
     for (int tries = 0; request.goal.kind != Goal::Kind::full; ++tries) {
         for (Follower::State::Followed& object : follower.state_->objects()) object.cut->unfold_turned();
         const vdtree::Index triangles = follower.state_->triangle_count();
-        const bool fits = request.goal.kind != Goal::Kind::budget || triangles <= request.goal.triangles;
+        const bool fits = request.goal.kind != Goal::Kind::budget || triangles <= request.goal.triangles ||
+                          request.goal.triangles <= follower.state_->locked_triangles();
         report->stats.triangles = triangles;
         if (fits) break;
         const vdtree::Index excess = triangles - request.goal.triangles;

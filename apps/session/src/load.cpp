@@ -35,6 +35,10 @@ Result<vdtree::VertexTree> as_asked(Result<vdtree::VertexTree> tree, const fs::p
         return invalid_field("{} is a tree: which of its edges are hard was decided when it was built. Give "
                              "{load.crease} with the mesh.",
                              {file.string()});
+    if (tree && !options.protect.empty())
+        return invalid_field("{} is a tree: what of it is protected was decided when it was built. Give {load.protect} "
+                             "with the mesh.",
+                             {file.string()});
     if (tree && options.without_textures && !tree->texture().empty()) return tree->untextured();
     return tree;
 }
@@ -76,6 +80,7 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     building.dropped_before = read->dropped_triangles;
     building.prelit = options.prelit;
     building.crease = options.crease;
+    building.border_weight = border_weight(options.protect);
     auto tree = vdtree::build_tree(read->mesh.view(), building);
     if (!tree) return Error{tree.error().code, file.string() + ": " + tree.error().message};
     if (const Message hint = hint_at_baked_light(*tree); !hint.empty() && options.messages.note)
@@ -189,6 +194,8 @@ Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOp
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
     if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
+    if (const auto found = protect(*read, options.protect); !found)
+        return Error{found.error().code, file.string() + ": " + found.error().message};
     tell(options.messages.warning, file, read->warnings);
     tell(options.messages.note, file, read->notes);
     return read;

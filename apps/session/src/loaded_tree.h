@@ -2,9 +2,11 @@
 #pragma once
 
 #include <optional>
+#include <set>
 
 #include <unseen/perception/internal/lit_folds.h>
 #include <unseen/session/scene.h>
+#include <unseen/vdtree/builder.h>
 
 namespace unseen::session {
 
@@ -59,6 +61,10 @@ Result<vdtree::VertexTree> measured_once(const vdtree::VertexTree& tree, const M
 Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree& tree, const MeasurementPlace* place,
                                                         const Messages& messages, bool takes_long);
 
+// For the meshes of a scene: protect() without the complaint, and the complaint about materials that none of them has.
+Result<void> find_weights(meshio::ReadResult& read, std::span<const Protection> what);
+Result<void> check_protected(const std::set<std::string>& materials, std::span<const Protection> what);
+
 // ---- what a tree is kept under
 
 // A hash of all that the tree of a file depends on: the bytes of the file and of those it refers to (libraries of
@@ -67,8 +73,8 @@ Result<perception::LitFolds> measured_under_lights_once(const vdtree::VertexTree
 std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
 
 // The key of the tree of a mesh that was read, with its texture and document.
-std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit,
-                           const std::optional<float>& crease, bool measures, bool conserves_light);
+std::string mesh_cache_key(const vdtree::Mesh& mesh, const vdtree::BuildOptions& building, bool measures,
+                           bool conserves_light);
 
 // The key of what a tree's folds change under lights, whichever these are. `key`: the tree's.
 std::string lights_key(const std::string& key);

@@ -75,6 +75,8 @@ public:
             work(true);
         }
         if (failure_) return *failure_;
+        if (const auto known = check_protected(materials_, options_.protect); !known)
+            return in_file(name_, known.error());
         tell(vdtree::seconds_since(start));
         return {};
     }
@@ -85,9 +87,13 @@ private:
         if (!read) return read.error();
         if (!*read) return {};
         const bool is_measured = !is_lit_ && part.folds;
-        const std::string key =
-            mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, options_.crease,
-                           is_measured && options_.measures, is_measured && options_.conserves_light);
+        vdtree::BuildOptions building;
+        building.dropped_before = (*read)->dropped_triangles;
+        building.prelit = options_.prelit;
+        building.crease = options_.crease;
+        building.border_weight = border_weight(options_.protect);
+        const std::string key = mesh_cache_key((*read)->mesh, building, is_measured && options_.measures,
+                                               is_measured && options_.conserves_light);
         if (cache_.is_on()) {
             auto kept = cache_.find(key);
             if (!kept) return kept.error();
@@ -98,10 +104,6 @@ private:
                 return {};
             }
         }
-        vdtree::BuildOptions building;
-        building.dropped_before = (*read)->dropped_triangles;
-        building.prelit = options_.prelit;
-        building.crease = options_.crease;
         auto tree = vdtree::build_tree((*read)->mesh.view(), building);
         if (!tree) return in_file(name_, tree.error());
         if (is_measured) tree = measured_as_asked(std::move(*tree), options_, {});
@@ -126,6 +128,9 @@ private:
             return read;
         }
         if (const auto laid = lay_texture(name_, **read, options_); !laid) return laid.error();
+        if (const auto found = find_weights(**read, options_.protect); !found) return in_file(name_, found.error());
+        for (const vdtree::MeshRange& range : (*read)->mesh.ranges)
+            if (range.kind == vdtree::MeshRange::Kind::material) materials_.insert(range.name);
         for (std::string& warning : (*read)->warnings) warnings_.push_back(std::move(warning));
         for (std::string& note : (*read)->notes) notes_.push_back(std::move(note));
         return read;
@@ -172,6 +177,7 @@ private:
     std::atomic<bool> is_over_{false};
     std::optional<Error> failure_;
     std::vector<Message> warnings_, notes_;
+    std::set<std::string> materials_;
     std::string not_kept_;
     std::size_t built_ = 0, empty_ = 0;
 };
@@ -384,6 +390,11 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
     tell(options.messages.warning, name, contents.warnings);
     tell(options.messages.note, name, contents.notes);
 
+    for (const Protection& protection : options.protect)
+        if (protection.kind == Protection::Kind::vertices)
+            return in_file(name, invalid_field("{load.protect}: {} is for one mesh, and this is a scene of several: "
+                                               "add {load.as = }model.",
+                                               {protection.name}));
     // The test by errors knows the trees' own light alone.
     const bool is_lit = !options.prelit && (!contents.lights.empty() || layout->turns);
     if (const auto built = Builder(file, name, options, is_lit).build(layout->parts); !built) return built.error();

@@ -82,6 +82,20 @@ private:
 // by the nodes. `automatic`: a scene if meshio::SceneContents::is_scene says so.
 enum class LoadAs { model, scene, automatic };
 
+// What of a mesh is to be kept more than the rest, see vdtree::MeshView::weights.
+struct Protection {
+    // Its borders, the triangles of the material `name`, or vertices as the text file `name` says: a number a line for each
+    // vertex of the mesh's file, in its order, from 0 (as usual) to 1 (by the whole weight).
+    enum class Kind { borders, material, vertices };
+    Kind kind = Kind::borders;
+    std::string name = {};
+    float weight = vdtree::never_folds;
+};
+// Finds the mesh's weights. Fails on materials that it has not, and on files that are missing, malformed, or of other
+// numbers of vertices. Borders are the builder's: border_weight() is its option.
+Result<void> protect(meshio::ReadResult& read, std::span<const Protection> what);
+float border_weight(std::span<const Protection> what);
+
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
     LoadAs as = LoadAs::automatic; // for Scene::load(); trees and files of other formats are models
@@ -94,8 +108,9 @@ struct LoadOptions {
     // The colours and textures of the mesh contain light; they are not reflectance. See vdtree::BuildOptions. For
     // meshes only: tree files know it.
     bool prelit = false;
-    std::optional<float> crease = {}; // degrees, for meshes; see vdtree::BuildOptions
-    double unit_metres = 1;           // world units (metres) in a mesh unit; above 0. For Scene::load()
+    std::optional<float> crease = {};     // degrees, for meshes; see vdtree::BuildOptions
+    std::vector<Protection> protect = {}; // of meshes; in scenes borders and materials
+    double unit_metres = 1;               // world units (metres) in a mesh unit; above 0. For Scene::load()
     // For meshes: measure what folds change (see measured()), if the tree has at most two million folds and the test
     // `error` can handle its texture (perception::knows_texture()).
     bool measures = true;
