@@ -57,9 +57,8 @@ public:
     std::string run() {
         const ClustererKind clusterer = in_.below(2) ? ClustererKind::octree : ClustererKind::quadric;
         const float border_weights[] = {1, 4, never_folds};
-        auto tree =
-            build_tree(make_mesh().view(),
-                       {.clusterer = clusterer, .border_weight = border_weights[in_.below(3)], .threads = 1});
+        auto tree = build_tree(make_mesh().view(),
+                               {.clusterer = clusterer, .border_weight = border_weights[in_.below(3)], .threads = 1});
         if (!tree) return "no tree: " + tree.error().message;
         tree_.emplace(std::move(*tree));
         cut_.emplace(*tree_);
@@ -254,7 +253,8 @@ private:
         if (in_.below(3) == 0) options.hysteresis = static_cast<float>(in_.between(1, 2));
         const auto stats = cut_->follow(*criterion_, viewpoint, options);
         if (!stats) return "refused: " + stats.error().message;
-        if (stats->triangles > std::max(*options.triangle_budget, tree_->locked_triangles()) || stats->triangles != cut_->triangle_count())
+        if (stats->triangles > std::max(*options.triangle_budget, tree_->locked_triangles()) ||
+            stats->triangles != cut_->triangle_count())
             return "the budget was exceeded";
         if (options.hysteresis > 1) return {};
         Cut fresh(*tree_);

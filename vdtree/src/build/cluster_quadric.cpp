@@ -139,8 +139,7 @@ Error strange_message() {
 Result<void> share_slots(std::span<Index> slots, const Members& members) {
     const auto own_slots = [&](std::size_t member) {
         const Index begin = part_begin(members.first_part(member), members.parts, slots.size());
-        return slots.subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) -
-                                                   begin);
+        return slots.subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) - begin);
     };
     const auto receive = [&](std::size_t member, std::span<Index> to) {
         const std::vector<std::byte> bytes = members.team->receive(static_cast<int>(member));

@@ -77,7 +77,7 @@ struct GeometryArrays : WedgeArrays<Storage> {
     Storage<Index> source_vertices; // by leaf
     // The mesh's, of the places among the root's children, in their order, if the root never folds and floats round some.
     Storage<glm::dvec3> locked_positions;
-    Storage<std::byte> document;    // MeshView::document
+    Storage<std::byte> document; // MeshView::document
 
     // Textured trees only.
     Storage<TextureFacts> texture; // one
