@@ -23,8 +23,10 @@ inline constexpr std::uint32_t most_wedges_compared = 16; // of a child: poles h
 // Points this many times farther than heights change lie beside the ring, where a triangle is turned over: then the
 // triangles around count, too. A cone's tip is 1.3 times as far as the mean.
 inline constexpr float beside_the_ring = 4;
-inline constexpr std::uint32_t most_leaves_around = 4096; // of neighbours whose triangles may be looked at
-inline constexpr unsigned no_sheet = 0xffff;              // of triangles around a ring
+// Corners of triangles around that are looked at, at most, and for each leaf of the node: neighbours are about as large as
+// the node, but for hubs.
+inline constexpr std::uint32_t most_around = 1u << 15, around_a_leaf = 2048;
+inline constexpr unsigned no_sheet = 0xffff; // of triangles around a ring
 // A share of the width that a fold changes. Surfaces whose distances from a point differ by less meet at a seam, and the
 // point's own side counts. Some hundred times what rounding makes of distances.
 inline constexpr float seam_width = 1e-3f;
@@ -95,7 +97,8 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        triangles_compared,
                                                        most_wedges_compared,
                                                        beside_the_ring,
-                                                       most_leaves_around,
+                                                       most_around,
+                                                       around_a_leaf,
                                                        seam_width,
                                                        most_fine_triangles,
                                                        much_more,

@@ -403,7 +403,7 @@ NormalReach lay_out(const vdtree::SoundTree& tree, std::span<const LitPointOf<ch
 }
 
 // Adds to a ring that was laid out the triangles next to it, which the fold leaves alone: where one of the ring's is turned
-// over, the ring lies over these. `triangles_at`: those at a place. None where the neighbours have too many leaves.
+// over, the ring lies over these. `triangles_at`: those at a place. None where the neighbours have too many.
 template <std::size_t channels, class StandIn, class TrianglesAt>
 void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<channels>> points, vdtree::NodeId node,
                       std::span<const vdtree::Index> crossing, const StandIn& stand_in, const TrianglesAt& triangles_at,
@@ -421,9 +421,21 @@ void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<
     for (const NodeId shown : ring.shown)
         if (shown != node) neighbours.push_back(shown);
     keep_once(neighbours);
-    for (const NodeId neighbour : neighbours)
-        count += tree.is_place(neighbour) ? 1 : tree.leaf_end()[neighbour] - tree.first_leaf()[neighbour];
-    if (count > measurement::most_leaves_around) return;
+    const std::size_t most =
+        std::min<std::size_t>(measurement::most_around, measurement::around_a_leaf * (end - begin));
+    const auto for_each_place = [&](NodeId neighbour, auto&& use) {
+        if (tree.is_place(neighbour)) return use(neighbour);
+        for (Index leaf = tree.first_leaf()[neighbour]; leaf < tree.leaf_end()[neighbour];) {
+            const NodeId place = tree.place_of_leaf(leaf);
+            use(place);
+            leaf += tree.wedge_end(place) - tree.first_wedge(place);
+            if (count > most) return;
+        }
+    };
+    for (const NodeId neighbour : neighbours) {
+        for_each_place(neighbour, [&](NodeId place) { count += triangles_at(place).size(); });
+        if (count > most) return;
+    }
     for (const Index t : crossing)
         for (const Index leaf : triangles[t])
             if (leaf - begin >= end - begin) places.push_back(tree.place_of_leaf(leaf));
@@ -450,15 +462,7 @@ void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<
         const std::span<const Index> at = triangles_at(place);
         found.insert(found.end(), at.begin(), at.end());
     };
-    for (const NodeId neighbour : neighbours) {
-        if (tree.is_place(neighbour)) {
-            find_at(neighbour);
-            continue;
-        }
-        for (Index leaf = tree.first_leaf()[neighbour]; leaf < tree.leaf_end()[neighbour]; ++leaf)
-            if (leaf == tree.first_leaf()[neighbour] || tree.place_of_leaf(leaf) != tree.place_of_leaf(leaf - 1))
-                find_at(tree.place_of_leaf(leaf));
-    }
+    for (const NodeId neighbour : neighbours) for_each_place(neighbour, find_at);
     add(found, stand_in, ring.around);
     found.clear();
     for (const NodeId place : places) find_at(place);
