@@ -12,6 +12,7 @@
 #include "gl_test.h"
 #include "measured.h"
 #include "shapes.h"
+#include "textures.h"
 
 namespace level_control_test {
 
@@ -106,6 +107,21 @@ TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
     // All of a small mesh is its only level.
     Session small = *Session::create(Scene::of(support::measured(support::built(shapes::cube(1)))));
     EXPECT_EQ(level_chain(small, small.default_view(), {})->size(), 1);
+}
+
+// Of a textured mesh the pictures of few stages tell from how far most folds are seen.
+TEST(LevelChain, MeetsTheTrianglesAskedForThoughFoldsAreSeenFromAsFar) {
+    const vdtree::Mesh mesh = textures::with_seams(textures::textured_sphere(5, textures::noise(512, 512, 5)));
+    Session session = *Session::create(Scene::of(support::measured(support::built(mesh))));
+    const auto recipe = require(session.recipe(session.default_view(), {}));
+    const double all = session.tree().triangle_count();
+    for (const double share : {0.5, 0.3, 0.2, 0.1, 0.05}) {
+        const auto chain = require(LevelChain::by_triangles(
+            session.tree(), *recipe->criterion,
+            {.levels = 2, .most_share = share, .least_share = share, .least_triangles = 1}));
+        ASSERT_EQ(chain->size(), 2) << share;
+        EXPECT_NEAR(chain->triangles(1), share * all, 0.03 * share * all) << share;
+    }
 }
 
 TEST(LevelChain, FoldsThatShowFromNowhereAreALevelThatBeginsAtOnce) {

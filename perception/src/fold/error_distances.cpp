@@ -368,22 +368,49 @@ std::optional<ShownFolds> find_shown(std::span<const LitErrors> as_lit, const Fo
     return shown;
 }
 
+// Nodes of one stage keep the order of what they show themselves: by up to this share they count as seen from farther.
+constexpr float order_in_stage = 1.0f / 1024;
+constexpr float most_octaves = 64; // from the nearest to the farthest that is told apart
+
+// By interior node: from how far its own pattern is seen where one looks, in octaves of the mesh's radius; no less than
+// its children's.
+std::vector<float> octaves_of_distances(const vdtree::SoundTree& tree, const SwitchDistances& switch_distances,
+                                        const ShownFolds& shown) {
+    const float radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
+    std::vector<float> octaves(shown.patches.size(), -most_octaves / 2);
+    for (NodeId node = static_cast<NodeId>(octaves.size()); node-- > 0;) {
+        for (const ShownFold& fold : {shown.patches[node], shown.strips[node]}) {
+            const float distance = switch_distances.switch_distance(fold.row)[0] * fold.length;
+            if (distance > 0)
+                octaves[node] = std::max(octaves[node], std::min(std::log2(distance / radius), most_octaves / 2));
+        }
+        if (node == 0) continue;
+        float& above = octaves[tree.parents()[node]];
+        above = std::max(above, octaves[node]);
+    }
+    return octaves;
+}
+
 // Gives a node its stage's pattern, one of `stages`, where that is seen from no farther than the node's own from
-// anywhere, unless a child would then be seen from farther.
+// anywhere, unless a child would then be seen from farther. `octaves`: by node, what orders the nodes of a stage.
 void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
                     const SwitchDistances& switch_distances, std::span<const ShownFold> stages,
-                    std::span<ShownFold> shown) {
+                    std::span<const float> octaves, std::span<ShownFold> shown) {
+    const auto stage_of = [&](NodeId node) {
+        ShownFold stage = stages[errors[node].stage];
+        stage.length *= 1 + order_in_stage * (octaves[node] / most_octaves + 0.5f);
+        return stage;
+    };
     std::vector<bool> may_take(shown.size(), true);
-    for (std::size_t node = shown.size(); node-- > 0;) {
-        const std::size_t number = errors[node].stage;
-        if (may_take[node] && shortfall(switch_distances, shown[node], stages[number]) <= 1) {
-            shown[node] = stages[number]; // no more than the parent's own, nor its stage
+    for (NodeId node = static_cast<NodeId>(shown.size()); node-- > 0;) {
+        const ShownFold stage = stage_of(node);
+        if (may_take[node] && shortfall(switch_distances, shown[node], stage) <= 1) {
+            shown[node] = stage; // no more than the parent's own, nor its stage
             continue;
         }
         if (node == 0) return;
         const NodeId parent = tree.parents()[node];
-        const std::size_t above = errors[parent].stage;
-        if (!(shortfall(switch_distances, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+        if (!(shortfall(switch_distances, stage_of(parent), shown[node]) <= 1)) may_take[parent] = false;
     }
 }
 
@@ -432,8 +459,9 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
                 switch_distances.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
             stages.push_back({.pattern = {}, .length = object_radius, .row = row});
         }
-        fold_in_stages(tree, errors, switch_distances, stages, shown->patches);
-        fold_in_stages(tree, errors, switch_distances, stages, shown->strips);
+        const std::vector<float> octaves = octaves_of_distances(tree, switch_distances, *shown);
+        fold_in_stages(tree, errors, switch_distances, stages, octaves, shown->patches);
+        fold_in_stages(tree, errors, switch_distances, stages, octaves, shown->strips);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {shown->patches[node].row, shown->strips[node].row};
