@@ -195,7 +195,7 @@ TEST(Chroma, FoldsNothingThatLuminanceKeeps) {
         for (const double distance : {near / 4, near, 4 * near, 20 * near}) {
             const Cut grey = cut_of(tree, distance, {safe, false}), coloured = cut_of(tree, distance, {safe, true});
             for (NodeId node = 0; node < tree.interior_count(); ++node)
-                EXPECT_TRUE(coloured.is_unfolded(node) || !grey.is_unfolded(node));
+                EXPECT_TRUE(coloured.is_wanted(node) || !grey.is_wanted(node));
         }
     }
 }

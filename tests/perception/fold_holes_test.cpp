@@ -409,7 +409,7 @@ TEST(FoldHoles, AShiftThatNobodySeesFolds) {
     scene.build();
     const Cut safe = safe_cut(scene, view_of_screen());
     std::size_t folded = 0;
-    for (const NodeId node : scene.nodes) folded += !safe.is_unfolded(node);
+    for (const NodeId node : scene.nodes) folded += !safe.is_wanted(node);
     EXPECT_GT(folded, scene.nodes.size() * 9 / 10);
     EXPECT_EQ(visible_pixels(safe, view_of_screen()), 0u);
 }
@@ -435,9 +435,9 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
         ASSERT_TRUE(plain.follow(*luebke_hallen_distances(tree, view, options), viewpoint));
         ASSERT_TRUE(safe.follow(*luebke_hallen_safe_distances(tree, rings, view, options), viewpoint));
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
-            kept += plain.is_unfolded(node);
-            more += safe.is_unfolded(node) && !plain.is_unfolded(node);
-            EXPECT_TRUE(safe.is_unfolded(node) || !plain.is_unfolded(node)) << "trial " << trial << " node " << node;
+            kept += plain.is_wanted(node);
+            more += safe.is_wanted(node) && !plain.is_wanted(node);
+            EXPECT_TRUE(safe.is_wanted(node) || !plain.is_wanted(node)) << "trial " << trial << " node " << node;
         }
     }
     EXPECT_GT(kept, 100u);

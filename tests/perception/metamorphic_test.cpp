@@ -56,7 +56,7 @@ std::vector<bool> decisions_at(const VertexTree& tree, const DistanceCriterion& 
     std::vector<bool> all;
     for (const Viewpoint& viewpoint : viewpoints) {
         const auto stats = require(cut.follow(criterion, viewpoint));
-        for (NodeId node = 0; node < tree.interior_count(); ++node) all.push_back(cut.is_unfolded(node));
+        for (NodeId node = 0; node < tree.interior_count(); ++node) all.push_back(cut.is_wanted(node));
     }
     return all;
 }

@@ -198,7 +198,6 @@ Index kept_by_default(const Mesh& mesh) {
     const auto criterion = require(error_distances(tree, view, {}));
     Cut cut(tree);
     EXPECT_TRUE(cut.follow(*criterion, {.eye = eye_in_tree(tree, view, {})}));
-    cut.unfold_turned();
     return cut.triangle_count();
 }
 

@@ -42,7 +42,7 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
             Cut one(tree);
             ASSERT_TRUE(one.follow(*criterion, vdtree::viewpoint_of(tree, eye), follow));
             for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
-                ASSERT_TRUE(both.is_unfolded(node) || !one.is_unfolded(node)) << node;
+                ASSERT_TRUE(both.is_wanted(node) || !one.is_wanted(node)) << node;
             const oracle::Look as_seen{eye, options};
             const perception::Image before = oracle::draw(*renderer, whole, eye),
                                     after = oracle::draw(*renderer, both, eye);

@@ -11,6 +11,7 @@
 
 #include "cut/kernel/fold_tester.h"
 #include "sound.h"
+#include "tree_checks.h"
 
 namespace unseen::support {
 
@@ -29,7 +30,7 @@ inline std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCrit
         unfolded[node] = verdict.unfolded;
         node = verdict.unfolded ? node + 1 : support::sound(tree).subtree_end()[node];
     }
-    return unfolded;
+    return with_needs(tree, std::move(unfolded));
 }
 
 inline std::vector<bool> state_of(const Cut& cut) {

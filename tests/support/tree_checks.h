@@ -50,6 +50,13 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
     };
     using vdtree::TreeGeometry;
     if (differs(&TreeGeometry::extra_wedges)) return "extra_wedges";
+    const auto needing = [](const VertexTree& tree) {
+        const auto& set = tree.data().geometry->needing;
+        return std::span<const vdtree::RankWord>(set.data(), set.size());
+    };
+    if (!same_bytes(needing(a), needing(b))) return "needing";
+    if (differs(&TreeGeometry::first_need)) return "first_need";
+    if (differs(&TreeGeometry::needs)) return "needs";
     if (differs(&TreeGeometry::leaf_ranks)) return "leaf_ranks";
     if (differs(&TreeGeometry::wedge_ranks)) return "wedge_ranks";
     for (NodeId node = 0; node <= a.node_count(); ++node)
@@ -279,14 +286,98 @@ inline std::string fault_in_cut(const Cut& cut) {
     return {};
 }
 
-// The cut as a still or a written mesh has it: without triangles that are turned over, which a flight has no time for.
-inline Cut still_of(const Cut& cut) {
-    Cut still(cut.tree());
-    still.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
-        for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = cut.is_unfolded(nodes[i]) ? 2.0f : 0.0f;
-    });
-    still.unfold_turned();
-    return still;
+// What is unfolded with all that it needs: by the definition, round by round.
+inline std::vector<bool> with_needs(const VertexTree& tree, std::vector<bool> unfolded) {
+    const auto& g = *tree.data().geometry;
+    if (g.needing.empty()) return unfolded;
+    for (bool changed = true; changed;) {
+        changed = false;
+        Index k = 0;
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            if (!vdtree::is_in(g.needing, node)) continue;
+            for (Index i = g.first_need[k]; i < g.first_need[k + 1] && unfolded[node]; ++i)
+                for (NodeId up = g.needs[i] & ~vdtree::joined_need; up != no_node && !unfolded[up]; up = g.parents[up])
+                    unfolded[up] = changed = true;
+            ++k;
+        }
+    }
+    return unfolded;
+}
+
+// By wedge of a textured tree: whether triangles of both orientations in the texture meet at a leaf under it.
+inline std::vector<bool> wedges_on_mirrors(const VertexTree& tree) {
+    std::vector<int> sides(tree.leaf_count(), 0);
+    for (const Triangle& t : sound(tree).triangles()) {
+        glm::dvec2 p[3];
+        for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec2(tree.uvs()[tree.wedge_of_leaf(t[k])]);
+        const glm::dvec2 e = p[1] - p[0], f = p[2] - p[0];
+        const double area = e.x * f.y - e.y * f.x;
+        for (const Index leaf : t) sides[leaf] |= area > 0 ? 1 : area < 0 ? 2 : 0;
+    }
+    std::vector<bool> found(tree.wedge_count(), false);
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf)
+        for (NodeId node = tree.place_of_leaf(leaf); node != no_node && sides[leaf] == 3;
+             node = sound(tree).parents()[node])
+            found[tree.is_place(node) ? tree.wedge_of_leaf(leaf) : tree.wedge_at(node, leaf)] = true;
+    return found;
+}
+
+// The triangles of a cut that face away from where they faced in the mesh, and those that are mirrored in the texture,
+// though none of their corners lies where the texture itself is.
+struct TurnedTriangles {
+    Index in_space = 0, in_texture = 0;
+    bool operator==(const TurnedTriangles&) const = default;
+};
+template <class IsUnfolded>
+TurnedTriangles turned_triangles(const VertexTree& tree, const std::vector<bool>& on_mirror, IsUnfolded&& is_unfolded) {
+    std::vector<NodeId> active(tree.node_count(), no_node); // at or above
+    for (NodeId node = 0; node < tree.node_count(); ++node) {
+        const NodeId parent = sound(tree).parents()[node];
+        if (parent != no_node && active[parent] != no_node) active[node] = active[parent];
+        else if (tree.is_place(node) || !is_unfolded(node)) active[node] = node;
+    }
+    TurnedTriangles found;
+    for (const Triangle& t : sound(tree).triangles()) {
+        Triangle nodes;
+        for (std::size_t k = 0; k < 3; ++k) nodes[k] = active[tree.place_of_leaf(t[k])];
+        if (vdtree::uses_a_vertex_twice(nodes)) continue;
+        glm::dvec3 normals[2];
+        double areas[2] = {}, sines[2] = {};
+        bool is_mirror = false;
+        for (const bool now : {false, true}) {
+            vdtree::WedgeId w[3];
+            for (std::size_t k = 0; k < 3; ++k) w[k] = now ? tree.wedge_at(nodes[k], t[k]) : tree.wedge_of_leaf(t[k]);
+            const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[w[k]]); };
+            normals[now] = glm::cross(at(1) - at(0), at(2) - at(0));
+            if (on_mirror.empty()) continue;
+            for (const vdtree::WedgeId corner : w) is_mirror |= now && on_mirror[corner];
+            const auto uv = [&](std::size_t k) { return glm::dvec2(tree.uvs()[w[k]]); };
+            const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
+            areas[now] = e.x * f.y - e.y * f.x;
+            sines[now] = std::abs(areas[now]) / std::max(glm::length(e) * glm::length(f), 1e-300);
+        }
+        found.in_space += glm::dot(normals[0], normals[1]) < 0;
+        // Thinner ones have no side to speak of.
+        constexpr double least_sine = 1.01e-3;
+        found.in_texture += !is_mirror && areas[0] * areas[1] < 0 && std::min(sines[0], sines[1]) > least_sine;
+    }
+    return found;
+}
+
+// Of a cut that a criterion has made: it unfolds what is wanted and what that needs; no triangle is turned over.
+inline std::string fault_in_needs(const Cut& cut) {
+    const VertexTree& tree = cut.tree();
+    std::vector<bool> wanted(tree.interior_count()), unfolded(tree.interior_count());
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        wanted[node] = cut.is_wanted(node);
+        unfolded[node] = cut.is_unfolded(node);
+    }
+    if (with_needs(tree, wanted) != unfolded) return "it is not what is wanted and what that needs";
+    const auto turned = turned_triangles(tree, tree.uvs().empty() ? std::vector<bool>() : wedges_on_mirrors(tree),
+                                         [&](NodeId node) { return cut.is_unfolded(node); });
+    if (turned == TurnedTriangles()) return {};
+    return std::to_string(turned.in_space) + " triangles are turned over, " + std::to_string(turned.in_texture) +
+           " in the texture";
 }
 
 } // namespace unseen::support

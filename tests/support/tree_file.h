@@ -91,7 +91,7 @@ struct TreeFile {
                 checksums.push_back(xxh3(std::string_view(s.data).substr(at, page_bytes)));
         std::string out(header_bytes + sections.size() * entry_bytes, '\0');
         std::memcpy(out.data(), "UNSEENVT", 8);
-        store(out, version_at, std::uint32_t{6});
+        store(out, version_at, std::uint32_t{7});
         store(out, section_count_at, static_cast<std::uint32_t>(sections.size()));
         store(out, page_count_at, std::uint64_t{checksums.size()});
         for (const std::uint64_t sum : checksums) {

@@ -10,6 +10,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "testing.h"
+#include "tree_checks.h"
 
 namespace unseen::vdtree::criteria_test {
 
@@ -350,15 +351,21 @@ std::vector<bool> best_within(const VertexTree& tree, std::vector<float> costs, 
             if (!unfolded[node] && costs[node] > 0 && (node == 0 || unfolded[parents[node]]) &&
                 (best == no_node || costs[node] > costs[best]))
                 best = node;
-        if (best == no_node || first[best + 1] - first[best] > budget) return unfolded;
-        budget -= first[best + 1] - first[best];
+        if (best == no_node) return unfolded;
         unfolded[best] = true;
+        Index triangles = 0;
+        const std::vector<bool> drawn = support::with_needs(tree, unfolded);
+        for (NodeId node = 0; node < tree.interior_count(); ++node)
+            if (drawn[node]) triangles += first[node + 1] - first[node];
+        if (triangles <= budget) continue;
+        unfolded[best] = false;
+        return unfolded;
     }
 }
 
 std::vector<bool> state_of(const Cut& cut) {
     std::vector<bool> unfolded(cut.tree().interior_count());
-    for (NodeId node = 0; node < unfolded.size(); ++node) unfolded[node] = cut.is_unfolded(node);
+    for (NodeId node = 0; node < unfolded.size(); ++node) unfolded[node] = cut.is_wanted(node);
     return unfolded;
 }
 
@@ -432,7 +439,9 @@ const auto cluster_by_number = [](const ClusterInput& input) {
 };
 
 TEST(InfiniteCosts, UnfoldFirstUnderABudgetAndInTheOrderOfNodes) {
-    const auto made_tree = require(build_tree(shapes::random_soup(128, 300, 3).view(), cluster_by_number));
+    Mesh mesh = shapes::random_soup(128, 300, 3);
+    for (glm::dvec3& p : mesh.positions) p.y = p.z = 0; // triangles of no area cannot turn over
+    const auto made_tree = require(build_tree(mesh.view(), cluster_by_number));
     const VertexTree& tree = *made_tree;
     const Viewpoint viewpoint{.eye = glm::dvec3(tree.bounding_sphere().centre)};
     const auto criterion = require(extent_criterion(tree, View{}, 3));

@@ -216,6 +216,14 @@ void make_noisy_cut(Cut& cut, std::mt19937_64& random) {
     });
 }
 
+glm::dvec3 random_unit_vector(std::mt19937_64& random) {
+    for (;;) {
+        const glm::dvec3 v(shapes::random_between(random, -1, 1), shapes::random_between(random, -1, 1),
+                           shapes::random_between(random, -1, 1));
+        if (glm::length(v) > 0.1 && glm::length(v) <= 1) return glm::normalize(v);
+    }
+}
+
 std::vector<NodeId> nodes_of_wedges(const VertexTree& tree) {
     std::vector<NodeId> nodes(tree.wedge_count());
     for (NodeId node = 0; node < tree.node_count(); ++node)
@@ -259,42 +267,107 @@ TEST(AnyCut, KeepsTheSidesOfSeamsApartAndMaterialsPure) {
     }
 }
 
-TEST(UnfoldTurned, LeavesNoTriangleTurnedOver) {
+// Half of the model as far as it is wanted, the other half coarse.
+void make_half_cut(Cut& cut, std::mt19937_64& random) {
+    const VertexTree& tree = cut.tree();
+    const glm::vec3 side(random_unit_vector(random));
+    const float limit =
+        tree.support_spheres()[0].radius * static_cast<float>(shapes::random_between(random, 0.02, 0.2));
+    cut.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            const Sphere& sphere = tree.support_spheres()[nodes[i]];
+            const bool is_near = glm::dot(sphere.centre - tree.bounding_sphere().centre, side) + sphere.radius > 0;
+            costs[i] = sphere.radius / (is_near ? limit / 8 : limit);
+        }
+    });
+}
+
+// What the repair finds and adds in all of these cuts.
+struct Repair {
+    std::uint64_t turned = 0, wanted = 0, added = 0;
+};
+void check_repair(const Cut& cut, const std::vector<bool>& on_mirror, Repair& sum, const std::string& what) {
+    ASSERT_EQ(support::fault_in_needs(cut), "") << what;
+    const VertexTree& tree = cut.tree();
+    const auto turned = support::turned_triangles(tree, on_mirror, [&](NodeId node) { return cut.is_wanted(node); });
+    sum.turned += turned.in_space + turned.in_texture;
+    const auto first = support::sound(tree).first_triangle();
+    Index wanted = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (cut.is_wanted(node)) wanted += first[node + 1] - first[node];
+    sum.wanted += wanted;
+    sum.added += cut.triangle_count() - wanted;
+}
+
+TEST(AnyCut, HasNoTriangleTurnedOver) {
     std::mt19937_64 random(33);
-    std::uint64_t found = 0;
+    Repair sum;
     for (const AnyMesh& any : any_meshes()) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
             const VertexTree tree = built(any.mesh, kind);
-            const auto turned = [&](const Cut& cut) {
-                std::uint64_t count = 0;
-                for (const Triangle& t : support::sound(tree).triangles()) {
-                    glm::dvec3 now[3], before[3];
-                    NodeId nodes[3];
-                    for (std::size_t k = 0; k < 3; ++k) {
-                        nodes[k] = cut.proxy_of_leaf(t[k]);
-                        now[k] = glm::dvec3(tree.position(nodes[k]));
-                        before[k] = glm::dvec3(tree.position(tree.place_of_leaf(t[k])));
-                    }
-                    if (nodes[0] == nodes[1] || nodes[1] == nodes[2] || nodes[2] == nodes[0]) continue;
-                    count += glm::dot(glm::cross(now[1] - now[0], now[2] - now[0]),
-                                      glm::cross(before[1] - before[0], before[2] - before[0])) < 0;
-                }
-                return count;
-            };
+            const auto on_mirror = tree.uvs().empty() ? std::vector<bool>() : support::wedges_on_mirrors(tree);
             Cut cut(tree);
-            for (int trial = 0; trial < 6; ++trial) {
-                make_noisy_cut(cut, random);
-                const std::uint64_t before = turned(cut);
-                const Index triangles = cut.triangle_count(), unfolded = cut.unfold_turned();
-                found += before;
-                EXPECT_EQ(turned(cut), 0u) << any.name << ", trial " << trial;
-                EXPECT_EQ(unfolded == 0, triangles == cut.triangle_count());
+            for (int trial = 0; trial < 8; ++trial) {
+                if (trial % 2) make_half_cut(cut, random);
+                else make_noisy_cut(cut, random);
+                check_repair(cut, on_mirror, sum, any.name);
                 EXPECT_EQ(support::fault_in_cut(cut), "") << any.name;
-                EXPECT_EQ(cut.unfold_turned(), 0u) << "nothing is left to do";
             }
         }
     }
-    EXPECT_GT(found, 20u) << "of these there are some to find";
+    EXPECT_GT(sum.turned, 20u) << "of these there are some to find";
+    EXPECT_LT(sum.added, sum.wanted / 50);
+}
+
+// In small steps and jumps; by a threshold, budgets, and in time.
+TEST(AnyCut, HasNoTriangleTurnedOverWhereverItIsFollowedTo) {
+    std::mt19937_64 random(34);
+    Repair sum;
+    for (const AnyMesh& any : any_meshes()) {
+        const VertexTree tree = built(any.mesh);
+        const auto on_mirror = tree.uvs().empty() ? std::vector<bool>() : support::wedges_on_mirrors(tree);
+        const DistanceCriterion criterion = *require(extent_criterion(tree, View{}, 12));
+        const Index budget = tree.triangle_count() / 3;
+        for (const FollowOptions& options :
+             {FollowOptions{}, FollowOptions{.triangle_budget = budget},
+              FollowOptions{.triangle_budget = budget, .hysteresis = 1.2f}, FollowOptions{.milliseconds = 0}}) {
+            Cut cut(tree), fresh(tree);
+            const double radius = static_cast<double>(tree.bounding_sphere().radius);
+            glm::dvec3 eye(0, 0, 3 * radius);
+            for (int frame = 0; frame < 24; ++frame) {
+                eye += radius * (frame % 8 == 7 ? 2.0 : 0.05) * glm::dvec3(random_unit_vector(random));
+                ASSERT_TRUE(cut.follow(criterion, {.eye = eye}, options));
+                static_cast<void>(cut.indices());
+                check_repair(cut, on_mirror, sum, any.name);
+                EXPECT_EQ(support::fault_in_cut(cut), "") << any.name << ", frame " << frame;
+                if (options.triangle_budget && !options.milliseconds) EXPECT_LE(cut.triangle_count(), budget);
+                if (options.milliseconds || options.hysteresis > 1) continue;
+                ASSERT_TRUE(fresh.follow(criterion, {.eye = eye}, options));
+                EXPECT_EQ(support::sorted_triangles(cut), support::sorted_triangles(fresh));
+                fresh = Cut(tree);
+            }
+        }
+    }
+    EXPECT_GT(sum.turned, 0u);
+    EXPECT_LT(sum.added, sum.wanted / 50);
+}
+
+// A map that folds over itself: the repair leaves alone what is drawn across the line, and budgets are met.
+TEST(AnyCut, OfAMirroredMapNeedsHardlyMore) {
+    std::mt19937_64 random(35);
+    const VertexTree tree = built(textures::textured_sphere(5, textures::checkerboard(16, 16, 4, 0, 255)));
+    const auto on_mirror = support::wedges_on_mirrors(tree);
+    Repair sum;
+    Cut cut(tree);
+    for (int trial = 0; trial < 8; ++trial) {
+        make_noisy_cut(cut, random);
+        check_repair(cut, on_mirror, sum, "noisy");
+        const std::vector<float> costs(tree.interior_count(), 2.0f);
+        const Index budget = tree.triangle_count() >> (trial + 1);
+        EXPECT_LE(cut.adjust(look_up(costs), budget).triangles, budget);
+        EXPECT_GT(cut.triangle_count(), budget * 9 / 10);
+    }
+    EXPECT_LT(sum.added, sum.wanted / 100);
 }
 
 TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {
@@ -311,8 +384,8 @@ TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {
             float largest = 0;
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
                 const NodeId parent = support::sound(tree).parents()[node];
-                const bool reached = parent == no_node || cut.is_unfolded(parent);
-                ASSERT_EQ(cut.is_unfolded(node), reached && costs[node] > 1);
+                const bool reached = parent == no_node || cut.is_wanted(parent);
+                ASSERT_EQ(cut.is_wanted(node), reached && costs[node] > 1);
                 if (reached && costs[node] <= 1) largest = std::max(largest, costs[node]);
             }
             EXPECT_EQ(stats.max_fold_cost, largest);
@@ -391,6 +464,14 @@ TEST(Adjust, DoesNotDependOnTheStateBefore) {
     }
 }
 
+Index triangles_of(const VertexTree& tree, const std::vector<bool>& unfolded) {
+    Index triangles = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (unfolded[node])
+            triangles += support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
+    return triangles;
+}
+
 TEST(Budget, NeverExceedsAndNeverWastes) {
     std::mt19937_64 random(6);
     for (const shapes::Named& named : shapes::all()) {
@@ -406,17 +487,19 @@ TEST(Budget, NeverExceedsAndNeverWastes) {
             ASSERT_LE(cut.triangle_count(), budget);
             // The costliest folded node is 0, or does not fit.
             float largest = 0;
-            for (NodeId node = 0; node < tree.interior_count(); ++node)
-                if (cut.is_active(node)) largest = std::max(largest, costs[node]);
-            ASSERT_EQ(stats.max_fold_cost, largest);
-            bool fits = false;
             NodeId first = no_node;
-            for (NodeId node = 0; node < tree.interior_count() && first == no_node; ++node)
-                if (cut.is_active(node) && costs[node] == largest) first = node;
-            if (first != no_node)
-                fits = cut.triangle_count() + support::sound(tree).first_triangle()[first + 1] -
-                           support::sound(tree).first_triangle()[first] <=
-                       budget;
+            std::vector<bool> more(tree.interior_count());
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                more[node] = cut.is_wanted(node);
+                const NodeId parent = support::sound(tree).parents()[node];
+                const bool is_folded = !more[node] && (parent == no_node || more[parent]);
+                if (!is_folded || (first != no_node && costs[node] <= largest)) continue;
+                largest = costs[node];
+                first = node;
+            }
+            ASSERT_EQ(stats.max_fold_cost, largest);
+            if (first != no_node) more[first] = true;
+            const bool fits = first != no_node && triangles_of(tree, support::with_needs(tree, more)) <= budget;
             ASSERT_TRUE(largest == 0 || !fits);
         }
     }
@@ -440,7 +523,10 @@ float least_largest_cost(const VertexTree& tree, const std::vector<float>& costs
                     support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
             else if (reached) largest = std::max(largest, costs[node]);
         }
-        if (closed && triangles <= budget) least = std::min(least, largest);
+        if (!closed || triangles > budget) continue;
+        std::vector<bool> bits(n);
+        for (NodeId node = 0; node < n; ++node) bits[node] = is_unfolded(node);
+        if (support::with_needs(tree, bits) == bits) least = std::min(least, largest);
     }
     return least;
 }
@@ -473,11 +559,11 @@ TEST(Budget, BreaksTiesByNodeNumber) {
     cut.adjust(criterion, tree.triangle_count() / 2);
     // All cost the same, so the nodes are unfolded in the order of their numbers, up to the first that does not fit.
     bool ended = false;
-    Index triangles = 0;
+    std::vector<bool> unfolded(tree.interior_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        triangles += support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
-        ended |= triangles > tree.triangle_count() / 2;
-        ASSERT_EQ(cut.is_unfolded(node), !ended) << "node " << node;
+        unfolded[node] = true;
+        ended |= triangles_of(tree, support::with_needs(tree, unfolded)) > tree.triangle_count() / 2;
+        ASSERT_EQ(cut.is_wanted(node), !ended) << "node " << node;
     }
     EXPECT_TRUE(ended);
 }
@@ -519,7 +605,7 @@ TEST(Budget, OrdersUnboundedCostsAmongThemselves) {
     EXPECT_TRUE(is_unbounded(stats.max_fold_cost));
     float least_unfolded = std::numeric_limits<float>::infinity();
     for (NodeId node = 0; node < tree.interior_count(); ++node)
-        if (cut.is_unfolded(node)) least_unfolded = std::min(least_unfolded, costs[node]);
+        if (cut.is_wanted(node)) least_unfolded = std::min(least_unfolded, costs[node]);
     EXPECT_GE(least_unfolded, stats.max_fold_cost);
     EXPECT_GT(cut.triangle_count(), 0u);
 }

@@ -26,7 +26,6 @@ Cut cut_by(const VertexTree& tree, double displacement) {
         for (std::size_t i = 0; i < nodes.size(); ++i)
             costs[i] = static_cast<float>(static_cast<double>(t.displacement()[nodes[i]]) / displacement);
     });
-    cut.unfold_turned();
     return cut;
 }
 

@@ -126,7 +126,7 @@ TEST(Numerics, MillionsOfEqualCosts) {
     }
     const auto expect_expected = [&](const Cut& cut, const char* how) {
         std::uint64_t differ = 0;
-        for (NodeId node = 0; node < tree.interior_count(); ++node) differ += cut.is_unfolded(node) != expected[node];
+        for (NodeId node = 0; node < tree.interior_count(); ++node) differ += cut.is_wanted(node) != expected[node];
         EXPECT_EQ(differ, 0u) << how;
     };
     Cut cut(tree);

@@ -99,7 +99,7 @@ TEST(Occluders, FoldOnlyWhatNoLineOfSightReaches) {
         ASSERT_TRUE(cut.follow(criterion, {.eye = eye, .occluders = spheres}));
         std::size_t hidden = 0;
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
-            if (cut.is_unfolded(node)) continue;
+            if (cut.is_wanted(node)) continue;
             ++hidden;
             const Sphere ring = tree.bounds()[node].ring;
             for (int k = 0; k < 20; ++k) {

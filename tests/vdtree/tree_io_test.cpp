@@ -161,14 +161,14 @@ TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
     EXPECT_FALSE(is_tree_file(file_));
 
     std::string bad = good;
-    for (const std::uint32_t version : {7u, ~0u}) {
+    for (const std::uint32_t version : {8u, ~0u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad, "version " + std::to_string(version) + " of the format");
         expect_refused(bad, "Build the tree again from its mesh");
         EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
     }
-    for (const std::uint32_t version : {0u, 2u, 4u, 5u}) {
+    for (const std::uint32_t version : {0u, 2u, 4u, 6u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad,

@@ -123,11 +123,6 @@ public:
     };
     std::vector<Followed>& objects() { return objects_; }
     void let_pass(double seconds) { passed_s_ += seconds; }
-    vdtree::Index triangle_count() const {
-        vdtree::Index count = 0;
-        for (const Followed& object : objects_) count += object.cut->triangle_count();
-        return count;
-    }
 
 private:
     // A cut is of one tree: where another has come in its place, it begins anew.
@@ -295,21 +290,6 @@ Result<Simplification> Session::simplify(const vdtree::View& view, const Request
     Follower follower(*this);
     auto report = follower.follow(view, once);
     if (!report) return report.error();
-    // A still or a mesh that is written has time to show no triangle from behind; what that adds has to find room.
-    constexpr int most_tries = 8;
-    for (int tries = 0; request.goal.kind != Goal::Kind::full; ++tries) {
-        for (Follower::State::Followed& object : follower.state_->objects()) object.cut->unfold_turned();
-        const vdtree::Index triangles = follower.state_->triangle_count();
-        const bool fits = request.goal.kind != Goal::Kind::budget || triangles <= request.goal.triangles ||
-                          request.goal.triangles <= follower.state_->locked_triangles();
-        report->stats.triangles = triangles;
-        if (fits) break;
-        const vdtree::Index excess = triangles - request.goal.triangles;
-        once.goal.triangles -= tries < most_tries ? std::min(excess, once.goal.triangles) : 0;
-        report = follower.follow(view, once);
-        if (!report) return report.error();
-        if (tries == most_tries) break;
-    }
     Simplification result{std::move(*report), {}};
     for (Follower::State::Followed& object : follower.state_->objects()) result.cuts.push_back(std::move(*object.cut));
     return result;

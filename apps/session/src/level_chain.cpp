@@ -73,7 +73,6 @@ vdtree::Cut LevelChain::cut_at(double distance) const {
         for (std::size_t i = 0; i < nodes.size(); ++i)
             costs[i] = static_cast<double>(seen_from[nodes[i]]) > distance ? 2.F : 0.F;
     });
-    cut.unfold_turned();
     return cut;
 }
 

@@ -10,6 +10,7 @@
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
 #include "build/leaves.h"
+#include "build/needs.h"
 #include "build/order_nodes.h"
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
@@ -193,6 +194,7 @@ public:
         }
         if (is_textured()) lay_texture();
         mark_translucent();
+        find_what_nodes_need();
 
         g_->closedness = surface_.closedness;
         g_->creases = places_->creases();
@@ -414,6 +416,13 @@ private:
         g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
         g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
         g_->ring_texture = bound_ring_texture(*g_, *parts_);
+    }
+
+    void find_what_nodes_need() {
+        NeedArrays<Vector> needs = find_needs(*g_);
+        g_->needing = std::move(needs.needing);
+        g_->first_need = std::move(needs.first_need);
+        g_->needs = std::move(needs.needs);
     }
 
     // Nodes with a corner of the ring that has an alpha below 1.

@@ -4,6 +4,7 @@
 #include <queue>
 
 #include "cut/decide_tree.h"
+#include "cut/needs.h"
 
 namespace unseen::vdtree {
 
@@ -42,8 +43,11 @@ public:
     Budgeter(std::span<const CostSource* const> sources, const BudgetLimits& limits)
         : sources_(sources), limits_(limits), asked_(sources.size()), above_(sources.size()),
           has_bounds_(!limits.only_unfolding && std::ranges::all_of(sources, &CostSource::has_bounds)) {
-        for (const CostSource* source : sources)
+        for (const CostSource* source : sources) {
             decision_.unfolded.emplace_back(words_for(source->tree.interior_count()));
+            closers_.emplace_back(source->tree);
+        }
+        drawn_ = decision_.unfolded;
     }
 
     // From the roots down; the result of all ways.
@@ -54,8 +58,8 @@ public:
                 continue;
             }
             const Entry root{infinity, infinity, number, VertexTree::root()};
-            triangles_ += triangles_of(root);
-            take(root);
+            set_bit(decision_.unfolded[number], root.node);
+            draw(root, [](NodeId) {});
             ask_children({&root, 1});
         }
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
@@ -81,7 +85,30 @@ private:
     }
     const VertexTree& tree(std::uint32_t number) const { return sources_[number]->tree; }
     std::uint64_t triangles_of(const Entry& e) const { return unchecked_links(tree(e.tree)).triangles_of(e.node); }
-    void take(const Entry& e) { set_bit(decision_.unfolded[e.tree], e.node); }
+    // Unfolds the node and what it needs: f(node) hears of each.
+    template <class F>
+    void draw(const Entry& e, F&& f) {
+        const auto& links = unchecked_links(tree(e.tree));
+        closers_[e.tree].add(e.node, drawn_[e.tree], [&](NodeId node) {
+            triangles_ += links.triangles_of(node);
+            f(node);
+        });
+    }
+    bool is_drawn(const Entry& e) const { return test_bit(drawn_[e.tree], e.node); }
+    // Unfolds all of them, and what they need; false, and does nothing, if that does not fit.
+    bool take(std::span<const Entry> entries) {
+        const std::uint64_t before = triangles_;
+        drawn_now_.clear();
+        for (const Entry& e : entries) {
+            draw(e, [&](NodeId node) { drawn_now_.emplace_back(e.tree, node); });
+            if (triangles_ <= limits_.triangles) continue;
+            triangles_ = before;
+            for (const auto& [of, node] : drawn_now_) clear_bit(drawn_[of], node);
+            return false;
+        }
+        for (const Entry& e : entries) set_bit(decision_.unfolded[e.tree], e.node);
+        return true;
+    }
     void leave(const Entry& e) {
         decision_.threshold = std::max(decision_.threshold, e.cost);
         decision_.max_seen_cost = std::max(decision_.max_seen_cost, e.seen_cost);
@@ -139,7 +166,9 @@ private:
                 find_bounds(number, &unfolding, [&](const Entry& entry) { wait(entry); });
             });
             const auto& links = unchecked_links(tree(number));
-            for_each_bit(decision_.unfolded[number], [&](NodeId node) { triangles_ += links.triangles_of(node); });
+            drawn_[number] = decision_.unfolded[number];
+            closers_[number].close(drawn_[number], [](NodeId) {});
+            for_each_bit(drawn_[number], [&](NodeId node) { triangles_ += links.triangles_of(node); });
         }
         decision_.node_tests += decider.decisions;
         return !is_damaged && triangles_ <= limits_.triangles;
@@ -289,7 +318,7 @@ private:
             for (std::size_t i = 0; i < fresh.size(); ++i) {
                 if (i + ahead < fresh.size())
                     prefetch(&unchecked_links(tree(fresh[i + ahead].tree)).first_triangle[fresh[i + ahead].node]);
-                sum += triangles_of(fresh[i]);
+                if (!is_drawn(fresh[i])) sum += triangles_of(fresh[i]);
             }
             all.insert(all.end(), fresh.begin(), fresh.end());
             if (sum > limits_.triangles && all.size() > most) {
@@ -302,12 +331,10 @@ private:
                 bucket, [&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); },
                 [&](const Entry& entry) { bounded_below.push_back(entry); });
         }
-        if (sum > limits_.triangles) {
+        if (sum > limits_.triangles || !take(all)) {
             finish(std::move(all), below, bounded_below);
             return false;
         }
-        triangles_ = sum;
-        for (const Entry& entry : all) take(entry);
         for (const Entry& entry : below) buckets_[bucket_of(entry.cost)].push_back(entry);
         for (const Entry& entry : bounded_below) wait(entry);
         return true;
@@ -316,12 +343,7 @@ private:
     void finish(std::vector<Entry> all, std::span<const Entry> below, std::span<const Entry> bounded_below) {
         std::sort(all.begin(), all.end(), comes_first);
         std::size_t i = 0;
-        for (; i < all.size(); ++i) {
-            const std::uint64_t sum = triangles_ + triangles_of(all[i]);
-            if (sum > limits_.triangles) break;
-            triangles_ = sum;
-            take(all[i]);
-        }
+        while (i < all.size() && take({&all[i], 1})) ++i;
         // What is left is folded, as far as its parent is not.
         const auto is_folded_under_unfolded = [&](const Entry& e) {
             const NodeId parent = unchecked_links(tree(e.tree)).parents[e.node];
@@ -337,11 +359,10 @@ private:
     void finish_one_by_one(std::vector<Entry> waiting) {
         const auto comes_later = [](const Entry& a, const Entry& b) { return comes_first(b, a); };
         std::priority_queue queue(comes_later, std::move(waiting));
-        while (!queue.empty() && triangles_ + triangles_of(queue.top()) <= limits_.triangles) {
+        while (!queue.empty()) {
             const Entry entry = queue.top();
+            if (!take({&entry, 1})) break;
             queue.pop();
-            triangles_ += triangles_of(entry);
-            take(entry);
             ask_children({&entry, 1});
             answer([&](const Entry& child) { queue.push(child); });
         }
@@ -350,7 +371,10 @@ private:
 
     std::span<const CostSource* const> sources_;
     const BudgetLimits& limits_;
-    std::uint64_t triangles_ = 0;
+    std::uint64_t triangles_ = 0; // of what is drawn
+    std::vector<NeedCloser> closers_;
+    std::vector<std::vector<std::uint64_t>> drawn_; // what is unfolded, and what that needs
+    std::vector<std::pair<std::uint32_t, NodeId>> drawn_now_;
     std::vector<std::vector<Entry>> buckets_{bucket_count};
     std::vector<std::vector<Entry>> bounded_{bucket_count}; // of which only bounds are known yet
     std::size_t far_bucket_ = 0;

@@ -113,6 +113,10 @@ Cut& Cut::operator=(Cut&&) noexcept = default;
 Cut::~Cut() = default;
 
 bool Cut::is_unfolded(NodeId node) const noexcept { return state_->is_unfolded(node); }
+bool Cut::is_wanted(NodeId node) const noexcept {
+    if (tree_->is_place(node) || state_->is_changed_by_hand()) return is_unfolded(node);
+    return state_->is_wanted(node);
+}
 bool Cut::is_active(NodeId node) const noexcept { return state_->is_active(node); }
 bool Cut::unfold(NodeId node) { return state_->unfold(node); }
 bool Cut::fold(NodeId node) { return state_->fold(node); }

@@ -191,9 +191,13 @@ private:
     }
 
     void settle_due(CutState& cut) {
-        if (!time_limit_) return settler_.settle(cut, rules(), settler_.front().collect_due());
-        settler_.settle_in_time(cut, rules());
-        stats_.is_complete = settler_.is_all_tested() && !settler_.has_waiting();
+        if (time_limit_) {
+            settler_.settle_in_time(cut, rules());
+            stats_.is_complete = settler_.is_all_tested() && !settler_.has_waiting();
+        } else {
+            settler_.settle(cut, rules(), settler_.front().collect_due());
+        }
+        cut.settle_needs();
     }
 
     // Deadlines are left to the first frame that needs some: after a jump there may be another one.

@@ -145,7 +145,7 @@ private:
                 constexpr std::size_t ahead = 16; // nodes between a prefetch and its use
                 if (i + ahead < piece.size()) rules_.tester->prefetch(piece[i + ahead]);
                 candidates_.push_back(rules_.tester->candidate(piece[i]));
-                candidates_.back().is_unfolded = cut.is_unfolded_interior(piece[i]);
+                candidates_.back().is_unfolded = cut.is_wanted(piece[i]);
             }
             rules_.tester->find_still_rows(candidates_);
             wave_slots_.clear();
@@ -160,7 +160,7 @@ private:
     // The nodes to watch, in about their order, as the next wave.
     void find_border(const CutState& cut) {
         unfolding_.clear();
-        for_each_bit(cut.unfolded(), [&](NodeId node) { unfolding_.push_back(node); });
+        for_each_bit(cut.wanted(), [&](NodeId node) { unfolding_.push_back(node); });
         next_wave_.clear();
         if (unfolding_.empty()) next_wave_.push_back(VertexTree::root());
         std::size_t at = 0;
@@ -173,7 +173,7 @@ private:
             tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; },
             [&](std::size_t i, NodeId child) {
                 go_to(i);
-                if (cut.is_unfolded_interior(child)) is_border = false;
+                if (cut.is_wanted(child)) is_border = false;
                 else next_wave_.push_back(child);
             });
         go_to(unfolding_.size());
@@ -251,8 +251,7 @@ private:
     void test_parents(const CutState& cut) {
         std::sort(parents_.begin(), parents_.end());
         parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
-        std::erase_if(parents_,
-                      [&](NodeId node) { return !cut.is_unfolded_interior(node) || front_.slot_of(node) != no_slot; });
+        std::erase_if(parents_, [&](NodeId node) { return !cut.is_wanted(node) || front_.slot_of(node) != no_slot; });
         candidates_.clear();
         for (const NodeId node : parents_) {
             rules_.tester->prefetch(node);
@@ -324,17 +323,15 @@ private:
                 prefetch_changes(cut, std::span(folding_).subspan(i, std::min(changes_at_once, folding_.size() - i)),
                                  true);
             const NodeId node = folding_[i];
-            if (!cut.is_unfolded_interior(node)) continue;
+            if (!cut.is_wanted(node)) continue;
             const auto children = cut.fetched_children(i % changes_at_once);
-            const auto has_fold = [&](NodeId child) {
-                return !tree_.is_place(child) && cut.is_unfolded_interior(child);
-            };
+            const auto has_fold = [&](NodeId child) { return !tree_.is_place(child) && cut.is_wanted(child); };
             if (std::ranges::none_of(children, has_fold)) { // nearly always
-                cut.apply_fold(node, children);
+                cut.want_fold(node, children);
                 for (const NodeId child : children)
                     if (!tree_.is_place(child)) front_.remove(child);
             } else {
-                cut.fold_below(node, [&](NodeId folded) {
+                cut.want_fold_below(node, [&](NodeId folded) {
                     for (NodeId child = folded + 1; child < subtree_end[folded]; child = subtree_end[child])
                         front_.remove(child);
                 });
@@ -365,7 +362,7 @@ private:
 
     // Watches the children of what has unfolded, too: they are the next wave.
     void apply_unfold(CutState& cut, NodeId node, std::span<const NodeId> children) {
-        cut.apply_unfold(node, children);
+        cut.want_unfold(node, children);
         front_.set_unfolded(front_.slot_of(node), true);
         if (node != VertexTree::root() && !rules_.watches_ancestors)
             front_.remove(unchecked_links(tree_).parents[node]);
@@ -443,7 +440,7 @@ private:
     bool has_unfolded_child(NodeId node, const CutState& cut) const {
         const auto subtree_end = unchecked_links(tree_).subtree_end;
         for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
-            if (cut.is_unfolded_interior(child)) return true;
+            if (cut.is_wanted(child)) return true;
         return false;
     }
 

@@ -50,10 +50,11 @@ struct CutState::Indices {
 };
 
 CutState::CutState(const VertexTree& tree)
-    : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), proxy_(tree.leaf_count(), VertexTree::root()),
-      revision_(first_revision()) {
+    : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), wanted_(unfolded_.size()), closer_(tree_),
+      proxy_(tree.leaf_count(), VertexTree::root()), revision_(first_revision()) {
     if (!tree.is_locked()) return;
     set_unfolded(VertexTree::root());
+    has_all_needed_ = false; // by this one
     for (const NodeId child : children_of(VertexTree::root())) assign(child);
 }
 CutState::~CutState() = default;
@@ -98,6 +99,7 @@ std::span<const NodeId> CutState::children_of(NodeId node) {
 void CutState::make_stale() {
     changes_.clear();
     revision_ += 2;
+    has_all_needed_ = are_needs_counted_ = false;
     forget_followed();
     if (!indices_) return;
     indices_->drop();
@@ -160,6 +162,7 @@ void CutState::unfold_all() {
 // ---- changes in steps
 
 void CutState::begin_changes() {
+    count_needs();
     changes_.clear();
     ++revision_;
     if (!indices_) return;
@@ -247,17 +250,138 @@ void CutState::apply_fold(NodeId node, std::span<const NodeId> children) {
     assign(node);
 }
 
-void CutState::fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
+// ---- what nodes need
+
+void CutState::want_unfold(NodeId node, std::span<const NodeId> children) {
+    set_bit(wanted_, node);
+    if (is_unfolded_interior(node)) return; // for others
+    apply_unfold(node, children);
+    ask_for_needs(node);
+}
+
+void CutState::want_fold(NodeId node, std::span<const NodeId> children) {
+    if (is_locked(node)) return;
+    clear_bit(wanted_, node);
+    if (is_held(node, children)) {
+        spare_.push_back(node); // perhaps not for long
+        return;
+    }
+    apply_fold(node, children);
+    drop_needs(node);
+}
+
+void CutState::want_fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
     const NodeId end = unchecked_links(tree_).subtree_end[node];
     for (std::size_t word = words_for(end); word-- > node / 64;) {
-        std::uint64_t bits = unfolded_[word];
+        std::uint64_t bits = wanted_[word];
         if (word == node / 64) bits &= ~std::uint64_t{0} << (node & 63);
         if (word == end / 64) bits &= (std::uint64_t{1} << (end & 63)) - 1;
         for_each_bit_down(bits, 64 * word, [&](NodeId below) {
-            apply_fold(below);
+            want_fold(below, children_of(below));
             on_fold(below);
         });
     }
+}
+
+void CutState::count_needs() {
+    if (are_needs_counted_) return;
+    are_needs_counted_ = true;
+    const auto& links = unchecked_links(tree_);
+    if (links.needing.empty()) return;
+    times_needed_.assign(tree_.interior_count(), 0);
+    for_each_need(links, unfolded_, [&](NodeId need) { ++times_needed_[need & ~joined_need]; });
+}
+
+void CutState::ask_for_needs(NodeId node) {
+    const auto& links = unchecked_links(tree_);
+    if (!links.is_needing(node)) return;
+    for (const NodeId need : links.needs_of(node)) {
+        const NodeId needed = need & ~joined_need;
+        ++times_needed_[needed];
+        if (!is_unfolded_interior(needed)) missing_.push_back(needed);
+    }
+}
+
+void CutState::drop_needs(NodeId node) {
+    const auto& links = unchecked_links(tree_);
+    if (!links.is_needing(node)) return;
+    for (const NodeId need : links.needs_of(node)) {
+        const NodeId needed = need & ~joined_need;
+        if (--times_needed_[needed] == 0 && is_unfolded_interior(needed) && !is_wanted(needed))
+            spare_.push_back(needed);
+    }
+}
+
+// By others that need it, or by what is unfolded under it.
+bool CutState::is_held(NodeId node, std::span<const NodeId> children) {
+    if (is_needed(node)) return true;
+    return std::ranges::any_of(children,
+                               [&](NodeId child) { return !tree_.is_place(child) && is_unfolded_interior(child); });
+}
+
+bool CutState::is_joined(NodeId parent, NodeId child) const {
+    const auto& links = unchecked_links(tree_);
+    return links.is_needing(parent) &&
+           std::ranges::find(links.needs_of(parent), child | joined_need) != links.needs_of(parent).end();
+}
+
+// With what is folded above it.
+void CutState::unfold_needed(NodeId node) {
+    const Index leaf = first_leaf_of(node);
+    while (leaf < tree_.leaf_count() && proxy_[leaf] <= node && tree_.is_sound(proxy_[leaf])) {
+        const NodeId above = proxy_[leaf];
+        apply_unfold(above);
+        ask_for_needs(above);
+    }
+}
+
+// The node and what folds with it alone, parents first, in group_; false: something holds it.
+bool CutState::find_spare_group(NodeId node) {
+    group_.assign(1, node);
+    for (std::size_t i = 0; i < group_.size(); ++i) {
+        const NodeId member = group_[i];
+        const std::uint32_t by_parent = i == 0 ? 0 : 1;
+        if (is_needed(member, by_parent)) return false;
+        for (const NodeId child : children_of(member)) {
+            if (tree_.is_place(child) || !is_unfolded_interior(child)) continue;
+            if (is_wanted(child) || !is_joined(member, child)) return false;
+            group_.push_back(child);
+        }
+    }
+    return true;
+}
+
+void CutState::fold_spare(NodeId node) {
+    if (!is_unfolded_interior(node) || is_wanted(node)) return;
+    const NodeId parent = node == VertexTree::root() ? no_node : unchecked_links(tree_).parents[node];
+    const bool has_spare_parent = parent != no_node && !is_wanted(parent);
+    if (find_spare_group(node)) {
+        for (std::size_t i = group_.size(); i-- > 0;) {
+            apply_fold(group_[i]);
+            drop_needs(group_[i]);
+        }
+        if (has_spare_parent) spare_.push_back(parent);
+    } else if (has_spare_parent && is_joined(parent, node)) {
+        spare_.push_back(parent);
+    }
+}
+
+void CutState::settle_needs() {
+    while (!missing_.empty()) {
+        const NodeId node = missing_.back();
+        missing_.pop_back();
+        if (!is_unfolded_interior(node) && is_needed(node)) unfold_needed(node);
+    }
+    while (!spare_.empty()) {
+        const NodeId node = spare_.back();
+        spare_.pop_back();
+        fold_spare(node);
+    }
+}
+
+std::vector<std::uint64_t> CutState::close(std::vector<std::uint64_t> wanted) {
+    closer_.close(wanted, [](NodeId) {});
+    return wanted;
 }
 
 void CutState::count(AdjustStats& stats) const {
@@ -266,6 +390,7 @@ void CutState::count(AdjustStats& stats) const {
 }
 
 void CutState::end_changes(AdjustStats& stats) {
+    settle_needs();
     count(stats);
     if (!indices_) return;
     indices_->count_changes(changes_.size(), triangle_count_);
@@ -278,44 +403,58 @@ void CutState::end_changes(AdjustStats& stats) {
 
 // ---- other cuts as wholes
 
-bool CutState::are_few_changes(std::span<const std::uint64_t> unfolded) const {
+bool CutState::are_few_changes(std::span<const std::uint64_t> from, std::span<const std::uint64_t> to) const {
     std::size_t changes = 0;
-    for (std::size_t word = 0; word < unfolded_.size(); ++word)
-        changes += static_cast<std::size_t>(std::popcount(unfolded_[word] ^ unfolded[word]));
+    for (std::size_t word = 0; word < from.size(); ++word)
+        changes += static_cast<std::size_t>(std::popcount(from[word] ^ to[word]));
     return changes < few_changes(triangle_count_);
-}
-
-void CutState::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
-    if (tree_.is_locked()) set_bit(unfolded, VertexTree::root());
-    if (!are_few_changes(unfolded)) return become(std::move(unfolded), stats);
-    begin_changes();
-    replay(unfolded);
-    end_changes(stats);
-}
-
-void CutState::change_further(std::vector<std::uint64_t> unfolded) {
-    if (tree_.is_locked()) set_bit(unfolded, VertexTree::root());
-    if (are_few_changes(unfolded)) return replay(unfolded);
-    const std::vector<FoldChange> before = std::move(changes_);
-    AdjustStats ignored; // all changes are counted at the end
-    become(std::move(unfolded), ignored);
-    --revision_; // one for all of them
-    changes_.insert(changes_.begin(), before.begin(), before.end());
 }
 
 // Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn
 // comes, and folds run downward.
 template <class Unfold, class Fold>
-void CutState::for_each_change(std::span<const std::uint64_t> unfolded, Unfold&& unfold, Fold&& fold) {
-    for (std::size_t word = 0; word < unfolded.size(); ++word)
-        for_each_bit(unfolded[word] & ~unfolded_[word], 64 * word, unfold);
-    for (std::size_t word = unfolded.size(); word-- > 0;)
-        for_each_bit_down(unfolded_[word] & ~unfolded[word], 64 * word, fold);
+void for_each_change(std::span<const std::uint64_t> from, std::span<const std::uint64_t> to, Unfold&& unfold,
+                     Fold&& fold) {
+    for (std::size_t word = 0; word < to.size(); ++word) for_each_bit(to[word] & ~from[word], 64 * word, unfold);
+    for (std::size_t word = to.size(); word-- > 0;) for_each_bit_down(from[word] & ~to[word], 64 * word, fold);
 }
 
-void CutState::replay(std::span<const std::uint64_t> unfolded) {
+void CutState::change_to(std::vector<std::uint64_t> wanted, AdjustStats& stats) {
+    if (tree_.is_locked()) set_bit(wanted, VertexTree::root());
+    if (has_all_needed_ && are_few_changes(wanted_, wanted)) {
+        begin_changes();
+        replay(wanted);
+        return end_changes(stats);
+    }
+    wanted_ = wanted;
+    become(close(std::move(wanted)), stats);
+    has_all_needed_ = true;
+}
+
+void CutState::change_further(std::vector<std::uint64_t> wanted) {
+    if (tree_.is_locked()) set_bit(wanted, VertexTree::root());
+    if (are_few_changes(wanted_, wanted)) return replay(wanted);
+    const std::vector<FoldChange> before = std::move(changes_);
+    AdjustStats ignored; // all changes are counted at the end
+    missing_.clear();
+    spare_.clear();
+    change_to(std::move(wanted), ignored);
+    --revision_; // one for all of them
+    changes_.insert(changes_.begin(), before.begin(), before.end());
+}
+
+void CutState::replay(std::span<const std::uint64_t> wanted) {
     for_each_change(
-        unfolded, [&](NodeId node) { apply_unfold(node); }, [&](NodeId node) { apply_fold(node); });
+        wanted_, wanted, [&](NodeId node) { want_unfold(node, children_of(node)); },
+        [&](NodeId node) { want_fold(node, children_of(node)); });
+}
+
+void CutState::show(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    if (!are_few_changes(unfolded_, unfolded)) return become(std::move(unfolded), stats);
+    begin_changes();
+    for_each_change(
+        unfolded_, unfolded, [&](NodeId node) { apply_unfold(node); }, [&](NodeId node) { apply_fold(node); });
+    end_changes(stats);
 }
 
 // The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and places for those of
@@ -333,11 +472,11 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
     // The number of leaves is unpredictable, so branch-free: a few places are written at once, and the next node overwrites
     // the surplus.
     constexpr Index at_once = 16;
-    const Index leaves = tree_.leaf_count(), last_begin = leaves - std::min(leaves, at_once);
+    const Index leaves = tree_.leaf_count();
     NodeId* const proxies = proxy_.data();
     Index leaf = 0;
     const auto write = [&](Index leaves_end, auto&& proxy_of) {
-        for (; leaf < leaves_end && leaf <= last_begin; leaf += at_once)
+        for (; leaf < leaves_end && leaves - leaf >= at_once; leaf += at_once)
             for (Index i = 0; i < at_once; ++i) proxies[leaf + i] = proxy_of(leaf + i);
         for (; leaf < leaves_end; ++leaf) proxies[leaf] = proxy_of(leaf);
         leaf = leaves_end;
@@ -360,8 +499,9 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
 void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     ++revision_;
+    are_needs_counted_ = false;
     for_each_change(
-        unfolded,
+        unfolded_, unfolded,
         [&](NodeId node) {
             changes_.push_back({node, false});
         },

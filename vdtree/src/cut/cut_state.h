@@ -5,12 +5,13 @@
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/internal/node_bits.h>
 
-#include "tree/unchecked_links.h"
+#include "cut/needs.h"
 
 namespace unseen::vdtree {
 
 class CutFollower;
 
+// What a criterion wants unfolded is, and besides what that needs (NeedArrays), so that no triangle is turned over.
 // Public functions of Cut's names do what Cut says. Not copied and not moved: cuts hold pointers into it.
 class CutState {
 public:
@@ -24,11 +25,15 @@ public:
 
     const VertexTree& tree() const noexcept { return tree_; }
     std::span<const std::uint64_t> unfolded() const noexcept { return unfolded_; } // one bit an interior node
+    std::span<const std::uint64_t> wanted() const noexcept { return wanted_; }     // likewise
     std::span<const NodeId> proxies() const noexcept { return proxy_; }            // by leaf; always in the same place
     Index triangle_count() const noexcept { return triangle_count_; }
     std::span<const FoldChange> changes() const noexcept { return changes_; }
     // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
     std::uint64_t revision() const noexcept { return revision_; }
+    // Of interior nodes, as the next.
+    bool is_wanted(NodeId node) const noexcept { return test_bit(wanted_, node); }
+    bool is_changed_by_hand() const noexcept { return !has_all_needed_; }
     bool is_unfolded_interior(NodeId node) const noexcept { return test_bit(unfolded_, node); }
     bool is_unfolded(NodeId node) const noexcept { return !tree_.is_place(node) && is_unfolded_interior(node); }
     bool is_active(NodeId node) const noexcept {
@@ -66,15 +71,20 @@ public:
     }
     void apply_unfold(NodeId node) { apply_unfold(node, children_of(node)); }
     void apply_unfold(NodeId node, std::span<const NodeId> children);
-    void fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold); // tells each node, descendants first
     void apply_fold(NodeId node) { apply_fold(node, children_of(node)); }
     void apply_fold(NodeId node, std::span<const NodeId> children);
-    void change_further(std::vector<std::uint64_t> unfolded); // to another cut as a whole, within the steps
+    // The criterion's changes. What its nodes need follows later: by settle_needs(), or at the end.
+    void want_unfold(NodeId node, std::span<const NodeId> children);
+    void want_fold(NodeId node, std::span<const NodeId> children);
+    void want_fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold); // tells each node, descendants first
+    void change_further(std::vector<std::uint64_t> wanted); // to another cut as a whole, within the steps
+    void settle_needs();
     void end_changes(AdjustStats& stats);
 
     // ---- to another cut as a whole
 
-    void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+    void change_to(std::vector<std::uint64_t> wanted, AdjustStats& stats);
+    void show(std::vector<std::uint64_t> unfolded, AdjustStats& stats); // this and nothing else
 
     // ---- the index buffer
 
@@ -87,29 +97,44 @@ public:
 
 private:
     bool is_locked(NodeId node) const noexcept { return node == VertexTree::root() && tree_.is_locked(); }
+    bool is_needed(NodeId node, std::uint32_t more_than = 0) const {
+        return !times_needed_.empty() && times_needed_[node] > more_than;
+    }
+    void count_needs();
+    void ask_for_needs(NodeId node);
+    void drop_needs(NodeId node);
+    bool is_held(NodeId node, std::span<const NodeId> children);
+    bool is_joined(NodeId parent, NodeId child) const;
+    void unfold_needed(NodeId node);
+    void fold_spare(NodeId node);
+    bool find_spare_group(NodeId node);
     void set_unfolded(NodeId node);
     void set_folded(NodeId node);
     void assign(NodeId node);
     void make_stale();
     bool is_patching();
     std::span<const NodeId> children_of(NodeId node);
-    bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
-    template <class Unfold, class Fold>
-    void for_each_change(std::span<const std::uint64_t> unfolded, Unfold&& unfold, Fold&& fold);
+    bool are_few_changes(std::span<const std::uint64_t> from, std::span<const std::uint64_t> to) const;
     void count(AdjustStats& stats) const;
-    void replay(std::span<const std::uint64_t> unfolded);
+    void replay(std::span<const std::uint64_t> wanted);
+    std::vector<std::uint64_t> close(std::vector<std::uint64_t> wanted);
     void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
     void count_triangles();
     void assign_changed(const std::vector<std::uint64_t>& unfolded);
     void assign_all(std::span<const std::uint64_t> unfolded);
 
     const VertexTree tree_; // a handle of its own
-    std::vector<std::uint64_t> unfolded_;
+    std::vector<std::uint64_t> unfolded_, wanted_;
+    bool has_all_needed_ = true;              // unfolded_ is what wanted_ needs, and nothing else
+    bool are_needs_counted_ = false;          // times_needed_ is right
+    std::vector<std::uint16_t> times_needed_; // by interior node: unfolded nodes that need it; empty where none can
+    std::vector<NodeId> missing_, spare_;     // nodes that may be needed, or no more
+    NeedCloser closer_;
     std::vector<NodeId> proxy_; // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
     std::uint64_t revision_;
-    std::vector<NodeId> children_, soon_, others_; // scratch
+    std::vector<NodeId> children_, soon_, others_, group_; // scratch
     std::vector<std::size_t> soon_ends_;
     std::unique_ptr<CutFollower> follower_;
     struct Indices;

@@ -93,7 +93,7 @@ struct Geomorph::State {
         glides.clear();
         moved.clear();
         AdjustStats unused;
-        drawn.change_to({cut.unfolded().begin(), cut.unfolded().end()}, unused);
+        drawn.show({cut.unfolded().begin(), cut.unfolded().end()}, unused);
     }
 
     void pass(double seconds) {

@@ -20,7 +20,7 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 6;
+constexpr std::uint32_t format_version = 7;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;     // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
@@ -99,6 +99,9 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("ring_range", l.ring_range);
     f("adaptation", l.adaptation);
     f("triangles", g.triangles);
+    f("needing", g.needing);
+    f("first_need", g.first_need);
+    f("needs", g.needs);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
     f("locked_positions", g.locked_positions);
@@ -115,9 +118,10 @@ bool is_of_seams(std::string_view name) {
     return name == "several" || name == "extra_wedges" || name == "further" || name == "leaf_ranks" ||
            name == "wedge_ranks";
 }
+bool is_of_needs(std::string_view name) { return name == "needing" || name == "first_need" || name == "needs"; }
 bool is_optional(std::string_view name) {
-    return is_of_texture(name) || is_of_seams(name) || name == "document" || name == "fold_weights" ||
-           name == "locked_positions";
+    return is_of_texture(name) || is_of_seams(name) || is_of_needs(name) || name == "document" ||
+           name == "fold_weights" || name == "locked_positions";
 }
 
 template <class T>
@@ -493,6 +497,8 @@ private:
             return fail("The tree has no nodes or no triangles.");
         if (const char* section = section_against_wedges(g))
             return fail("Section " + std::string(section) + " does not fit the wedges of the other sections.");
+        if (const char* section = section_against_needs(g))
+            return fail("Section " + std::string(section) + " does not fit the other sections about what nodes need.");
         const std::size_t wedges = g.positions.size(), leaves = links_of(g).leaves();
         const std::pair<bool, const char*> checks[] = {
             {g.normals.size() == wedges, "normals"},

@@ -126,6 +126,21 @@ const char* section_against_wedges(const TreeGeometry& g) noexcept {
     return g.leaf_ranks.size() == wedges - interior - extra[k] ? nullptr : "leaf_ranks";
 }
 
+const char* section_against_needs(const TreeGeometry& g) noexcept {
+    if (g.needing.empty()) {
+        if (!g.first_need.empty()) return "first_need";
+        return g.needs.empty() ? nullptr : "needs";
+    }
+    const std::size_t interior = g.first_leaf.size();
+    const auto& first = g.first_need;
+    if (first.empty() || first[0] != 0 || first[first.size() - 1] != g.needs.size() ||
+        std::adjacent_find(first.begin(), first.end(), std::greater_equal<>()) != first.end())
+        return "first_need";
+    if (!is_counted(g.needing, interior, first.size() - 1)) return "needing";
+    const auto is_known = [&](NodeId need) { return 0 < (need & ~joined_need) && (need & ~joined_need) < interior; };
+    return std::ranges::all_of(g.needs, is_known) ? nullptr : "needs";
+}
+
 const char* fault_in_links(const TreeGeometry& g, NodeId node) {
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();

@@ -16,6 +16,9 @@ namespace unseen::vdtree {
 // from them lies within the arrays. Cost: a few bits a wedge.
 const char* section_against_wedges(const TreeGeometry& geometry) noexcept;
 
+// Likewise, about what nodes need. Cost: a few bits a node and a number a need.
+const char* section_against_needs(const TreeGeometry& geometry) noexcept;
+
 const char* fault_in_links(const TreeGeometry& g, NodeId node);
 
 // That the root stands for the whole tree.

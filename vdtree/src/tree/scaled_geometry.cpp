@@ -39,6 +39,7 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
     facts.bounding_sphere = scaled(g.bounding_sphere, scale);
     GeometryArrays<Array> arrays{{view_of(g.several), view_of(g.extra_wedges), view_of(g.further),
                                   view_of(g.leaf_ranks), view_of(g.wedge_ranks)},
+                                 {view_of(g.needing), view_of(g.first_need), view_of(g.needs)},
                                  view_of(g.parents),
                                  std::move(positions),
                                  view_of(g.normals),

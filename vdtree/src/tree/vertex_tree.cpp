@@ -227,6 +227,7 @@ VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)
                g.first_leaf,
                g.leaf_end,
                g.subtree_end},
+              {g.needing, g.first_need, g.needs},
               g.first_triangle,
               g.triangles};
     is_locked_ = !g.fold_weights.empty() && std::isinf(g.fold_weights[root()]);
@@ -358,10 +359,11 @@ std::uint64_t VertexTree::byte_size() const noexcept {
     const TreeGeometry& g = *data_->geometry;
     const TreeLuminance& l = *data_->light;
     return attributes + g.ranges.capacity() * sizeof(MeshRange) +
-           bytes_of(g.parents, g.several, g.extra_wedges, g.further, g.leaf_ranks, g.wedge_ranks, g.positions,
-                    g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end, g.subtree_end, g.first_triangle, g.bounds,
-                    g.support_spheres, g.mask_at, g.mask_records, g.displacement, g.triangles, g.source_triangles,
-                    g.source_vertices, g.document, g.texels, g.ring_texture) +
+           bytes_of(g.parents, g.several, g.extra_wedges, g.further, g.leaf_ranks, g.wedge_ranks, g.needing,
+                    g.first_need, g.needs, g.positions, g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end,
+                    g.subtree_end, g.first_triangle, g.bounds, g.support_spheres, g.mask_at, g.mask_records,
+                    g.displacement, g.triangles, g.source_triangles, g.source_vertices, g.document, g.texels,
+                    g.ring_texture) +
            bytes_of(l.luminance, l.support_range, l.ring_range, l.adaptation);
 }
 

@@ -80,9 +80,10 @@ public:
     bool fold_subtree(NodeId node);     // folds the node and everything below it
     void unfold_all();
     void fold_all();
-    // Unfolds the coarsest corner of every triangle that faces away from where it faced in the mesh, or is mirrored in the
-    // texture, until there is none; returns how many nodes. Cost: a few nanoseconds a triangle of the cut, two to six times.
-    Index unfold_turned();
+    // What follows unfolds more nodes than are wanted by their cost, a few in a thousand, for no triangle may face away from
+    // where it faced in the mesh or be mirrored in the texture: nodes that others need while these are unfolded. The result
+    // depends on what is wanted alone. (Changes by hand do not see to that; to them, what is unfolded is wanted.)
+    bool is_wanted(NodeId node) const noexcept;
 
     // Makes the criterion's cut, whatever the state before.
     //   Without a budget, nodes of cost 1 and less fold, top-down: a node below a folded one is folded.

@@ -210,10 +210,16 @@ struct RankWord {
     using Component = std::uint32_t;
     std::uint32_t bits = 0, before = 0;
 };
+// Where processors are not known to count bits, the library's function takes several times as long.
+constexpr std::uint32_t count_bits(std::uint32_t bits) noexcept {
+    bits -= (bits >> 1) & 0x55555555u;
+    bits = (bits & 0x33333333u) + ((bits >> 2) & 0x33333333u);
+    return (((bits + (bits >> 4)) & 0x0f0f0f0fu) * 0x01010101u) >> 24;
+}
 // How many of the first `i` are in a set.
 inline Index rank_in(std::span<const RankWord> set, Index i) noexcept {
     const RankWord& word = set[i / 32];
-    return word.before + static_cast<Index>(std::popcount(word.bits & ((1u << (i % 32)) - 1)));
+    return word.before + count_bits(word.bits & ((1u << (i % 32)) - 1));
 }
 inline bool is_in(std::span<const RankWord> set, Index i) noexcept { return set[i / 32].bits >> (i % 32) & 1; }
 
@@ -230,6 +236,17 @@ struct WedgeArrays {
 };
 template <class T>
 using ConstSpan = std::span<const T>;
+
+// Which nodes need others. While a node is unfolded, what it needs is, too, with all that is above: otherwise a triangle
+// could be turned over, as it is drawn between the two. Empty where none can be.
+template <template <class> class Storage>
+struct NeedArrays {
+    Storage<RankWord> needing; // by interior node, and one more: whether it needs others
+    Storage<Index> first_need; // by node that does, one longer
+    Storage<NodeId> needs;     // node by node; no node is in it more than 2^16 - 1 times
+};
+// The bit of a need that is a child, which folds and unfolds with its parent.
+inline constexpr NodeId joined_need = 1u << 31;
 
 // The same as views, with the links of the nodes that they need.
 template <class Numbers>
@@ -354,7 +371,7 @@ public:
     std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance; empty without one
     std::span<const Unorm16> adaptation_luminance() const noexcept;  // middle of ring_luminance, saturated up the tree
     // How far the surface moves when the node folds, mesh units: bounds the distance from it to the original surface and
-    // back, in cuts without turned triangles (Cut::unfold_turned()). Vertices that slide in the surface, along its edges
+    // back, in cuts without turned triangles (as criteria make them). Vertices that slide in the surface, along its edges
     // or its borders do not count.
     std::span<const float> displacement() const noexcept;
 
@@ -437,9 +454,15 @@ private:
     NodeChecks* checks_ = nullptr; // of data_
     bool is_locked_ = false;
     // Views of data_, kept here because they are read node by node.
-    struct Links : WedgeLinks<std::span<const NodeId>> {
+    struct Links : WedgeLinks<std::span<const NodeId>>, NeedArrays<ConstSpan> {
         std::span<const Index> first_triangle;
         std::span<const Triangle> triangles;
+
+        bool is_needing(NodeId node) const noexcept { return !needing.empty() && is_in(needing, node); }
+        std::span<const NodeId> needs_of(NodeId node) const noexcept {
+            const Index k = rank_in(needing, node);
+            return needs.subspan(first_need[k], first_need[k + 1] - first_need[k]);
+        }
 
         Index triangles_of(NodeId node) const noexcept { return first_triangle[node + 1] - first_triangle[node]; }
     };

@@ -47,7 +47,7 @@ static_assert(sizeof(TextureFacts) == 16);
 
 // `Storage`: Vector while they are filled, Array when they are done.
 template <template <class> class Storage>
-struct GeometryArrays : WedgeArrays<Storage> {
+struct GeometryArrays : WedgeArrays<Storage>, NeedArrays<Storage> {
     Storage<NodeId> parents; // by node: interior nodes, then places
 
     // By wedge.
