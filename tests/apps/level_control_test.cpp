@@ -116,9 +116,9 @@ TEST(LevelChain, MeetsTheTrianglesAskedForThoughFoldsAreSeenFromAsFar) {
     const auto recipe = require(session.recipe(session.default_view(), {}));
     const double all = session.tree().triangle_count();
     for (const double share : {0.5, 0.3, 0.2, 0.1, 0.05}) {
-        const auto chain = require(LevelChain::by_triangles(
-            session.tree(), *recipe->criterion,
-            {.levels = 2, .most_share = share, .least_share = share, .least_triangles = 1}));
+        const auto chain = require(
+            LevelChain::by_triangles(session.tree(), *recipe->criterion,
+                                     {.levels = 2, .most_share = share, .least_share = share, .least_triangles = 1}));
         ASSERT_EQ(chain->size(), 2) << share;
         EXPECT_NEAR(chain->triangles(1), share * all, 0.03 * share * all) << share;
     }
