@@ -4,7 +4,7 @@
 #include <queue>
 
 #include "cut/decide_tree.h"
-#include "cut/needs.h"
+#include "tree/needs.h"
 
 namespace unseen::vdtree {
 

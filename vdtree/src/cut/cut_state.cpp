@@ -53,9 +53,10 @@ CutState::CutState(const VertexTree& tree)
     : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), wanted_(unfolded_.size()), closer_(tree_),
       proxy_(tree.leaf_count(), VertexTree::root()), revision_(first_revision()) {
     if (!tree.is_locked()) return;
-    set_unfolded(VertexTree::root());
-    has_all_needed_ = false; // by this one
-    for (const NodeId child : children_of(VertexTree::root())) assign(child);
+    has_all_needed_ = false; // by the root
+    AdjustStats ignored;
+    change_to(wanted_, ignored);
+    changes_.clear();
 }
 CutState::~CutState() = default;
 

@@ -5,7 +5,7 @@
 #include <unseen/vdtree/function_ref.h>
 #include <unseen/vdtree/internal/node_bits.h>
 
-#include "cut/needs.h"
+#include "tree/needs.h"
 
 namespace unseen::vdtree {
 

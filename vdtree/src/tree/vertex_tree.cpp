@@ -8,6 +8,7 @@
 #include <unseen/vdtree/internal/texture_bounds.h>
 
 #include "tree/mask_pool.h"
+#include "tree/needs.h"
 #include "tree/node_check.h"
 
 namespace unseen::vdtree {
@@ -231,6 +232,9 @@ VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)
               g.first_triangle,
               g.triangles};
     is_locked_ = !g.fold_weights.empty() && std::isinf(g.fold_weights[root()]);
+    if (!is_locked_) return;
+    std::vector<std::uint64_t> locked(words_for(interior_count()));
+    NeedCloser(*this).add(root(), locked, [&](NodeId node) { locked_triangles_ += links_.triangles_of(node); });
 }
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;

@@ -378,10 +378,10 @@ public:
     // Protection, see MeshView::weights and BuildOptions::border_weight. What is multiplied with the cost of a node's fold, at least the children's: by
     // interior node; one value: the root's, and 1 for all others; empty: 1 for all.
     std::span<const float> fold_weights() const noexcept;
-    // Whether the root never folds. The places that never fold are among its children: no cut has fewer triangles than
-    // vanish there.
+    // Whether the root never folds. The places that never fold are among its children: no cut of a criterion has fewer
+    // triangles than vanish there, and at what the root needs.
     bool is_locked() const noexcept { return is_locked_; }
-    Index locked_triangles() const noexcept { return is_locked_ ? links_.triangles_of(root()) : 0; }
+    Index locked_triangles() const noexcept { return locked_triangles_; }
 
     // The input: by leaf its first vertex, by triangle its number, and its ranges (groups, materials). The last two are
     // empty if the input had no ranges.
@@ -453,6 +453,7 @@ private:
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
     bool is_locked_ = false;
+    Index locked_triangles_ = 0;
     // Views of data_, kept here because they are read node by node.
     struct Links : WedgeLinks<std::span<const NodeId>>, NeedArrays<ConstSpan> {
         std::span<const Index> first_triangle;
