@@ -59,7 +59,9 @@ public:
             }
             const Entry root{infinity, infinity, number, VertexTree::root()};
             set_bit(decision_.unfolded[number], root.node);
-            draw(root, [](NodeId) {});
+            drawn_[number] = decision_.unfolded[number];
+            closers_[number].close(drawn_[number], [](NodeId) {});
+            triangles_ += tree(number).locked_triangles();
             ask_children({&root, 1});
         }
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
@@ -85,29 +87,34 @@ private:
     }
     const VertexTree& tree(std::uint32_t number) const { return sources_[number]->tree; }
     std::uint64_t triangles_of(const Entry& e) const { return unchecked_links(tree(e.tree)).triangles_of(e.node); }
-    // Unfolds the node and what it needs: f(node) hears of each.
-    template <class F>
-    void draw(const Entry& e, F&& f) {
-        const auto& links = unchecked_links(tree(e.tree));
-        closers_[e.tree].add(e.node, drawn_[e.tree], [&](NodeId node) {
-            triangles_ += links.triangles_of(node);
-            f(node);
-        });
-    }
     bool is_drawn(const Entry& e) const { return test_bit(drawn_[e.tree], e.node); }
-    // Unfolds all of them, and what they need; false, and does nothing, if that does not fit.
-    bool take(std::span<const Entry> entries) {
+    std::uint64_t more_triangles_of(const Entry& e) const { return is_drawn(e) ? 0 : triangles_of(e); }
+
+    // Unfolds all of them, which show so many triangles more, and what they need; false, and does nothing, if that does
+    // not fit.
+    bool take(std::span<const Entry> entries, std::uint64_t more_triangles) {
         const std::uint64_t before = triangles_;
-        drawn_now_.clear();
+        triangles_ += more_triangles;
+        drawn_before_.clear();
+        drawn_for_them_.clear();
         for (const Entry& e : entries) {
-            draw(e, [&](NodeId node) { drawn_now_.emplace_back(e.tree, node); });
-            if (triangles_ <= limits_.triangles) continue;
-            triangles_ = before;
-            for (const auto& [of, node] : drawn_now_) clear_bit(drawn_[of], node);
-            return false;
+            if (is_drawn(e)) drawn_before_.push_back(e);
+            else set_bit(drawn_[e.tree], e.node);
         }
-        for (const Entry& e : entries) set_bit(decision_.unfolded[e.tree], e.node);
-        return true;
+        for (const Entry& e : entries)
+            closers_[e.tree].add_needs_of(e.node, drawn_[e.tree], [&](NodeId node) {
+                drawn_for_them_.push_back({0, 0, e.tree, node});
+                triangles_ += triangles_of(drawn_for_them_.back());
+            });
+        if (triangles_ <= limits_.triangles) {
+            for (const Entry& e : entries) set_bit(decision_.unfolded[e.tree], e.node);
+            return true;
+        }
+        triangles_ = before;
+        for (const Entry& e : entries) clear_bit(drawn_[e.tree], e.node);
+        for (const Entry& e : drawn_for_them_) clear_bit(drawn_[e.tree], e.node);
+        for (const Entry& e : drawn_before_) set_bit(drawn_[e.tree], e.node);
+        return false;
     }
     void leave(const Entry& e) {
         decision_.threshold = std::max(decision_.threshold, e.cost);
@@ -318,7 +325,7 @@ private:
             for (std::size_t i = 0; i < fresh.size(); ++i) {
                 if (i + ahead < fresh.size())
                     prefetch(&unchecked_links(tree(fresh[i + ahead].tree)).first_triangle[fresh[i + ahead].node]);
-                if (!is_drawn(fresh[i])) sum += triangles_of(fresh[i]);
+                sum += more_triangles_of(fresh[i]);
             }
             all.insert(all.end(), fresh.begin(), fresh.end());
             if (sum > limits_.triangles && all.size() > most) {
@@ -331,7 +338,7 @@ private:
                 bucket, [&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); },
                 [&](const Entry& entry) { bounded_below.push_back(entry); });
         }
-        if (sum > limits_.triangles || !take(all)) {
+        if (sum > limits_.triangles || !take(all, sum - triangles_)) {
             finish(std::move(all), below, bounded_below);
             return false;
         }
@@ -343,7 +350,7 @@ private:
     void finish(std::vector<Entry> all, std::span<const Entry> below, std::span<const Entry> bounded_below) {
         std::sort(all.begin(), all.end(), comes_first);
         std::size_t i = 0;
-        while (i < all.size() && take({&all[i], 1})) ++i;
+        while (i < all.size() && take({&all[i], 1}, more_triangles_of(all[i]))) ++i;
         // What is left is folded, as far as its parent is not.
         const auto is_folded_under_unfolded = [&](const Entry& e) {
             const NodeId parent = unchecked_links(tree(e.tree)).parents[e.node];
@@ -361,7 +368,7 @@ private:
         std::priority_queue queue(comes_later, std::move(waiting));
         while (!queue.empty()) {
             const Entry entry = queue.top();
-            if (!take({&entry, 1})) break;
+            if (!take({&entry, 1}, more_triangles_of(entry))) break;
             queue.pop();
             ask_children({&entry, 1});
             answer([&](const Entry& child) { queue.push(child); });
@@ -373,8 +380,8 @@ private:
     const BudgetLimits& limits_;
     std::uint64_t triangles_ = 0; // of what is drawn
     std::vector<NeedCloser> closers_;
-    std::vector<std::vector<std::uint64_t>> drawn_; // what is unfolded, and what that needs
-    std::vector<std::pair<std::uint32_t, NodeId>> drawn_now_;
+    std::vector<std::vector<std::uint64_t>> drawn_;    // what is unfolded, and what that needs
+    std::vector<Entry> drawn_before_, drawn_for_them_; // scratch
     std::vector<std::vector<Entry>> buckets_{bucket_count};
     std::vector<std::vector<Entry>> bounded_{bucket_count}; // of which only bounds are known yet
     std::size_t far_bucket_ = 0;

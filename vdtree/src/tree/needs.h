@@ -16,10 +16,18 @@ void for_each_need(const Links& links, std::span<const std::uint64_t> set, F&& f
         const auto unfolded = static_cast<std::uint32_t>(set[word / 2] >> (32 * (word % 2)));
         const RankWord& needing = links.needing[word];
         if ((needing.bits & unfolded) == 0) continue;
-        Index k = needing.before;
-        for (std::uint32_t bits = needing.bits; bits; bits &= bits - 1, ++k)
-            if (bits & -bits & unfolded)
-                for (Index i = links.first_need[k]; i < links.first_need[k + 1]; ++i) f(links.needs[i]);
+        const auto of_nodes = [&](Index first, Index end) {
+            for (Index i = links.first_need[first]; i < links.first_need[end]; ++i) f(links.needs[i]);
+        };
+        // Mostly all of them.
+        if ((needing.bits & ~unfolded) == 0) {
+            of_nodes(needing.before, needing.before + count_bits(needing.bits));
+            continue;
+        }
+        for (std::uint32_t bits = needing.bits & unfolded; bits; bits &= bits - 1) {
+            const Index k = needing.before + count_bits(needing.bits & ((bits & -bits) - 1));
+            of_nodes(k, k + 1);
+        }
     }
 }
 
@@ -29,12 +37,9 @@ class NeedCloser {
 public:
     explicit NeedCloser(const VertexTree& tree) : tree_(tree), links_(unchecked_links(tree)) {}
 
-    // A sound node, whose parent is in the set, and what follows from it. f(node) hears of each that is new.
+    // What follows from a node of the set. f(node) hears of each that is new.
     template <class F>
-    void add(NodeId node, std::span<std::uint64_t> set, F&& f) {
-        if (test_bit(set, node)) return;
-        set_bit(set, node);
-        f(node);
+    void add_needs_of(NodeId node, std::span<std::uint64_t> set, F&& f) {
         if (!links_.is_needing(node)) return;
         for (const NodeId need : links_.needs_of(node)) let_wait(need, set);
         add_waiting(set, f);

@@ -234,7 +234,9 @@ VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)
     is_locked_ = !g.fold_weights.empty() && std::isinf(g.fold_weights[root()]);
     if (!is_locked_) return;
     std::vector<std::uint64_t> locked(words_for(interior_count()));
-    NeedCloser(*this).add(root(), locked, [&](NodeId node) { locked_triangles_ += links_.triangles_of(node); });
+    set_bit(locked, root());
+    locked_triangles_ = links_.triangles_of(root());
+    NeedCloser(*this).close(locked, [&](NodeId node) { locked_triangles_ += links_.triangles_of(node); });
 }
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
