@@ -108,8 +108,9 @@ Result<LevelChain> LevelChain::create(const vdtree::VertexTree& tree, const vdtr
     // What is seen from nowhere, or from everywhere, tells no factor: then triangles do.
     if (!has_factor) return by_triangles(tree, criterion, options);
     const int steps = options.levels - 2;
-    for (int i = 0; i <= steps; ++i)
-        chain->add(steps == 0 ? nearest : nearest * std::pow(farthest / nearest, static_cast<double>(i) / steps));
+    for (int i = 0; i < std::max(steps, 1); ++i)
+        chain->add(nearest * std::pow(farthest / nearest, i / std::max<double>(steps, 1)));
+    if (steps > 0) chain->add(farthest);
     return chain;
 }
 

@@ -180,7 +180,8 @@ Result<SpatialNumbering> number_by_space(const ClusterInput& input, const Member
     std::iota(n.place_of_slot.begin(), n.place_of_slot.end(), Index{0});
     n.folding = folding_places(input);
     if (n.folding < slots)
-        std::ranges::stable_partition(n.place_of_slot, [&](Index place) { return may_fold(input.weights[place]); });
+        std::stable_partition(n.place_of_slot.begin(), n.place_of_slot.end(),
+                              [&](Index place) { return may_fold(input.weights[place]); });
     const std::span<Index> folding = std::span(n.place_of_slot).first(n.folding);
     KdPartition(input.mesh.positions, folding, n.parts)
         .run(members.first_part(members.rank()), members.first_part(members.rank() + 1));

@@ -211,9 +211,9 @@ private:
         parallel_loop(NodeId{0}, interior_, [&](NodeId vanishing) {
             for (Index t = mesh_.first_triangle[vanishing]; t < mesh_.first_triangle[vanishing + 1]; ++t) {
                 const auto place = [&](std::size_t k) { return place_node(mesh_.triangles[t][k]) - interior_; };
-                const auto [low, high] = std::minmax({place(0), place(1), place(2)});
+                const std::pair<Index, Index> ends = std::minmax({place(0), place(1), place(2)});
                 const NodeId whole = ancestors.lowest(vanishing, [&](NodeId node) {
-                    return shape_.first_leaf[node] <= low && high < shape_.leaf_end[node];
+                    return shape_.first_leaf[node] <= ends.first && ends.second < shape_.leaf_end[node];
                 });
                 joins[t] = whole == vanishing ? no_node : whole;
             }
@@ -570,7 +570,8 @@ private:
             parents_below_[node] = std::move(below);
         }
         number.assign(state.components.size(), none);
-        auto& [wedges, components] = space.compacted;
+        auto& wedges = space.compacted.wedges;
+        auto& components = space.compacted.components;
         space.compacted.clear();
         for_each_wedge(state, space, [&](Index w) {
             WedgeState& wedge = wedges.emplace_back(state.wedges[w]);
