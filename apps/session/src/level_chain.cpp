@@ -100,7 +100,7 @@ Result<LevelChain> LevelChain::create(const vdtree::VertexTree& tree, const vdtr
     if (!chain || options.levels == 1) return chain;
     const auto budget = [&](double share) {
         return std::max({options.least_triangles, vdtree::Index(1),
-                         static_cast<vdtree::Index>(share * static_cast<double>(tree.triangle_count()))});
+                         static_cast<vdtree::Index>(std::ceil(share * static_cast<double>(tree.triangle_count())))});
     };
     const double nearest = chain->distance_of(budget(options.most_share)),
                  farthest = chain->distance_of(budget(options.least_share));
