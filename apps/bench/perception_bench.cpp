@@ -545,7 +545,7 @@ private:
                              1,
                              {},
                              rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +
-                                 " px: no one tolerance does for both; the perceptual threshold is 1 everywhere"});
+                                 " px. No one tolerance does for both. The perceptual threshold is 1 everywhere"});
         }
         for (const FoldTest test : tests) add_line({.fold_test = test}, "threshold 1", "everywhere");
         report_.tables.push_back(std::move(details));

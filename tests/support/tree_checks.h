@@ -364,7 +364,7 @@ TurnedTriangles turned_triangles(const VertexTree& tree, const std::vector<bool>
     return found;
 }
 
-// Of a cut that a criterion has made: it unfolds what is wanted and what that needs; no triangle is turned over.
+// Checks a cut that a criterion has made: it unfolds what is wanted and what that needs, and turns no triangle over.
 inline std::string fault_in_needs(const Cut& cut) {
     const VertexTree& tree = cut.tree();
     std::vector<bool> wanted(tree.interior_count()), unfolded(tree.interior_count());

@@ -33,7 +33,7 @@ constexpr double sure_angle = 1e-8;
 
 constexpr int slab_units = 127; // of NormalSlabs in 1
 
-// Of a distance from a plane, as a share of the way to a point on it: vdtree::plane_normal()'s rounding.
+// How far vdtree::plane_normal()'s rounding shifts a distance from a plane, as a share of the way to a point on it.
 constexpr double plane_rounding = 0x1p-24;
 
 constexpr Index most_leaves_measured = 4096; // of a node: verify()'s

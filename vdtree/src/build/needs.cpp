@@ -66,7 +66,7 @@ private:
         bool is_on_mirror;
     };
     using Chain = std::vector<Stand>;
-    // Of each triangle that turns over in some cut, one at least, if only of no node.
+    // Each triangle that turns over in some cut adds one or more; one without nodes, if nothing has to be needed.
     struct NeedOfTriangle {
         Index triangle;
         Need need;

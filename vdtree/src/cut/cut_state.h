@@ -31,7 +31,7 @@ public:
     std::span<const FoldChange> changes() const noexcept { return changes_; }
     // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
     std::uint64_t revision() const noexcept { return revision_; }
-    // Of interior nodes, as the next.
+    // Precondition of these two: the node is interior.
     bool is_wanted(NodeId node) const noexcept { return test_bit(wanted_, node); }
     bool is_changed_by_hand() const noexcept { return !has_all_needed_; }
     bool is_unfolded_interior(NodeId node) const noexcept { return test_bit(unfolded_, node); }

@@ -34,7 +34,7 @@ public:
     const glm::dvec3& normal() const { return normal_; }
 
 private:
-    // Of any length, in double: triangles of a large model may be tiny.
+    // Not normalised, and in double, for triangles of a large model may be tiny.
     static glm::dvec3 normal_of(const Positions& p) {
         const glm::dvec3 a(p[0]);
         return glm::cross(glm::dvec3(p[1]) - a, glm::dvec3(p[2]) - a);

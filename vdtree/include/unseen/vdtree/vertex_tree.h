@@ -375,8 +375,8 @@ public:
     // or its borders do not count.
     std::span<const float> displacement() const noexcept;
 
-    // Protection, see MeshView::weights and BuildOptions::border_weight. What is multiplied with the cost of a node's fold, at least the children's: by
-    // interior node; one value: the root's, and 1 for all others; empty: 1 for all.
+    // Protection, see MeshView::weights and BuildOptions::border_weight. By interior node: what the cost of its fold is
+    // multiplied with, at least the children's. One value is the root's, and 1 for all others; empty is 1 for all.
     std::span<const float> fold_weights() const noexcept;
     // Whether the root never folds. The places that never fold are among its children: no cut of a criterion has fewer
     // triangles than vanish there, and at what the root needs.
