@@ -148,10 +148,6 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     return true;
 }
 
-} // namespace
-
-namespace {
-
 float radius_of(const VertexTree& tree, const DistanceCriterion::Parts& parts, NodeId node) {
     return parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring.radius
                                                              : tree.support_spheres()[node].radius;

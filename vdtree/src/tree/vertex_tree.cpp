@@ -368,8 +368,8 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.parents, g.several, g.extra_wedges, g.further, g.leaf_ranks, g.wedge_ranks, g.needing,
                     g.first_need, g.needs, g.positions, g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end,
                     g.subtree_end, g.first_triangle, g.bounds, g.support_spheres, g.mask_at, g.mask_records,
-                    g.displacement, g.triangles, g.source_triangles, g.source_vertices, g.document, g.texels,
-                    g.ring_texture) +
+                    g.displacement, g.fold_weights, g.locked_positions, g.triangles, g.source_triangles,
+                    g.source_vertices, g.document, g.texels, g.ring_texture) +
            bytes_of(l.luminance, l.support_range, l.ring_range, l.adaptation);
 }
 
