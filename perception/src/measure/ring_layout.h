@@ -415,8 +415,7 @@ void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<
     std::size_t count = 0;
     const auto keep_once = [](auto& values) {
         std::ranges::sort(values);
-        const auto again = std::ranges::unique(values);
-        values.erase(again.begin(), again.end());
+        values.erase(std::unique(values.begin(), values.end()), values.end()); // clang 14 has no ranges::unique
     };
     for (const NodeId shown : ring.shown)
         if (shown != node) neighbours.push_back(shown);
