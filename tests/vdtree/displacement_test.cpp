@@ -162,7 +162,7 @@ TEST(Displacement, BoundsTheDistanceOnFurtherMeshes) {
     const auto files = support::extra_meshes();
     if (files.empty()) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES is not set";
     const support::TempFolder scratch;
-    constexpr std::size_t most_triangles = 100'000, points = 4000;
+    constexpr std::size_t most_triangles = 50'000, points = 1000;
     for (const auto& file : files) {
         const auto read = meshio::read_mesh(support::uncompressed(file, scratch.path()));
         if (!read || read->mesh.triangles.size() > most_triangles) continue;
