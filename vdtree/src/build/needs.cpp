@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/tree_shape.h>
 
 #include "tree/turned.h"
@@ -75,12 +76,6 @@ private:
         std::vector<NeedOfTriangle> needs;
         std::vector<Need> impossible;
     };
-    struct Ways {
-        std::array<Chain, 3> chains;
-        std::vector<double> x, y, z; // of the last chain, relative to the first corner's place
-        std::vector<Need> needs;
-        std::size_t left = 0; // to try at the triangles to come
-    };
 
     void find_vanishing() {
         vanishes_at_.resize(g_.triangles.size());
@@ -134,40 +129,73 @@ private:
         return node;
     }
 
-    // Whether a triangle with corners at two nodes may turn over where the third one is any of its chain. Mostly it does
-    // not, and this takes less than the tests themselves.
-    class SideFilter {
+    // Where a triangle is seen from its front, and likewise in the texture: its corners' chains in floats. Mostly no way
+    // turns it over, and this takes less than the tests themselves.
+    class Front {
     public:
-        SideFilter(const glm::dvec3& normal, Ways& ways)
-            : origin_(ways.chains[0][0].position), normal_(normal), ways_(ways) {
-            const Chain& c = ways.chains[2];
-            for (std::vector<double>* const to : {&ways.x, &ways.y, &ways.z}) to->resize(c.size());
-            for (std::size_t i = 0; i < c.size(); ++i) {
-                const glm::dvec3 p = glm::dvec3(c[i].position) - origin_;
-                ways.x[i] = p.x, ways.y[i] = p.y, ways.z[i] = p.z;
-            }
-            double extent = 0;
-            for (const Chain& chain : ways.chains)
-                for (const Stand& stand : chain)
-                    extent = std::max(extent, glm::length(glm::dvec3(stand.position) - origin_));
-            constexpr double rounding = 1e-13; // of some ten operations, and more
-            slack_ = rounding * glm::length(normal) * extent * extent;
+        static constexpr std::size_t lanes = 4;
+
+        // place_of(stand): two coordinates of up to 2, in which the triangle itself runs counter-clockwise.
+        template <class PlaceOf>
+        void set(const std::array<Chain, 3>& chains, PlaceOf&& place_of) {
+            for (std::size_t k = 0; k < 3; ++k)
+                for (std::size_t i = 0; i < (chains[k].size() + lanes - 1) / lanes * lanes; ++i) {
+                    const glm::vec2 p = place_of(chains[k][std::min(i, chains[k].size() - 1)]);
+                    x_[k][i] = p.x, y_[k][i] = p.y;
+                }
         }
-        bool may_turn(const glm::vec3& at_a, const glm::vec3& at_b) const {
-            const glm::dvec3 a = glm::dvec3(at_a) - origin_, b = glm::dvec3(at_b) - origin_;
-            const glm::dvec3 side = glm::cross(normal_, b - a);
-            const double least = glm::dot(side, a) + slack_;
-            int few = 0;
-            for (std::size_t i = 0; i < ways_.x.size(); ++i)
-                few |= side.x * ways_.x[i] + side.y * ways_.y[i] + side.z * ways_.z[i] < least;
-            return few != 0;
+        // Of the stands of the last chain from `first` on, as many as there are lanes: a bit for each where the triangle may
+        // be turned over.
+        std::uint32_t suspects(std::size_t at_a, std::size_t at_b, std::size_t first) const {
+            constexpr float slack = 2e-5f; // of the area; roundings are below 2e-6
+            const float x = x_[0][at_a], y = y_[0][at_a], to_x = x_[1][at_b] - x, to_y = y_[1][at_b] - y;
+            Float4 x_of_c, y_of_c;
+            std::memcpy(&x_of_c, &x_[2][first], sizeof x_of_c);
+            std::memcpy(&y_of_c, &y_[2][first], sizeof y_of_c);
+            return FourWide::bits_of(to_x * (y_of_c - y) - to_y * (x_of_c - x) > slack) ^ 0xf; // NaN is suspect
         }
 
     private:
-        glm::dvec3 origin_, normal_;
-        const Ways& ways_;
-        double slack_;
+        std::array<std::array<float, longest_chain + lanes>, 3> x_, y_;
     };
+
+    struct Ways {
+        std::array<Chain, 3> chains;
+        Front in_space, in_texture;
+        std::vector<Need> needs;
+        std::size_t left = 0; // to try at the triangles to come
+    };
+
+    // Along the triangle's normal onto the plane of two axes, relative to the first corner.
+    static void show(const std::array<Chain, 3>& chains, const glm::dvec3& normal, Front& front) {
+        const glm::vec3 origin = chains[0][0].position;
+        float squared = 0;
+        for (const Chain& chain : chains)
+            for (const Stand& stand : chain)
+                squared = std::max(squared, glm::dot(stand.position - origin, stand.position - origin));
+        const float scale = 1 / std::sqrt(squared); // not finite where floats are too coarse: all are suspect
+        const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
+        const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+        const int u = normal[axis] > 0 ? (axis + 1) % 3 : (axis + 2) % 3, v = 3 - axis - u;
+        const double by = static_cast<double>(scale) / normal[axis];
+        const float u_by = static_cast<float>(normal[u] * by), v_by = static_cast<float>(normal[v] * by);
+        front.set(chains, [&](const Stand& stand) {
+            const glm::vec3 p = stand.position - origin;
+            return glm::vec2(p[u] * scale - p[axis] * u_by, p[v] * scale - p[axis] * v_by);
+        });
+    }
+    static void show_texture(const std::array<Chain, 3>& chains, bool is_mirrored, Front& front) {
+        const glm::vec2 origin = chains[0][0].uv;
+        float squared = 0;
+        for (const Chain& chain : chains)
+            for (const Stand& stand : chain)
+                squared = std::max(squared, glm::dot(stand.uv - origin, stand.uv - origin));
+        const float scale = 1 / std::sqrt(squared);
+        front.set(chains, [&](const Stand& stand) {
+            const glm::vec2 p = (stand.uv - origin) * scale;
+            return is_mirrored ? glm::vec2(p.y, p.x) : p;
+        });
+    }
 
     // Adds what is found at those triangles; returns needs of nodes that are not smaller than what they need.
     std::vector<Need> look_at(std::span<const Index> triangles, std::vector<NeedOfTriangle>& needs) const {
@@ -201,9 +229,12 @@ private:
     std::vector<Index> take_around(std::span<const NodeId> nodes, std::vector<NeedOfTriangle>& found) const {
         std::vector<std::uint8_t> is_one(tree_.interior());
         for (const NodeId node : nodes) is_one[node] = 1;
+        std::vector<std::uint8_t> is_under(is_one);
+        for (NodeId node = 1; node < tree_.interior(); ++node) is_under[node] |= is_under[g_.parents[node]];
         const auto is_near = [&](Index t) {
             return std::ranges::any_of(g_.triangles[t], [&](Index leaf) {
                 NodeId node = g_.parents[tree_.place_of_leaf(leaf)];
+                if (!is_under[node]) return false;
                 for (std::size_t step = 0; step < longest_chain && !is_one[node]; ++step) {
                     if (is_above(node, vanishes_at_[t]) && !joins_[node]) return false;
                     node = g_.parents[node];
@@ -249,11 +280,19 @@ private:
         };
         if (count <= ways.left) {
             ways.left -= count;
-            const SideFilter filter(test.normal(), ways);
-            for (const Stand& at_a : a)
-                for (const Stand& at_b : b)
-                    if (has_uvs || filter.may_turn(at_a.position, at_b.position))
-                        for (const Stand& at_c : c) try_way(at_a, at_b, at_c);
+            show(ways.chains, test.normal(), ways.in_space);
+            const bool is_mapped = test.uv_area() != 0;
+            if (is_mapped) show_texture(ways.chains, test.uv_area() < 0, ways.in_texture);
+            for (std::size_t i = 0; i < a.size(); ++i)
+                for (std::size_t j = 0; j < b.size(); ++j)
+                    for (std::size_t first = 0; first < c.size(); first += Front::lanes) {
+                        std::uint32_t suspects = ways.in_space.suspects(i, j, first);
+                        if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first);
+                        for (; suspects; suspects &= suspects - 1) {
+                            const std::size_t k = first + static_cast<std::size_t>(std::countr_zero(suspects));
+                            if (k < c.size()) try_way(a[i], b[j], c[k]);
+                        }
+                    }
         } else {
             std::array<std::size_t, 3> at{};
             do try_way(a[at[0]], b[at[1]], c[at[2]]);
@@ -305,14 +344,17 @@ private:
         if (is_smaller(large->node, one->node)) std::swap(large, one);
         if (is_smaller(large->node, other->node)) std::swap(large, other);
         NodeId above = is_smaller(one->above, other->above) ? one->above : other->above;
-        if (is_smaller(above, large->node)) return needs.push_back({above, large->node});
+        if (const Need need{above, large->node}; is_smaller(need.node, need.needed)) {
+            if (needs.empty() || needs.back() != need) needs.push_back(need); // neighbouring ways mostly find the same
+            return;
+        }
         if (is_smaller(large->above, above)) above = large->above;
         impossible.push_back({above, large->node});
     }
 
     // Without those that follow from another one, for an unfolded node is under unfolded ones.
     void keep_least(std::vector<Need>& needs) const {
-        std::ranges::sort(needs, {}, [](const Need& need) { return std::pair(need.needed, need.node); });
+        std::ranges::sort(needs, {}, [](const Need& need) { return std::uint64_t{need.needed} << 32 | need.node; });
         std::size_t kept = 0;
         for (const Need& need : needs) {
             if (kept > 0 && needs[kept - 1].needed == need.needed &&

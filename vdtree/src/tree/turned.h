@@ -24,14 +24,16 @@ public:
     using Positions = std::array<glm::vec3, 3>;
     using Uvs = std::array<glm::vec2, 3>;
 
-    TurnedTest(const Positions& positions, const Uvs& uvs) : normal_(normal_of(positions)), uv_area_(uv_area(uvs)) {}
+    TurnedTest(const Positions& positions, const Uvs& uvs)
+        : normal_(normal_of(positions)), uv_area_(vdtree::uv_area(uvs)) {}
 
     bool is_turned(const Positions& positions) const { return glm::dot(normal_of(positions), normal_) < 0; }
     bool is_mirrored(const Uvs& uvs) const {
-        return uv_area_ != 0 && (uv_area_ > 0 ? uv_area(uvs) < 0 : uv_area(uvs) > 0);
+        return uv_area_ != 0 && (uv_area_ > 0 ? vdtree::uv_area(uvs) < 0 : vdtree::uv_area(uvs) > 0);
     }
 
     const glm::dvec3& normal() const { return normal_; }
+    float uv_area() const { return uv_area_; }
 
 private:
     // Not normalised, and in double, for triangles of a large model may be tiny.
