@@ -1,6 +1,7 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
 
 #include "run_command.h"
+#include "tree_file.h"
 
 namespace command_test {
 
@@ -359,6 +360,19 @@ TEST_F(BuildTest, SaysWhereHardEdgesComeFrom) {
               std::tuple(Json({{"source", "asked"}, {"degrees", 180}}), 8));
     EXPECT_EQ(creases({"round.obj"}, "as the mesh says"),
               std::tuple(Json({{"source", "file"}, {"degrees", nullptr}}), 8));
+}
+
+TEST_F(BuildTest, TreesOfAnEarlierVersionAreRefused) {
+    using unseen::support::TreeFile;
+    build_ball();
+    std::string bytes = read_text(path("ball.vdt"));
+    unseen::support::store(bytes, TreeFile::version_at, std::uint32_t{6});
+    TreeFile::seal(bytes);
+    write_text(path("old.vdt"), bytes);
+    for (const Words& words : {Words{"simplify", "old.vdt", "-o", "x.obj"}, {"info", "old.vdt"}})
+        EXPECT_THAT(run(words), fails(1, AllOf(IsAnErrorForPeople(), HasSubstr("old.vdt was written by an earlier"),
+                                               HasSubstr("unseen build MESH -o FILE"))));
+    EXPECT_FALSE(fs::exists(path("x.obj")));
 }
 
 TEST_F(InfoTest, SaysWhatIsUnusualAboutAMesh) {

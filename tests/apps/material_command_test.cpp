@@ -153,6 +153,45 @@ TEST_F(MaterialCommandTest, CutsKeepEverythingAndLookTheSame) {
         }
 }
 
+// Whatever image lies over it, or none that can be drawn: no triangle runs through the image beside the seam.
+TEST_F(MaterialCommandTest, SeamsHoldUnderMapsOfEveryKind) {
+    const Json map = {{"index", 0}}, maps[] = {{{"emissiveTexture", map}, {"emissiveFactor", {1, 1, 1}}},
+                                               {{"pbrMetallicRoughness", {{"metallicRoughnessTexture", map}}}},
+                                               {{"occlusionTexture", map}},
+                                               {{"normalTexture", map}},
+                                               {{"pbrMetallicRoughness", {{"baseColorTexture", map}}}}};
+    for (const Json& material : maps) {
+        SCOPED_TRACE(material.dump());
+        GltfScene scene(16, 24);
+        scene.document["materials"][0] = material;
+        scene.document["materials"][0]["name"] = "checkers";
+        scene.document["materials"].push_back({{"name", "of no triangle"}});
+        scene.document["extensionsUsed"] = {"KHR_texture_transform"};
+        auto images = this->images();
+        std::swap(images[0], images[1]); // the first one is of one colour
+        write_text(path("in.glb"), scene.glb(images));
+        const GltfContents in = read_gltf(path("in.glb"));
+        for (const Words& budget : {Words{}, {"--triangles", "400"}}) {
+            succeed(joined({"simplify", "in.glb", "--as", "model", "-o", "out.glb"}, budget));
+            const GltfContents out = read_gltf(path("out.glb"));
+            EXPECT_EQ(in.rest, out.rest) << nlohmann::json::diff(in.rest, out.rest);
+            EXPECT_EQ(in.images, out.images);
+            EXPECT_EQ(in.attributes, out.attributes);
+            const auto& ball = out.triangles.at("checkered ball 0");
+            EXPECT_GT(ball.size(), 100u);
+            for (const auto& triangle : ball)
+                for (const auto& row : triangle) { // normal, position, and coordinates: u twice round, v downward
+                    ASSERT_EQ(row.size(), 10u);
+                    if (std::abs(row[4]) > 0.9f) continue;
+                    const double turn = std::atan2(row[3], row[5]) / std::numbers::pi - static_cast<double>(row[6]);
+                    EXPECT_LT(std::abs(turn - 2 * std::round(turn / 2)), 0.1) << row[6];
+                    EXPECT_NEAR(row[9], row[6] / 2, 0.05) << "the second set is the first, turned: a vertex's nearby";
+                    EXPECT_LT(std::abs(row[6] - triangle[0][6]), 0.6) << "not through the image";
+                }
+        }
+    }
+}
+
 TEST_F(MaterialCommandTest, PartsThatVanishLeaveTheirNodes) {
     write_text(path("in.glb"), GltfScene().glb(images()));
     succeed({"simplify", "in.glb", "--triangles", "8", "-o", "out.glb"});
@@ -273,6 +312,47 @@ TEST_F(ObjMaterialTest, FullModelComesOutAsItCameIn) {
             EXPECT_EQ(read_text(path("in") / file), read_text(path("out") / file)) << file;
         fs::remove_all(path("out/images"));
     });
+}
+
+// With the materials' file lost, corners without coordinates, and a material of no triangle: what is there stays right.
+TEST_F(ObjMaterialTest, WhatIsMissingIsMissedAloneAtEveryBudget) {
+    write_model();
+    fs::remove(path("in/paint.mtl"));
+    std::string text = read_text(path("in/model.obj")), gaps;
+    std::istringstream lines(text);
+    bool is_left = false, is_upper = false; // groups go on from object to object
+    for (std::string line; std::getline(lines, line); gaps += line + '\n') {
+        if (line.starts_with("o ")) is_left = line == "o left";
+        is_upper = is_left && (is_upper || line == "g upper");
+        if (line.starts_with("usemtl gold")) gaps += "usemtl nothing\n";
+        if (!is_upper || !line.starts_with("f ")) continue;
+        for (std::size_t at = 2; (at = line.find('/', at)) != std::string::npos;) { // V/T/N to V//N
+            const std::size_t second = line.find('/', at + 1);
+            line.erase(at + 1, second - at - 1);
+            at += 2;
+        }
+    }
+    write_text(path("in/model.obj"), gaps);
+    fs::create_directories(path("out"));
+    for (const Words& budget : {Words{"--full"}, {"--triangles", "60"}, {"--triangles", "20"}, {}}) {
+        SCOPED_TRACE(::testing::PrintToString(budget));
+        EXPECT_THAT(succeed(joined({"simplify", "in/model.obj", "-o", "out/model.obj"}, budget)).err,
+                    HasSubstr("paint.mtl"));
+        const auto out = read_obj(read_text(path("out/model.obj")));
+        std::set<std::string> names;
+        for (const auto& [name, faces] : out.faces) {
+            names.insert(name);
+            for (const auto& face : faces)
+                for (const auto& corner : face) {
+                    EXPECT_EQ(corner[1] < 0, name == "left upper check") << name;
+                    if (corner[1] < 0) continue;
+                    const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]);
+                    EXPECT_NEAR(uv[0], p[0] + (p[0] < 0.1 ? 2 : -0.25), 1e-4) << name;
+                    EXPECT_NEAR(uv[1], (p[1] + 1) / 2, 1e-4) << name;
+                }
+        }
+        EXPECT_THAT(names, ::testing::ElementsAre("left  check", "left upper check", "right upper gold"));
+    }
 }
 
 TEST_F(ObjMaterialTest, FormatsBecomeEachOther) {

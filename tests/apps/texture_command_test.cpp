@@ -252,6 +252,9 @@ TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
     write_text(path("nan.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 1 1\nf 1/1 2/2 3/3\n");
     EXPECT_THAT(succeed({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"}).err,
                 HasSubstr("1 texture coordinate was not finite"));
+    write_text(path("normals.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn nan 0 1\nf 1//1 2//2 3//2\n");
+    EXPECT_THAT(succeed({"simplify", "normals.obj", "-o", "x.obj"}).err, HasSubstr("normal"));
+    EXPECT_EQ(read_text(path("x.obj")).find("nan"), std::string::npos);
 }
 
 TEST_F(TextureCommandTest, MissingMaterialsAreNoted) {

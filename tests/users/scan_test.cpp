@@ -192,7 +192,7 @@ TEST_F(ScanUsers, AsciiStl) {
     write_text(path("block.stl"), stl.str());
     expect_invisible("block.stl", "obj");
     const Json small = Json::parse(read_text(path("out/small.obj.json")));
-    EXPECT_LT(small["triangles"].get<int>(), 1000) << "of 1,728 in six planes";
+    EXPECT_LT(small["triangles"].get<int>(), 60) << "of 1,728 in six planes";
     EXPECT_EQ(examination("block.stl")["boundary_edges"], 0);
     EXPECT_EQ(examination("out/small.obj")["boundary_edges"], 0);
 }

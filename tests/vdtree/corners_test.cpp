@@ -1,6 +1,8 @@
 // Corners with values of their own, at every budget: charts, hard edges and corners of made things.
 #include <unseen/vdtree/builder.h>
 
+#include <ctime>
+#include <map>
 #include <numbers>
 
 #include <unseen/vdtree/cut.h>
@@ -135,6 +137,125 @@ TEST(Corners, TrianglesThatLieOverEachOtherKeepTheirCoordinates) {
                 const glm::dvec2 own(cut.positions[v]), other = glm::dvec2(20) - own, uv(cut.uvs[v]);
                 EXPECT_LT(std::min(glm::distance(uv, own), glm::distance(uv, other)), 1e-4) << most;
             }
+}
+
+// A bumpy ball of six charts of an atlas, with gaps between them.
+Mesh ball_with_atlas(int n) {
+    Mesh mesh;
+    for (int chart = 0; chart < 6; ++chart) {
+        const int axis = chart / 2;
+        const double sign = chart % 2 ? 1 : -1;
+        const auto first = static_cast<Index>(mesh.positions.size()), row = static_cast<Index>(n) + 1;
+        for (int i = 0; i <= n; ++i)
+            for (int j = 0; j <= n; ++j) {
+                const double s = static_cast<double>(i) / n, t = static_cast<double>(j) / n;
+                glm::dvec3 p;
+                p[axis] = sign;
+                p[(axis + 1) % 3] = std::tan(std::numbers::pi / 4 * (2 * s - 1));
+                p[(axis + 2) % 3] = sign * std::tan(std::numbers::pi / 4 * (2 * t - 1));
+                p = glm::normalize(p);
+                // Both sides of a seam get the same bits.
+                p = glm::round(p * (1 + 0.06 * std::sin(7 * p.x) * std::sin(6 * p.y + 1)) * 0x1p20) * 0x1p-20;
+                mesh.positions.push_back(p);
+                mesh.uvs.emplace_back((chart % 3 + 0.05 + 0.9 * s) / 3, (chart / 3 + 0.05 + 0.9 * t) / 2);
+            }
+        for (Index i = 0; i + 1 < row; ++i)
+            for (Index j = 0; j + 1 < row; ++j) {
+                const Index a = first + i * row + j;
+                mesh.triangles.push_back({a, a + row, a + row + 1});
+                mesh.triangles.push_back({a, a + row + 1, a + 1});
+            }
+    }
+    return mesh;
+}
+
+double uv_area(const Mesh& mesh) {
+    double sum = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const glm::dvec2 e(mesh.uvs[t[1]] - mesh.uvs[t[0]]), f(mesh.uvs[t[2]] - mesh.uvs[t[0]]);
+        sum += std::abs(e.x * f.y - e.y * f.x) / 2;
+    }
+    return sum;
+}
+
+// Of the edges whose two sides have other coordinates: the length of both sides in the texture.
+double seam_length(const Mesh& mesh) {
+    using Place = std::array<double, 3>;
+    std::map<std::pair<Place, Place>, std::vector<std::array<glm::vec2, 2>>> sides;
+    const auto place = [&](Index v) { return Place{mesh.positions[v].x, mesh.positions[v].y, mesh.positions[v].z}; };
+    for (const Triangle& t : mesh.triangles)
+        for (std::size_t k = 0; k < 3; ++k) {
+            Index a = t[k], b = t[(k + 1) % 3];
+            if (place(b) < place(a)) std::swap(a, b);
+            sides[{place(a), place(b)}].push_back({mesh.uvs[a], mesh.uvs[b]});
+        }
+    double sum = 0;
+    for (const auto& [edge, uvs] : sides) {
+        EXPECT_EQ(uvs.size(), 2u) << "it stays closed";
+        if (uvs.size() != 2 || uvs[0] == uvs[1]) continue;
+        for (const auto& ends : uvs) sum += static_cast<double>(glm::distance(ends[0], ends[1]));
+    }
+    return sum;
+}
+
+TEST(Corners, AnAtlasKeepsItsAreaAndTheLengthOfItsSeams) {
+    const Mesh whole = ball_with_atlas(32);
+    const double area = uv_area(whole), length = seam_length(whole);
+    EXPECT_NEAR(length, 12 * (0.9 / 3 + 0.9 / 2), 1e-4) << "four sides of six charts";
+    const VertexTree tree = support::built(whole);
+    struct {
+        double kept, area, length; // how far off, of the whole's
+    } const budgets[] = {{0.5, 0.02, 0.1}, {0.3, 0.03, 0.1}, {0.1, 0.1, 0.1}};
+    for (const auto& most : budgets) {
+        const Mesh cut = with_at_most(tree, static_cast<Index>(most.kept * tree.triangle_count()));
+        EXPECT_GT(static_cast<double>(cut.triangles.size()), 0.9 * most.kept * tree.triangle_count());
+        EXPECT_NEAR(uv_area(cut) / area, 1, most.area) << most.kept;
+        EXPECT_LT(seam_length(cut), (1 + most.length) * length) << most.kept;
+    }
+}
+
+// A cone whose point has other coordinates in each triangle.
+Mesh cone_with_pole(int spokes) {
+    Mesh mesh;
+    for (int i = 0; i <= spokes; ++i) {
+        const double angle = 2 * std::numbers::pi * (i % spokes) / spokes;
+        const auto u = static_cast<float>(i) / static_cast<float>(spokes);
+        mesh.positions.emplace_back(std::cos(angle), std::sin(angle), 0);
+        mesh.uvs.emplace_back(u, 1);
+        mesh.positions.emplace_back(0, 0, 1);
+        mesh.uvs.emplace_back(u, 0);
+        if (i == spokes) continue;
+        const auto v = static_cast<Index>(2 * i);
+        mesh.triangles.push_back({v, v + 2, v + 1});
+    }
+    return mesh;
+}
+
+TEST(Corners, ThousandsAtAPole) {
+    const auto cpu_seconds = [](int spokes) {
+        const Mesh cone = cone_with_pole(spokes);
+        const std::clock_t start = std::clock();
+        const VertexTree tree = support::built(cone);
+        EXPECT_EQ(tree.place_count(), static_cast<Index>(spokes + 1));
+        EXPECT_EQ(tree.leaf_count(), static_cast<Index>(2 * spokes + 1));
+        for (const Index most : {static_cast<Index>(spokes / 2), static_cast<Index>(spokes / 8)}) {
+            const Mesh cut = with_at_most(tree, most);
+            EXPECT_GT(cut.triangles.size(), 0.8 * most);
+            for (const Triangle& t : cut.triangles)
+                for (const Index v : t) {
+                    const glm::dvec3& p = cut.positions[v];
+                    if (glm::length(glm::dvec2(p)) < 0.5) continue;
+                    double turn = std::atan2(p.y, p.x) / (2 * std::numbers::pi);
+                    turn -= static_cast<double>(cut.uvs[v].x);
+                    EXPECT_LT(std::abs(turn - std::round(turn)), 0.05) << most;
+                }
+        }
+        const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+        EXPECT_TRUE(verify(tree));
+        return seconds;
+    };
+    const double few = cpu_seconds(1500), many = cpu_seconds(12000);
+    EXPECT_LT(many, 24 * few) << "8 is linear, 64 the square";
 }
 
 } // namespace

@@ -24,18 +24,18 @@ using support::read;
 // A folder of its own for each test, removed with everything in it.
 class MeshFiles : public testing::Test {
 protected:
-    MeshFiles() : folder_(fs::temp_directory_path() / ("unseen-mesh-io-" + std::to_string(std::random_device{}()))) {
-        fs::create_directories(folder_);
-    }
-    ~MeshFiles() override { fs::remove_all(folder_); }
-
     void save(const std::string& name, const std::string& bytes) const {
         std::ofstream(folder_ / name, std::ios::binary) << bytes;
     }
     std::size_t files() const {
         return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
     }
-    fs::path folder_;
+
+private:
+    const support::TempFolder own_;
+
+protected:
+    const fs::path folder_ = own_.path();
 };
 
 double area(const Mesh& mesh) {
