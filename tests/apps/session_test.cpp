@@ -1,12 +1,16 @@
 // The session library: requests that contradict themselves, plans, several objects.
 
+#include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/session.h>
 #include <unseen/vdtree/builder.h>
 
+#include "extra_meshes.h"
 #include "shapes.h"
+#include "temp_folder.h"
 #include "testing.h"
+#include "textures.h"
 #include "tree_checks.h"
 
 namespace session_test {
@@ -192,6 +196,79 @@ TEST(Follower, ComesWhereACutFromScratchIs) {
             EXPECT_EQ(support::fault_in_needs(follower.cut(object)), "") << "frame " << frame;
         }
     }
+}
+
+// Cuts for a gaze, budgets and half of the model in the window, from scratch, followed, and for both eyes of a pair.
+// How many triangles would be turned over but for what nodes need.
+vdtree::Index expect_nothing_turned(const vdtree::VertexTree& tree) {
+    auto session = *Session::create(session::Scene::of(tree.share()));
+    const auto on_mirror = tree.uvs().empty() ? std::vector<bool>() : support::wedges_on_mirrors(tree);
+    vdtree::Index turned = 0;
+    const auto check = [&](const vdtree::Cut& cut) {
+        EXPECT_EQ(support::fault_in_needs(cut), "");
+        turned += support::turned_triangles(cut.tree(), on_mirror, [&](vdtree::NodeId node) {
+                      return cut.is_wanted(node);
+                  }).in_space;
+    };
+    const vdtree::Index most = tree.triangle_count() / 4;
+    const Request requests[] = {{.purpose = session::Purpose::picture},
+                                {.fold_test = FoldTest::luebke_hallen},
+                                {.goal = Goal::budget(most, true)},
+                                {.goal = Goal::budget(most / 4), .purpose = session::Purpose::picture},
+                                {.goal = Goal::pixels(6)}};
+    for (const Request& request : requests) {
+        session::Follower follower(session);
+        vdtree::View view = session.default_view();
+        const double radius = session.bounding_sphere().radius;
+        for (int frame = 0; frame < 5; ++frame) {
+            SCOPED_TRACE("request " + std::to_string(&request - requests) + ", frame " + std::to_string(frame));
+            if (frame == 2) session.set_gaze(session::Gaze{{-100, 300}, 2});
+            if (frame == 3) view.target.x += radius; // half of it is in the window
+            view.eye += radius * (frame == 4 ? glm::dvec3(1, 2, 3) : glm::dvec3(0.03, -0.02, 0.01));
+            const auto followed = require(follower.follow(view, request));
+            check(follower.cut());
+            const auto anew = require(session.simplify(view, request));
+            check(anew->cuts[0]);
+            EXPECT_EQ(support::fault_in_cut(anew->cuts[0]), "");
+            vdtree::View other = view; // 64 mm apart, at arm's length of a model of half a metre
+            other.eye.x += 0.25 * radius, other.target.x += 0.25 * radius;
+            auto recipe = require(session.recipe(view, request));
+            recipe->viewpoint = *require(vdtree::viewpoint_of_pair(session.tree(), view, other));
+            recipe->viewpoint.lighting = require(session.recipe(view, request))->viewpoint.lighting;
+            vdtree::Cut pair(session.tree());
+            EXPECT_TRUE(pair.follow(*recipe->criterion, recipe->viewpoint, recipe->options));
+            check(pair);
+        }
+        session.set_gaze({});
+    }
+    return turned;
+}
+
+TEST(Session, TurnsNoTriangleOver) {
+    const vdtree::Texture checks = textures::checkerboard(16, 16, 4, 0, 255);
+    vdtree::Index turned = 0;
+    for (const vdtree::Mesh& mesh :
+         {shapes::bumpy_sphere(3, 0.03), shapes::spiky_star(3), shapes::cube(8),
+          textures::with_seams(textures::textured_sphere(3, checks)), textures::textured_grid(16, checks)})
+        turned += expect_nothing_turned(tree_of(mesh));
+    EXPECT_GT(turned, 0u) << "of these there are some to find";
+}
+
+TEST(Session, TurnsNoTriangleOfFurtherMeshesOver) {
+    const support::TempFolder scratch;
+    int meshes = 0;
+    for (const auto& file : support::extra_meshes()) {
+        constexpr std::uintmax_t most_bytes = 300'000; // compressed: some ten thousand triangles, measured in seconds
+        if (file.parent_path().filename() == "malformed" || std::filesystem::file_size(file) > most_bytes) continue;
+        const auto read = require(meshio::read_mesh(support::uncompressed(file, scratch.path())));
+        SCOPED_TRACE(file);
+        const vdtree::VertexTree tree = tree_of(read->mesh);
+        if (tree.triangle_count() > 50'000) continue;
+        std::cout << file.filename() << ", " << tree.triangle_count() << " triangles: " << expect_nothing_turned(tree)
+                  << " would be turned over\n";
+        ++meshes;
+    }
+    if (meshes == 0) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES names no folder of further meshes";
 }
 
 // Of what moves fast over the retina less is kept; what stands still again is refined at once, by the next call.
