@@ -1,5 +1,5 @@
-// Whether gltf-validator finds no error in NAME*.glb, and three.js the levels that NAME.json tells of, in all forms with
-// the same shape, and in NAME-cut-PERCENT.glb what NAME-source.glb has. read_levels.mjs NPM_FOLDER NAME
+// Whether gltf-validator finds no error in NAME*.glb, and three.js the levels that NAME.json tells of, in all forms
+// with the same shape. read_levels.mjs NPM_FOLDER NAME
 import fs from 'node:fs';
 import path from 'node:path';
 import {createRequire} from 'node:module';
@@ -92,41 +92,6 @@ for (const [form, is_rounded] of [['', false], ['-quantized', true], ['-compress
 for (let i = 0; i < told.length; ++i) {
     const [alone] = await levels(`${name}_lod${i}.glb`);
     expect(alone.length / 3 === told[i], `${name}_lod${i}: ${alone.length / 3} triangles, not ${told[i]}`);
-}
-// What a cut must have of its source: materials with their images, attributes by node, coordinates in the atlas.
-async function parts(file) {
-    const bytes = fs.readFileSync(file);
-    const data = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length);
-    const gltf = await new GLTFLoader().parseAsync(data, '');
-    const found = {materials: new Set(), attributes: new Map(), triangles: 0, low: [1e9, 1e9], high: [-1e9, -1e9]};
-    gltf.scene.traverse(part => {
-        if (!part.isMesh) return;
-        const {index, attributes} = part.geometry;
-        found.triangles += index.count / 3;
-        found.materials.add(part.material.name);
-        found.attributes.set(part.parent.name + part.material.name, Object.keys(attributes).sort().join());
-        for (let i = 0; attributes.uv && i < index.count; ++i)
-            for (let k = 0; k < 2; ++k) {
-                const x = attributes.uv.getComponent(index.getX(i), k);
-                found.low[k] = Math.min(found.low[k], x), found.high[k] = Math.max(found.high[k], x);
-            }
-    });
-    return found;
-}
-
-const source = await parts(name + '-source.glb');
-for (const file of files.filter(file => file.includes('-cut-'))) {
-    const cut = await parts(file), most = Math.ceil(source.triangles * Number(file.match(/-cut-(\d+)/)[1]) / 100);
-    expect(cut.triangles > 0 && cut.triangles <= most, `${file}: ${cut.triangles} triangles`);
-    for (const material of cut.materials) expect(source.materials.has(material), `${file}: material ${material}`);
-    for (const [part, names] of cut.attributes)
-        expect(source.attributes.get(part) === names,
-               `${file}: ${part} has ${names}, not ${source.attributes.get(part)}`);
-    for (let k = 0; k < 2; ++k) { // coordinates that leave the charts a little are those of a fitted proxy
-        const room = 0.02 * (source.high[k] - source.low[k]);
-        expect(cut.low[k] >= source.low[k] - room && cut.high[k] <= source.high[k] + room,
-               `${file}: coordinates from ${cut.low} to ${cut.high}, not ${source.low} to ${source.high}`);
-    }
 }
 
 console.log(`${path.basename(name)}: ${files.length} files, levels of ${told.join(', ')} triangles`);

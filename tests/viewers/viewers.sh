@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Writes levels of detail in all forms and has other programs read them. viewers.sh UNSEEN NPM_FOLDER
+# Writes levels of detail in all forms, or simplified files, and has other programs read them.
+# viewers.sh lod|round_trips UNSEEN NPM_FOLDER
 set -euo pipefail
 source cmake/setup.sh
-unseen=$1 npm=$2 here=$(cd "$(dirname "$0")" && pwd)
+unseen=$2 npm=$3 here=$(cd "$(dirname "$0")" && pwd)
 skip() { echo "skipped: $*"; exit 77; }
 
 command -v node >/dev/null || skip "node is not installed"
@@ -11,6 +12,11 @@ fetch_npm "$npm" gltf-validator@2.0.0-dev.3.10 three@0.180.0 "$models_package" |
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 export UNSEEN_CACHE=$out/cache # each tree is built once
+if [ "$1" = round_trips ]; then
+    mkdir "$out/files"
+    node "$here/round_trips.mjs" "$unseen" "$npm" "$out/files" "$npm/$models_folder/oculus-touch-v3/left.glb"
+    exit
+fi
 # A headset's controllers: several parts, materials and images.
 for model in htc-vive/none oculus-touch-v3/left; do
     name=$out/$(dirname "$model")
@@ -25,10 +31,5 @@ for model in htc-vive/none oculus-touch-v3/left; do
     lod -o "$name-quantized.glb" --quantize
     lod -o "$name-compressed.glb" --meshopt
     lod -o "$name-small.glb" --quantize --meshopt
-    cp "$npm/$models_folder/$model.glb" "$name-source.glb"
-    for percent in 100 50 10 2; do
-        "$unseen" simplify "$name-source.glb" --as model --triangles $percent% -o "$name-cut-$percent.glb" \
-            >"$out/log" 2>&1 || { cat "$out/log"; exit 1; }
-    done
     node "$here/read_levels.mjs" "$npm" "$name"
 done
