@@ -359,8 +359,7 @@ private:
         double weight = 0;
         if (t0 != u0 || t1 != u1) {
             if (!part_.materials.empty() && part_.materials[t0] != part_.materials[u0]) weight = material_weight;
-            if (const std::size_t c = part_.uv_class; c < most_classes)
-                if (!is_same(t0, u0, c) || !is_same(t1, u1, c)) weight = std::max(weight, uv_seam_weight);
+            if (part_.uv_class < most_classes) weight = std::max(weight, uv_seam_weight * tear(t0, u0, t1, u1));
             if (const std::size_t c = part_.normal_class; c < most_classes)
                 weight = std::max(weight, hard_edge_weight * (turn(t0, u0, c) + turn(t1, u1, c)) / 2);
         }
@@ -368,6 +367,20 @@ private:
             weight = std::max(weight, uv_seam_weight); // mirrored charts share their coordinates there
         if (!(weight > 0)) return;
         for (const Index side : {edge.side, edge.second_side}) add_plane_on(low, edge.high, side, weight);
+    }
+
+    // How far the coordinates of both sides are apart at an edge's two ends, against how far they run along it, squared and
+    // at most 1: at a pole whose triangles have coordinates of their own, the image is turned rather than torn.
+    double tear(Index t0, Index u0, Index t1, Index u1) const {
+        const std::size_t c = part_.uv_class;
+        const auto squared = [&](Index leaf, Index other) {
+            const float *a = values(leaf, c), *b = values(other, c);
+            const double x = static_cast<double>(a[0]) - b[0], y = static_cast<double>(a[1]) - b[1];
+            return x * x + y * y;
+        };
+        const double apart = std::max(squared(t0, u0), squared(t1, u1)),
+                     along = std::max(squared(t0, t1), squared(u0, u1));
+        return apart > 0 ? std::min(1.0, apart / along) : 0; // along may be 0
     }
 
     // 1 less the cosine between two leaves' normals.
