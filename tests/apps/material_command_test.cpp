@@ -600,6 +600,83 @@ TEST_F(BoxTest, GetsTheNormalsThatItIsDrawnWith) {
         EXPECT_TRUE(attributes.contains("NORMAL")) << name;
 }
 
+// STL of many boxes, whose facets share no vertices: a tenth of them has all corners.
+TEST_F(MaterialCommandTest, BoxesOfAnStlKeepTheirCorners) {
+    constexpr int n = 8, boxes = 20;
+    std::ostringstream stl;
+    std::vector<glm::dvec3> corners;
+    stl << "solid boxes\n";
+    for (int box = 0; box < boxes; ++box) {
+        const glm::dvec3 at(15.0 * (box % 5), 15.0 * (box / 5), 0);
+        for (int k = 0; k < 8; ++k) corners.push_back(at + glm::dvec3(k & 1 ? 10 : 0, k & 2 ? 10 : 0, k & 4 ? 10 : 0));
+        for (int side = 0; side < 6; ++side)
+            for (int i = 0; i < n * n; ++i) {
+                const auto p = [&](int u, int v) {
+                    glm::dvec3 q(0);
+                    q[side / 2] = side % 2 ? 10 : 0;
+                    q[(side / 2 + 1) % 3] = 10.0 * (i % n + u) / n, q[(side / 2 + 2) % 3] = 10.0 * (i / n + v) / n;
+                    return at + q;
+                };
+                std::array<std::array<glm::dvec3, 3>, 2> facets{
+                    {{p(0, 0), p(1, 0), p(1, 1)}, {p(0, 0), p(1, 1), p(0, 1)}}};
+                for (auto& facet : facets) {
+                    if (side % 2 == 0) std::swap(facet[1], facet[2]);
+                    stl << "facet normal 0 0 0\nouter loop\n";
+                    for (const glm::dvec3& q : facet) stl << "vertex " << q.x << ' ' << q.y << ' ' << q.z << '\n';
+                    stl << "endloop\nendfacet\n";
+                }
+            }
+    }
+    stl << "endsolid boxes\n";
+    write_text(path("boxes.stl"), stl.str());
+    succeed({"simplify", "boxes.stl", "-o", "out.obj", "--triangles", "10%"});
+    const auto out = read_obj(read_text(path("out.obj")));
+    EXPECT_LE(out.faces.begin()->second.size(), boxes * 12 * n * n / 10u);
+    for (const glm::dvec3& corner : corners) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const auto& p : out.vectors.at("v"))
+            nearest = std::min(nearest, glm::distance(corner, glm::dvec3(p[0], p[1], p[2])));
+        EXPECT_LT(nearest, 0.01);
+    }
+}
+
+// A tube of 24 sides, flat by `s off` and round in a smoothing group: drawn and written so, at every budget.
+TEST_F(MaterialCommandTest, SmoothingOfObjectsIsWrittenAsNormals) {
+    constexpr int sides = 24, rows = 8;
+    std::ostringstream obj, faces;
+    for (int r = 0; r <= rows; ++r)
+        for (int s = 0; s < sides; ++s) {
+            const double turn = 2 * std::numbers::pi * s / sides;
+            obj << "v " << std::cos(turn) << ' ' << std::sin(turn) << ' ' << r / 4.0 << '\n';
+        }
+    for (int r = 0; r < rows; ++r)
+        for (int s = 0; s < sides; ++s) {
+            const int a = r * sides + s + 1, b = r * sides + (s + 1) % sides + 1;
+            faces << "f " << a << ' ' << b << ' ' << b + sides << ' ' << a + sides << '\n';
+        }
+    for (const bool is_flat : {true, false}) {
+        write_text(path("tube.obj"), obj.str() + (is_flat ? "s off\n" : "s 1\n") + faces.str());
+        for (const Words& budget : {Words{"--full"}, {"--triangles", "192"}, {"--triangles", "96"}}) {
+            succeed(joined({"simplify", "tube.obj", "-o", "out.obj"}, budget));
+            const auto out = read_obj(read_text(path("out.obj")));
+            ASSERT_FALSE(out.faces.empty());
+            double worst = 1; // cosine to the face
+            for (const auto& face : out.faces.begin()->second) {
+                std::array<glm::dvec3, 3> p, n;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const auto &at = out.vector(0, face[k][0]), &normal = out.vector(2, face[k][2]);
+                    p[k] = {at[0], at[1], at[2]}, n[k] = {normal[0], normal[1], normal[2]};
+                }
+                const glm::dvec3 own = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
+                for (const glm::dvec3& normal : n) worst = std::min(worst, glm::dot(own, normal));
+            }
+            if (is_flat) EXPECT_GT(worst, 0.9999) << budget.back();
+            else EXPECT_LT(worst, 0.995) << budget.back();
+            EXPECT_GT(worst, 0.9) << budget.back();
+        }
+    }
+}
+
 class ProtectTest : public CommandTest {
 protected:
     static constexpr int n = 24;
