@@ -301,16 +301,21 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
     // Depth is reversed. What compares is at the depth that was drawn before, of which it is a part.
     glDepthFunc(use_ == Use::comparison ? GL_GEQUAL : GL_GREATER);
     glFrontFace(GL_CCW);
-    if (item.cull == Cull::nothing) {
-        glDisable(GL_CULL_FACE);
-    } else {
-        glEnable(GL_CULL_FACE);
-        glCullFace(item.cull == Cull::back ? GL_BACK : GL_FRONT);
-    }
+    glEnable(GL_CULL_FACE);
+    glCullFace(item.cull == Cull::front ? GL_FRONT : GL_BACK);
 
     item.program->set(clip_from_unit_location, jittered(item.projection, view_, point));
     if (output_ != Output::depth) set_colours(item, lod_bias);
     draw_triangles(*item.program, tree.arrays, cut.indices);
+    if (item.cull != Cull::nothing) return;
+    // Both sides of a leaf fold onto each other. Where they lie in one place, the one that faces the eye is seen, not the
+    // one that is drawn first: faces that turn away lie behind by more than rounding makes of depths.
+    constexpr float rounding = 16; // least differences of depths
+    glCullFace(GL_FRONT);
+    glEnable(GL_POLYGON_OFFSET_FILL);
+    glPolygonOffset(0, -rounding); // depth is reversed
+    draw_triangles(*item.program, tree.arrays, cut.indices);
+    glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
 void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {

@@ -290,5 +290,27 @@ TEST(StagePictures, DrawLittleOfWhatIsHidden) {
     }
 }
 
+// As renderers do, in whichever order the sides are drawn: leaves whose sides have folded onto each other keep them.
+TEST(StagePictures, ShowTheSideThatFacesTheEye) {
+    Mesh mesh;
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0},    {1, 0, 0},
+                      {0, 1, 0}, {0, 0, 0}, {1, 0, 0}, {0, -0.01, 0}};
+    mesh.colours.assign(9, {0.8f, 0.8f, 0.8f, 1});
+    std::fill_n(mesh.colours.begin() + 3, 3, glm::vec4(0.2f, 0.2f, 0.2f, 1));
+    mesh.triangles = {{0, 1, 2}, {4, 3, 5}, {6, 7, 8}}; // the last one, so that the surface is open
+    const VertexTree tree = support::built(mesh, {.prelit = true, .threads = 1});
+    ASSERT_EQ(tree.closedness(), Closedness::open);
+    std::vector<Triangle> sides(support::sound(tree).triangles().begin(), support::sound(tree).triangles().end());
+    for (Triangle& t : sides)
+        for (Index& corner : t) corner = tree.wedge_of_leaf(corner);
+    for (const bool is_reversed : {false, true}) {
+        if (is_reversed) std::reverse(sides.begin(), sides.end());
+        for (const std::size_t direction : {0, 25}) { // from above, from below
+            const StagePicture picture = draw(tree, sides, direction).picture;
+            EXPECT_NEAR(sum(picture.light) / sum(picture.cover), direction == 0 ? 0.8 : 0.2, 0.01) << is_reversed;
+        }
+    }
+}
+
 } // namespace fold_stages_test
 } // namespace unseen::perception

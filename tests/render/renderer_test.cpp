@@ -247,6 +247,29 @@ TEST_F(RendererTest, ShowsWhatIsNearer) {
         }
 }
 
+// Two sides in one place, in either order, of different shapes of triangles; and with a colour of its own for each.
+TEST_F(RendererTest, ShowsTheSideThatFacesTheEye) {
+    for (const bool front_first : {true, false}) {
+        Mesh front = rectangle({-7, -8}, {9, 9}, 0, grey(0.75f)), back = rectangle({-7, -8}, {9, 9}, 0, grey(0.25f));
+        for (auto& t : back.triangles) std::swap(t[1], t[2]);
+        Mesh mesh = front_first ? front : back;
+        const Mesh& other = front_first ? back : front;
+        mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());
+        mesh.colours.insert(mesh.colours.end(), other.colours.begin(), other.colours.end());
+        for (const auto& t : other.triangles) mesh.triangles.push_back({t[1] + 4, t[2] + 4, t[0] + 4});
+        add_rectangle(mesh, {20, 20}, {21, 21}, 0, grey(0.5f)); // else the two would be closed
+        const Scene scene(mesh);
+        ASSERT_EQ(scene.tree.closedness(), unseen::vdtree::Closedness::open);
+        View view = frontal_view(32, 32);
+        for (const double aside : {0.0, 0.3}) {
+            view.eye = {aside, -aside, 1};
+            EXPECT_THAT(draw(scene, view).luminance, ::testing::Each(::testing::FloatNear(0.75f, value_tolerance)));
+            view.eye = {aside, -aside, -1};
+            EXPECT_THAT(draw(scene, view).luminance, ::testing::Each(::testing::FloatNear(0.25f, value_tolerance)));
+        }
+    }
+}
+
 TEST_F(RendererTest, DrawsOpenSurfacesFromBothSidesAlike) {
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
     View view = frontal_view(16, 16);

@@ -19,6 +19,9 @@ constexpr std::size_t samples = stage_samples;
 constexpr float nothing = -std::numeric_limits<float>::infinity(); // is at a sample
 // Pictures in which so many surfaces lie behind each other on average are drawn with covers from there on.
 constexpr std::size_t most_layers = 4;
+// Where two faces lie in one place, as the sides of leaves do once they are folded, renderers show the one that faces the
+// eye. The other lies behind by this: more than rounding makes of heights, less than a thousandth of a cell.
+constexpr float behind = 1e-3f; // samples
 constexpr std::uint64_t every_tile = (std::uint64_t{1} << StageCovers::per_side) - 1;
 
 // A footprint and its luminances.
@@ -303,6 +306,8 @@ std::optional<StageFootprint> StagePainter::footprint(const Triangle& corners) c
     if (t.first >= t.end) return std::nullopt; // many, of fine meshes
     const float inverse = 1 / area;
     if (!std::isfinite(inverse)) return std::nullopt;
+    if (closedness_ == Closedness::open && area < 0)
+        for (Float4* const corner : {&t.a, &t.b, &t.c}) (*corner)[2] -= behind;
     t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
     t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
     return t;
