@@ -192,9 +192,8 @@ private:
     }
 
     void sort_edges() {
-        std::sort(edges_.begin(), edges_.end(), [](const EdgeOfCorner& a, const EdgeOfCorner& b) {
-            return std::pair(a.neighbour, a.corner) < std::pair(b.neighbour, b.corner);
-        });
+        std::ranges::sort(edges_, {},
+                          [](const EdgeOfCorner& e) { return std::uint64_t{e.neighbour} << 32 | e.corner; });
     }
 
     // The two edges of a face without an area become one.
