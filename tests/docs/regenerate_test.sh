@@ -74,4 +74,15 @@ sed -i '/missing.ply/,$d' "$work/page.md"
 sed -i 's/43,304/43,306/' "$work/build/apps/table"
 UNSEEN_BUILD="$work/build" "$regenerate" "$work/page.md" 2>/dev/null
 grep -qF '43,306' "$work/page.md" || { echo "The page was not made anew"; failed=1; }
+# Where a command fails, the page stays as it was.
+cp "$work/page.md" "$work/before.md"
+echo 'exit 3' >>"$work/build/apps/print-table"
+for mode in --check ''; do
+    if UNSEEN_BUILD="$work/build" "$regenerate" $mode "$work/page.md" 2>"$work/said" ||
+        ! grep -qF 'failed: print-table' "$work/said"; then
+        echo "A failing command is not named $mode"
+        failed=1
+    fi
+done
+cmp "$work/page.md" "$work/before.md" || failed=1
 exit $failed
