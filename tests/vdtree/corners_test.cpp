@@ -178,7 +178,7 @@ double uv_area(const Mesh& mesh) {
     return sum;
 }
 
-// Of the edges whose two sides have other coordinates: the length of both sides in the texture.
+// Sums the lengths in the texture of both sides of each edge whose sides differ in their coordinates.
 double seam_length(const Mesh& mesh) {
     using Place = std::array<double, 3>;
     std::map<std::pair<Place, Place>, std::vector<std::array<glm::vec2, 2>>> sides;

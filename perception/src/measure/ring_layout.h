@@ -415,7 +415,7 @@ void add_surroundings(const vdtree::SoundTree& tree, std::span<const LitPointOf<
     std::size_t count = 0;
     const auto keep_once = [](auto& values) {
         std::ranges::sort(values);
-        values.erase(std::unique(values.begin(), values.end()), values.end()); // clang 14 has no ranges::unique
+        values.erase(std::unique(values.begin(), values.end()), values.end()); // clang 14 rejects a subrange
     };
     for (const NodeId shown : ring.shown)
         if (shown != node) neighbours.push_back(shown);

@@ -80,9 +80,10 @@ public:
     bool fold_subtree(NodeId node);     // folds the node and everything below it
     void unfold_all();
     void fold_all();
-    // Whether the criterion wants the node unfolded. The functions below also unfold what these nodes need: below
-    // one in a hundred more, or up to one in twenty of textured models. So no triangle faces away from where it faced in the mesh, and none is mirrored in the texture. What is
-    // unfolded depends on what is wanted alone. After changes by hand, what is unfolded counts as wanted.
+    // Whether the criterion wants the node unfolded. The functions below also unfold what these nodes need: below one in a
+    // hundred more, or up to one in twenty of textured models. So no triangle faces away from where it faced in the mesh,
+    // and none is mirrored in the texture. What is unfolded depends on what is wanted alone. After changes by hand, what is
+    // unfolded counts as wanted.
     bool is_wanted(NodeId node) const noexcept;
 
     // Makes the criterion's cut, whatever the state before.
