@@ -166,14 +166,21 @@ private:
         std::size_t left = 0; // to try at the triangles to come
     };
 
+    // Brings all stands within 1 of the first corner's. Not finite where floats are too coarse: then all are suspect.
+    template <class Value>
+    static float scale_of(const std::array<Chain, 3>& chains, Value Stand::*value) {
+        float squared = 0;
+        for (const Chain& chain : chains)
+            for (const Stand& stand : chain) {
+                const Value way = stand.*value - chains[0][0].*value;
+                squared = std::max(squared, glm::dot(way, way));
+            }
+        return 1 / std::sqrt(squared);
+    }
     // Along the triangle's normal onto the plane of two axes, relative to the first corner.
     static void show(const std::array<Chain, 3>& chains, const glm::dvec3& normal, Front& front) {
         const glm::vec3 origin = chains[0][0].position;
-        float squared = 0;
-        for (const Chain& chain : chains)
-            for (const Stand& stand : chain)
-                squared = std::max(squared, glm::dot(stand.position - origin, stand.position - origin));
-        const float scale = 1 / std::sqrt(squared); // not finite where floats are too coarse: all are suspect
+        const float scale = scale_of(chains, &Stand::position);
         const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
         const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
         const int u = normal[axis] > 0 ? (axis + 1) % 3 : (axis + 2) % 3, v = 3 - axis - u;
@@ -186,11 +193,7 @@ private:
     }
     static void show_texture(const std::array<Chain, 3>& chains, bool is_mirrored, Front& front) {
         const glm::vec2 origin = chains[0][0].uv;
-        float squared = 0;
-        for (const Chain& chain : chains)
-            for (const Stand& stand : chain)
-                squared = std::max(squared, glm::dot(stand.uv - origin, stand.uv - origin));
-        const float scale = 1 / std::sqrt(squared);
+        const float scale = scale_of(chains, &Stand::uv);
         front.set(chains, [&](const Stand& stand) {
             const glm::vec2 p = (stand.uv - origin) * scale;
             return is_mirrored ? glm::vec2(p.y, p.x) : p;
