@@ -246,14 +246,15 @@ TEST(Planes, FoldByDefault) {
     EXPECT_LE(pierced, 160u); // 32 of 8,576
 }
 
+std::vector<Contact> contacts_of(const Mesh& mesh) {
+    const VertexTree tree = support::built(mesh);
+    const SoundTree sound = support::sound(tree);
+    const Progress nobody;
+    MeasuringProgress progress(nobody);
+    return find_contacts(std::span(&sound, 1), progress);
+}
+
 TEST(Contacts, AreFoundAroundHubs) {
-    const auto contacts_of = [](const Mesh& mesh) {
-        const VertexTree tree = support::built(mesh);
-        const SoundTree sound = support::sound(tree);
-        const Progress nobody;
-        MeasuringProgress progress(nobody);
-        return find_contacts(std::span(&sound, 1), progress);
-    };
     for (const int spokes : {90, 1000, 9000})
         for (const Contact& contact : contacts_of(disc(spokes, 0))) ASSERT_FALSE(contact.is_any()) << spokes;
     for (const int spokes : {90, 1000}) {
@@ -261,6 +262,21 @@ TEST(Contacts, AreFoundAroundHubs) {
         const Mesh both = shapes::together(disc(spokes, 0), shapes::inside_out(disc(spokes, 0.05)));
         for (const Contact& contact : contacts_of(both)) ASSERT_NEAR(contact.gap, 0.05f, 1e-4f) << spokes;
     }
+}
+
+// Both sides of a sheet on the same vertices fold together. Where a vertex of the one side is another one than that of the
+// other side, as after rounding, the sides come through each other.
+TEST(Contacts, AreFoundBetweenSidesThatShareCorners) {
+    const Mesh front = shapes::grid(8);
+    Mesh back = shapes::inside_out(front);
+    const auto nearest = [](const std::vector<Contact>& contacts) {
+        float gap = std::numeric_limits<float>::infinity();
+        for (const Contact& contact : contacts) gap = std::min(gap, contact.gap);
+        return gap;
+    };
+    EXPECT_EQ(nearest(contacts_of(shapes::together(front, back))), std::numeric_limits<float>::infinity());
+    back.positions[back.positions.size() / 2].z -= 0.001;
+    EXPECT_NEAR(nearest(contacts_of(shapes::together(front, back))), 0.001f, 1e-5f);
 }
 
 // Rings of so many vertices, each of a radius and a height, with quads between; closed by hubs where asked.

@@ -88,6 +88,25 @@ bool is_beside(const Corners& a, const Corners& b, const glm::vec3& way) {
     return glm::dot(way, way) > 0 && runs_along(a) && runs_along(b);
 }
 
+// The shortest way by which triangles with common corners lie over each other: from their other corners, and where edges
+// cross. Infinite if they do not, as back to back on the same corners, which move together.
+glm::vec3 way_over(const Corners& a, const Corners& b) {
+    glm::vec3 least(infinity);
+    const auto include = [&](const glm::vec3& way) {
+        if (!is_beside(a, b, way)) least = shorter(least, way);
+    };
+    const auto is_in = [](const Corners& t, const glm::vec3& p) { return p == t[0] || p == t[1] || p == t[2]; };
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (!is_in(b, a[i])) include(way_to_point(b, a[i]));
+        if (!is_in(a, b[i])) include(way_to_point(a, b[i]));
+        for (std::size_t k = 0; k < 3; ++k) {
+            const glm::vec3 &p = a[i], &q = a[(i + 1) % 3], &r = b[k], &s = b[(k + 1) % 3];
+            if (p != r && p != s && q != r && q != s) include(way_between_edges(p, q - p, r, s - r));
+        }
+    }
+    return least;
+}
+
 float sine_between(const Corners& a, const Corners& b) {
     const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
     const float lengths = glm::length(m) * glm::length(n);
@@ -98,10 +117,14 @@ float sine_between(const Corners& a, const Corners& b) {
 constexpr float alike_cosine = 0.9f;
 constexpr float alike_luminance = 0.01f;   // relative, 0..1; of the means
 constexpr std::size_t most_luminances = 4; // measured at once
-bool face_alike(const Corners& a, const Corners& b) {
+float cosine_between(const Corners& a, const Corners& b) {
     const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
-    return glm::dot(m, n) > alike_cosine * glm::length(m) * glm::length(n);
+    const float lengths = glm::length(m) * glm::length(n);
+    return lengths > 0 ? glm::dot(m, n) / lengths : 0;
 }
+bool face_alike(const Corners& a, const Corners& b) { return cosine_between(a, b) > alike_cosine; }
+// The sides of a thin sheet.
+bool are_back_to_back(const Corners& a, const Corners& b) { return cosine_between(a, b) < -alike_cosine; }
 
 struct Box {
     glm::vec3 lo = glm::vec3(infinity), hi = glm::vec3(-infinity);
@@ -427,11 +450,13 @@ private:
         };
         Contact contact;
         for (const auto& [box, other] : scratch.candidates) {
-            if (!around.meets(box) || is_near_by(mesh_.corners(other))) continue;
+            if (!around.meets(box)) continue;
+            const bool is_neighbour = is_near_by(mesh_.corners(other));
             if (looked_at > most_looks) return {0, 0};
             const Corners its = corners(other);
-            if (face_alike(own, its) && look_alike(triangle, other)) continue;
-            const glm::vec3 way = way_between(own, its);
+            if (is_neighbour ? !are_back_to_back(own, its) : face_alike(own, its) && look_alike(triangle, other))
+                continue;
+            const glm::vec3 way = is_neighbour ? way_over(own, its) : way_between(own, its);
             const float gap = glm::length(way);
             if (gap < near && !is_beside(own, its, way)) contact.include({gap, sine_between(own, its)});
         }

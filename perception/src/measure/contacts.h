@@ -10,8 +10,9 @@
 namespace unseen::perception {
 
 // A contact of triangles with others near them, over or under them and not beside them in one sheet. Neighbours, and
-// neighbours of neighbours, do not count. Nor do triangles that face and look alike: it makes no difference which of them
-// is seen. Near means nearer than a quarter of the circle around the first triangle.
+// neighbours of neighbours, count only back to back, as the sides of a thin sheet, and apart from the corners that they
+// share. Triangles that face and look alike do not count: it makes no difference which of them is seen. Near means nearer
+// than a quarter of the circle around the first triangle.
 struct Contact {
     float gap = std::numeric_limits<
         float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
