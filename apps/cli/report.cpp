@@ -26,6 +26,7 @@ void shorten_numbers(Json& json) {
 
 std::string json_text(const Json& json) {
     Json short_numbers = json;
+    if (json.is_object() && !printed_warnings().empty()) short_numbers["warnings"] = printed_warnings();
     shorten_numbers(short_numbers);
     const std::string plain =
         short_numbers.dump(2, ' ', false, Json::error_handler_t::replace); // names may be no UTF-8

@@ -16,8 +16,8 @@ namespace unseen::app {
 
 using Json = nlohmann::ordered_json;
 
-// What is printed or written of a report, with a line break behind it. Control characters are escaped, also those above
-// ASCII, which JSON would allow: nothing steers the terminal.
+// What is printed or written of a report, with a line break behind it. An object also gets the `warnings` so far.
+// Control characters are escaped, also those above ASCII, which JSON would allow: nothing steers the terminal.
 std::string json_text(const Json& json);
 
 // Infinite and undefined numbers are null: JSON has neither.

@@ -12,6 +12,7 @@ namespace unseen::app {
 namespace {
 
 std::string_view program = "unseen";
+std::vector<std::string> warnings;
 
 void print_to_stderr(std::string_view kind, std::string_view text) {
     constexpr std::size_t longest = 2000; // bytes of a sentence: files may have names of any length in them
@@ -40,7 +41,11 @@ std::size_t slips(std::string_view a, std::string_view b) {
 
 void name_program(std::string_view name) { program = name; }
 
-void print_warning(std::string_view text) { print_to_stderr("warning: ", text); }
+void print_warning(std::string_view text) {
+    warnings.emplace_back(text);
+    print_to_stderr("warning: ", text);
+}
+const std::vector<std::string>& printed_warnings() { return warnings; }
 void print_note(std::string_view text) { print_to_stderr("note: ", text); }
 void print_error(std::string_view text) {
     const bool is_ended = text.ends_with('.') || text.ends_with('?');

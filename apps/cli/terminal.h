@@ -13,9 +13,10 @@ namespace unseen::app {
 // The program that speaks, at the beginning of what is printed here; "unseen" unless it is said. For a literal.
 void name_program(std::string_view name);
 
-void print_warning(std::string_view text); // "unseen: warning: ..." on stderr
-void print_note(std::string_view text);    // "unseen: note: ..." on stderr
-void print_error(std::string_view text);   // "unseen: ..." on stderr, with a full stop where there is none
+void print_warning(std::string_view text);          // "unseen: warning: ..." on stderr
+const std::vector<std::string>& printed_warnings(); // all so far
+void print_note(std::string_view text);             // "unseen: note: ..." on stderr
+void print_error(std::string_view text);            // "unseen: ..." on stderr, with a full stop where there is none
 
 // Names of files, and what stands in them, must not steer the terminal: control characters, and bytes that are no
 // UTF-8, become \xNN. All that this header and report.h print goes through it.

@@ -1,5 +1,6 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
 
+#include "mesh_files.h"
 #include "run_command.h"
 #include "tree_file.h"
 
@@ -390,6 +391,45 @@ TEST_F(InfoTest, SaysWhatIsUnusualAboutAMesh) {
     EXPECT_EQ(run({"info", "m.obj", "--verify"}).status, 1);
     write_ball("ball.obj");
     EXPECT_THAT(run({"info", "ball.obj"}).out, HasSubstr("nothing unusual"));
+}
+
+// In every format with normals and texture coordinates: also in reports, and where the tree comes from the cache.
+TEST_F(InfoTest, CountsNormalsAndTextureCoordinatesThatAreNotFinite) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 0 inf\nvn 0 0 1\nvn 0 nan 1\n"
+                              "f 1/1/1 2/2/1 3/3/2\n");
+    write_text(path("m.ply"), "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
+                              "float z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty float s\n"
+                              "property float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+                              "0 0 0 0 0 1 0 0\n1 0 0 0 0 1 nan 0\n0 1 0 0 -inf 1 0 inf\n3 0 1 2\n");
+    Json gltf = Json::parse(mesh_files::gltf_triangle_json(R"([{"mesh":0}])", R"({"byteLength":128})"));
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::string data = mesh_files::gltf_triangle_data() + std::string(2, '\0') +
+                             mesh_files::floats(0, 0, 1, 0, 0, 1, 0, nan, 1) + // normals
+                             mesh_files::floats(0, 0, nan, 0, 0, 1) +          // the first coordinates
+                             mesh_files::floats(0, 0, 1, 0, 0, -INFINITY);     // the second ones
+    for (const auto& [name, type, at, size] :
+         {std::tuple("NORMAL", "VEC3", 44, 36), {"TEXCOORD_0", "VEC2", 80, 24}, {"TEXCOORD_1", "VEC2", 104, 24}}) {
+        gltf["meshes"][0]["primitives"][0]["attributes"][name] = gltf["accessors"].size();
+        gltf["accessors"].push_back(
+            {{"bufferView", gltf["bufferViews"].size()}, {"componentType", 5126}, {"count", 3}, {"type", type}});
+        gltf["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", size}});
+    }
+    write_text(path("m.glb"), mesh_files::glb(gltf.dump(), data));
+    for (const std::string file : {"m.obj", "m.ply", "m.glb"})
+        for (const Words& words : {Words{"info", file},
+                                   {"simplify", file, "-o", "o" + file, "--triangles", "1"},
+                                   {"simplify", file, "-o", "again" + file, "--triangles", "1"}}) {
+            const auto tells = AllOf(HasSubstr("1 normal was zero, missing or not finite and computed from the faces"),
+                                     HasSubstr("2 texture coordinates were not finite and set to 0, the first that of "
+                                               "vertex 1."));
+            EXPECT_THAT(succeed(words).err, tells) << file;
+            const Json report =
+                succeed(joined(words, words[0] == "info" ? Words{"--json"} : Words{"--json", "-"})).json();
+            EXPECT_THAT(report["warnings"].dump(), tells) << file;
+            if (words[0] == "info") continue;
+            EXPECT_FALSE(succeed({"info", words[3], "--json"}).json().contains("warnings"))
+                << "what is written is finite";
+        }
 }
 
 TEST_F(BuildTest, RemembersDroppedTriangles) {

@@ -80,7 +80,7 @@ void check_normals(ReadResult& result) {
             std::to_string(first) + ".");
 }
 
-// Colours and UVs take part in costs, where a NaN would spread.
+// Colours, UVs and what a file says beside them take part in costs and means, where a NaN would spread.
 void repair_attributes(ReadResult& result) {
     std::uint64_t colours = 0;
     for (glm::vec4& colour : result.mesh.colours) {
@@ -92,14 +92,28 @@ void repair_attributes(ReadResult& result) {
         }
         colours += repaired;
     }
-    std::uint64_t uvs = 0;
-    for (glm::vec2& uv : result.mesh.uvs) {
+    std::vector<bool> has_lost_uvs(result.mesh.positions.size(), false);
+    for (std::size_t v = 0; v < result.mesh.uvs.size(); ++v) {
+        glm::vec2& uv = result.mesh.uvs[v];
         if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
         uv = glm::vec2(0.0f);
-        ++uvs;
+        has_lost_uvs[v] = true;
     }
+    const auto is_finite = [](float value) { return std::isfinite(value); };
+    if (result.document)
+        for (auto& channel : result.document->channels)
+            for (std::size_t v = 0; v * channel.components < channel.values.size(); ++v) {
+                const auto own = std::span(channel.values).subspan(v * channel.components, channel.components);
+                if (std::ranges::all_of(own, is_finite)) continue;
+                if (channel.name.starts_with("TEXCOORD_")) has_lost_uvs[v] = true;
+                for (float& value : own)
+                    if (!is_finite(value) || channel.name == "NORMAL") value = 0; // a normal of zeros: none
+            }
     if (colours > 0) result.warnings.push_back(counted_were(colours, "vertex colour") + " outside 0..1 and clamped.");
-    if (uvs > 0) result.warnings.push_back(counted_were(uvs, "texture coordinate") + " not finite and set to 0.");
+    if (const auto uvs = std::ranges::count(has_lost_uvs, true); uvs > 0)
+        result.warnings.push_back(counted_were(static_cast<std::uint64_t>(uvs), "texture coordinate") +
+                                  " not finite and set to 0, the first that of vertex " +
+                                  std::to_string(std::ranges::find(has_lost_uvs, true) - has_lost_uvs.begin()) + ".");
 }
 
 // The runs of those triangles that stay. To be called before the others are dropped.
@@ -113,13 +127,6 @@ std::vector<SourceDocument::Run> shortened(const std::vector<SourceDocument::Run
         if (end - dropped > first) kept.push_back({first, runs[i].part});
     }
     return kept;
-}
-
-void finish_document(SourceDocument& document, const Mesh& mesh) {
-    document.runs = shortened(document.runs, mesh);
-    for (auto& channel : document.channels)
-        for (float& value : channel.values)
-            if (!std::isfinite(value)) value = 0;
 }
 
 // "vertex 3 has a NaN or infinite coordinate (the first of 7 such vertices); face 9 uses ...".
@@ -196,7 +203,7 @@ ReadResult finish_reading(const MeshSource& source, ReadResult result) {
     if (result.mesh.triangles.empty()) fail("it holds no triangles; give a file with faces.");
     if (const Result<void> valid = validate(result.mesh.view()); !valid) throw Fault{valid.error().message};
     repair_attributes(result);
-    if (result.document) finish_document(*result.document, result.mesh);
+    if (result.document) result.document->runs = shortened(result.document->runs, result.mesh);
     result.dropped_triangles = drop_degenerate_triangles(result.mesh);
     if (result.mesh.triangles.empty())
         fail("all of its ", result.dropped_triangles,
