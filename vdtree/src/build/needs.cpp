@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <utility>
 
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/tree_shape.h>
 
+#include "build/spatial_order.h"
 #include "tree/turned.h"
 
 namespace unseen::vdtree {
@@ -59,14 +61,12 @@ public:
     }
 
 private:
-    // A node that can stand for a corner, and the next one above that does not fold with its parent.
-    struct Stand {
-        NodeId node, above;
-        glm::vec3 position;
-        glm::vec2 uv;
-        bool is_on_mirror;
+    // What can stand for a corner, from its place up to below where two corners meet, without what folds with its parent.
+    struct Chain {
+        std::size_t size;
+        std::array<NodeId, longest_chain + 2> nodes; // and the next one above
+        std::array<WedgeId, longest_chain + 1> wedges;
     };
-    using Chain = std::vector<Stand>;
     // Each triangle that turns over in some cut adds one or more; one without nodes, if nothing has to be needed.
     struct NeedOfTriangle {
         Index triangle;
@@ -129,34 +129,78 @@ private:
         return node;
     }
 
-    // Where a triangle is seen from its front, and likewise in the texture: its corners' chains in floats. Mostly no way
-    // turns it over, and this takes less than the tests themselves.
+    // Where a triangle is seen from its front, and likewise in the texture: its corners' chains in floats. Mostly this says
+    // whether a way turns it over, and takes less than the test itself.
     class Front {
     public:
         static constexpr std::size_t lanes = 4;
 
-        // place_of(stand): two coordinates of up to 2, in which the triangle itself runs counter-clockwise.
-        template <class PlaceOf>
-        void set(const std::array<Chain, 3>& chains, PlaceOf&& place_of) {
-            for (std::size_t k = 0; k < 3; ++k)
-                for (std::size_t i = 0; i < (chains[k].size() + lanes - 1) / lanes * lanes; ++i) {
-                    const glm::vec2 p = place_of(chains[k][std::min(i, chains[k].size() - 1)]);
-                    x_[k][i] = p.x, y_[k][i] = p.y;
-                }
+        // Places are shown along the triangle's normal on the plane of two axes, relative to a corner: there the triangle
+        // runs counter-clockwise.
+        UNSEEN_INLINE void aim(const glm::vec3& corner, const glm::dvec3& normal) {
+            const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
+            const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+            constexpr std::array<int, 5> after{0, 1, 2, 0, 1};
+            const int u = after[static_cast<std::size_t>(axis + (normal[axis] > 0 ? 1 : 2))], v = 3 - axis - u;
+            const double by = 1 / normal[axis];
+            axes_ = {axis, u, v};
+            corner_ = {corner[axis], corner[u], corner[v]};
+            u_by_ = static_cast<float>(normal[u] * by), v_by_ = static_cast<float>(normal[v] * by);
+            farthest_ = 0;
         }
-        // Of the stands of the last chain from `first` on, as many as there are lanes: a bit for each where the triangle may
-        // be turned over.
-        std::uint32_t suspects(std::size_t at_a, std::size_t at_b, std::size_t first) const {
-            constexpr float slack = 2e-5f; // of the area; roundings are below 2e-6
+        // Places of chain k, one after the other.
+        UNSEEN_INLINE void add(std::size_t k, std::size_t i, const glm::vec3& p) {
+            const float along = p[axes_[0]] - corner_[0], u = p[axes_[1]] - corner_[1], v = p[axes_[2]] - corner_[2];
+            farthest_ = std::max(farthest_, along * along + u * u + v * v);
+            x_[k][i] = u - along * u_by_, y_[k][i] = v - along * v_by_; // up to twice as far as the place
+        }
+        UNSEEN_INLINE void finish(const std::array<Chain, 3>& chains) {
+            constexpr float share = 2e-5f;          // of the farthest one's square; roundings are below a tenth of that
+            constexpr float least_squared = 1e-30f; // below, floats are too coarse for shares of it
+            slack_ = farthest_ > least_squared ? share * farthest_ : std::numeric_limits<float>::infinity();
+            for (std::size_t k = 1; k < 3; ++k)
+                for (std::size_t i = chains[k].size; i % lanes != 0; ++i)
+                    x_[k][i] = x_[k][i - 1], y_[k][i] = y_[k][i - 1];
+            low_x_ = high_x_ = x_[2][0], low_y_ = high_y_ = y_[2][0];
+            for (std::size_t k = 1; k < chains[2].size; ++k) {
+                const float x = x_[2][k], y = y_[2][k];
+                low_x_ = std::min(low_x_, x), high_x_ = std::max(high_x_, x);
+                low_y_ = std::min(low_y_, y), high_y_ = std::max(high_y_, y);
+            }
+        }
+        // Of the second chain's places from `first` on, as many as there are lanes: a bit for each with which the triangle
+        // may be turned over, wherever in their box the last chain's places are.
+        UNSEEN_INLINE std::uint32_t suspect_sides(std::size_t at_a, std::size_t first) const {
+            const float x = x_[0][at_a], y = y_[0][at_a];
+            const Float4 to_x = lanes_of(x_[1], first) - x, to_y = lanes_of(y_[1], first) - y;
+            const Float4 low = to_x * (low_y_ - y), high = to_x * (high_y_ - y), left = to_y * (low_x_ - x),
+                         right = to_y * (high_x_ - x);
+            const Float4 least = (low < high ? low : high) - (left < right ? right : left);
+            return FourWide::bits_of(least > slack_) ^ 0xf; // NaN is suspect
+        }
+        // The same of the last chain's places; and those with which it is turned over for sure.
+        struct Suspects {
+            std::uint32_t all, turned;
+        };
+        UNSEEN_INLINE Suspects suspects(std::size_t at_a, std::size_t at_b, std::size_t first) const {
             const float x = x_[0][at_a], y = y_[0][at_a], to_x = x_[1][at_b] - x, to_y = y_[1][at_b] - y;
-            Float4 x_of_c, y_of_c;
-            std::memcpy(&x_of_c, &x_[2][first], sizeof x_of_c);
-            std::memcpy(&y_of_c, &y_[2][first], sizeof y_of_c);
-            return FourWide::bits_of(to_x * (y_of_c - y) - to_y * (x_of_c - x) > slack) ^ 0xf; // NaN is suspect
+            const Float4 area = to_x * (lanes_of(y_[2], first) - y) - to_y * (lanes_of(x_[2], first) - x);
+            return {FourWide::bits_of(area > slack_) ^ 0xf, FourWide::bits_of(area < -slack_)};
         }
 
     private:
-        std::array<std::array<float, longest_chain + lanes>, 3> x_, y_;
+        using Coordinates = std::array<float, longest_chain + lanes>;
+
+        static UNSEEN_INLINE Float4 lanes_of(const Coordinates& values, std::size_t first) {
+            Float4 some;
+            std::memcpy(&some, &values[first], sizeof some);
+            return some;
+        }
+
+        std::array<int, 3> axes_;
+        std::array<float, 3> corner_;
+        float u_by_, v_by_, farthest_, slack_, low_x_, high_x_, low_y_, high_y_;
+        std::array<Coordinates, 3> x_, y_;
     };
 
     struct Ways {
@@ -165,40 +209,6 @@ private:
         std::vector<Need> needs;
         std::size_t left = 0; // to try at the triangles to come
     };
-
-    // Brings all stands within 1 of the first corner's. Not finite where floats are too coarse: then all are suspect.
-    template <class Value>
-    static float scale_of(const std::array<Chain, 3>& chains, Value Stand::*value) {
-        float squared = 0;
-        for (const Chain& chain : chains)
-            for (const Stand& stand : chain) {
-                const Value way = stand.*value - chains[0][0].*value;
-                squared = std::max(squared, glm::dot(way, way));
-            }
-        return 1 / std::sqrt(squared);
-    }
-    // Along the triangle's normal onto the plane of two axes, relative to the first corner.
-    static void show(const std::array<Chain, 3>& chains, const glm::dvec3& normal, Front& front) {
-        const glm::vec3 origin = chains[0][0].position;
-        const float scale = scale_of(chains, &Stand::position);
-        const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
-        const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-        const int u = normal[axis] > 0 ? (axis + 1) % 3 : (axis + 2) % 3, v = 3 - axis - u;
-        const double by = static_cast<double>(scale) / normal[axis];
-        const float u_by = static_cast<float>(normal[u] * by), v_by = static_cast<float>(normal[v] * by);
-        front.set(chains, [&](const Stand& stand) {
-            const glm::vec3 p = stand.position - origin;
-            return glm::vec2(p[u] * scale - p[axis] * u_by, p[v] * scale - p[axis] * v_by);
-        });
-    }
-    static void show_texture(const std::array<Chain, 3>& chains, bool is_mirrored, Front& front) {
-        const glm::vec2 origin = chains[0][0].uv;
-        const float scale = scale_of(chains, &Stand::uv);
-        front.set(chains, [&](const Stand& stand) {
-            const glm::vec2 p = (stand.uv - origin) * scale;
-            return is_mirrored ? glm::vec2(p.y, p.x) : p;
-        });
-    }
 
     // Adds what is found at those triangles; returns needs of nodes that are not smaller than what they need.
     std::vector<Need> look_at(std::span<const Index> triangles, std::vector<NeedOfTriangle>& needs) const {
@@ -259,50 +269,70 @@ private:
     }
 
     void look_at(Index t, Ways& ways, Found& found) const {
-        const Triangle& leaves = g_.triangles[t];
-        std::size_t count = 1;
-        for (std::size_t k = 0; k < 3; ++k) {
-            find_chain(leaves[k], vanishes_at_[t], ways.chains[k]);
-            count *= ways.chains[k].size();
-        }
-        if (count == 1) return;
         const auto& [a, b, c] = ways.chains;
-        const bool has_uvs = !g_.uvs.empty();
-        const TurnedTest test({a[0].position, b[0].position, c[0].position},
-                              has_uvs ? TurnedTest::Uvs{a[0].uv, b[0].uv, c[0].uv} : TurnedTest::Uvs{});
+        const auto positions_of = [&](WedgeId u, WedgeId v, WedgeId w) {
+            return TurnedTest::Positions{g_.positions[u], g_.positions[v], g_.positions[w]};
+        };
+        const auto uvs_of = [&](WedgeId u, WedgeId v, WedgeId w) {
+            return g_.uvs.empty() ? TurnedTest::Uvs{} : TurnedTest::Uvs{g_.uvs[u], g_.uvs[v], g_.uvs[w]};
+        };
+        std::array<WedgeId, 3> leaves;
+        for (std::size_t k = 0; k < 3; ++k) leaves[k] = tree_.wedge_of_leaf(g_.triangles[t][k]);
+        const TurnedTest test(positions_of(leaves[0], leaves[1], leaves[2]), uvs_of(leaves[0], leaves[1], leaves[2]));
+        const bool is_mapped = test.uv_area() != 0;
+        const auto on_texture = [&](WedgeId w) { return glm::vec3(g_.uvs[w], 0); };
+        ways.in_space.aim(g_.positions[leaves[0]], test.normal());
+        if (is_mapped) ways.in_texture.aim(on_texture(leaves[0]), {0, 0, test.uv_area()});
+        for (std::size_t k = 0; k < 3; ++k)
+            find_chain(g_.triangles[t][k], vanishes_at_[t], ways.chains[k], [&](std::size_t i, WedgeId w) {
+                ways.in_space.add(k, i, g_.positions[w]);
+                if (is_mapped) ways.in_texture.add(k, i, on_texture(w));
+            });
+        const std::size_t count = a.size * b.size * c.size;
+        if (count == 1) return;
         ways.needs.clear();
         bool any = false;
-        const auto try_way = [&](const Stand& at_a, const Stand& at_b, const Stand& at_c) {
-            const auto is_mirrored = [&] {
-                const bool is_mirror = at_a.is_on_mirror | at_b.is_on_mirror | at_c.is_on_mirror;
-                return !is_mirror && test.is_mirrored({at_a.uv, at_b.uv, at_c.uv});
-            };
-            if (!test.is_turned({at_a.position, at_b.position, at_c.position}) && !(has_uvs && is_mirrored())) return;
+        const auto is_turned = [&](WedgeId u, WedgeId v, WedgeId w) {
+            if (test.is_turned(positions_of(u, v, w))) return true;
+            return is_mapped && !(on_mirror_[u] | on_mirror_[v] | on_mirror_[w]) && test.is_mirrored(uvs_of(u, v, w));
+        };
+        const auto try_way = [&](std::size_t i, std::size_t j, std::size_t k, bool is_known = false) {
+            if (!is_known && !is_turned(a.wedges[i], b.wedges[j], c.wedges[k])) return;
             any = true;
-            prevent(at_a, at_b, at_c, ways.needs, found.impossible);
+            prevent({a.nodes[i], b.nodes[j], c.nodes[k]}, {a.nodes[i + 1], b.nodes[j + 1], c.nodes[k + 1]}, ways.needs,
+                    found.impossible);
         };
         if (count <= ways.left) {
             ways.left -= count;
-            show(ways.chains, test.normal(), ways.in_space);
-            const bool is_mapped = test.uv_area() != 0;
-            if (is_mapped) show_texture(ways.chains, test.uv_area() < 0, ways.in_texture);
-            for (std::size_t i = 0; i < a.size(); ++i)
-                for (std::size_t j = 0; j < b.size(); ++j)
-                    for (std::size_t first = 0; first < c.size(); first += Front::lanes) {
-                        std::uint32_t suspects = ways.in_space.suspects(i, j, first);
-                        if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first);
-                        for (; suspects; suspects &= suspects - 1) {
-                            const std::size_t k = first + static_cast<std::size_t>(std::countr_zero(suspects));
-                            if (k < c.size()) try_way(a[i], b[j], c[k]);
-                        }
+            ways.in_space.finish(ways.chains);
+            if (is_mapped) ways.in_texture.finish(ways.chains);
+            const auto try_side = [&](std::size_t i, std::size_t j) {
+                for (std::size_t first = 0; first < c.size; first += Front::lanes) {
+                    auto [suspects, turned] = ways.in_space.suspects(i, j, first);
+                    if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first).all;
+                    for (; suspects; suspects &= suspects - 1) {
+                        const std::size_t k = first + static_cast<std::size_t>(std::countr_zero(suspects));
+                        if (k < c.size) try_way(i, j, k, (turned & suspects & -suspects) != 0);
                     }
+                }
+            };
+            for (std::size_t i = 0; i < a.size; ++i)
+                for (std::size_t first = 0; first < b.size; first += Front::lanes) {
+                    std::uint32_t suspects = ways.in_space.suspect_sides(i, first);
+                    if (is_mapped) suspects |= ways.in_texture.suspect_sides(i, first);
+                    for (; suspects; suspects &= suspects - 1) {
+                        const std::size_t j = first + static_cast<std::size_t>(std::countr_zero(suspects));
+                        if (j < b.size) try_side(i, j);
+                    }
+                }
         } else {
             std::array<std::size_t, 3> at{};
-            do try_way(a[at[0]], b[at[1]], c[at[2]]);
+            do try_way(at[0], at[1], at[2]);
             while (go_up(ways.chains, at));
         }
+        if (!any) return;
         keep_least(ways.needs);
-        if (any && ways.needs.empty()) ways.needs.push_back({no_node, no_node});
+        if (ways.needs.empty()) ways.needs.push_back({no_node, no_node});
         for (const Need& need : ways.needs) found.needs.push_back({t, need});
     }
 
@@ -310,69 +340,87 @@ private:
     bool go_up(const std::array<Chain, 3>& chains, std::array<std::size_t, 3>& at) const {
         std::size_t next = 0;
         for (std::size_t k = 1; k < 3; ++k)
-            if (is_smaller(chains[k][at[k]].above, chains[next][at[next]].above)) next = k;
-        return ++at[next] < chains[next].size();
+            if (is_smaller(chains[k].nodes[at[k] + 1], chains[next].nodes[at[next] + 1])) next = k;
+        return ++at[next] < chains[next].size;
     }
 
-    bool is_above(NodeId node, NodeId below) const { return node <= below && below < g_.subtree_end[node]; }
+    bool is_above(NodeId node, NodeId below) const { return (node <= below) & (below < g_.subtree_end[node]); }
 
     // From the place up to what stands for two corners.
-    void find_chain(Index leaf, NodeId vanishes_at, Chain& chain) const {
-        chain.clear();
-        const auto add = [&](NodeId node) {
-            const WedgeId w = node < tree_.interior() ? tree_.wedge_at(node, leaf) : tree_.wedge_of_leaf(leaf);
-            if (!chain.empty()) chain.back().above = node;
-            Stand& stand = chain.emplace_back();
-            stand.node = node;
-            stand.position = g_.positions[w];
-            if (g_.uvs.empty()) return;
-            stand.uv = g_.uvs[w];
-            stand.is_on_mirror = on_mirror_[w] != 0;
-        };
+    // Calls f(i, wedge) for each.
+    template <class F>
+    UNSEEN_INLINE void find_chain(Index leaf, NodeId vanishes_at, Chain& chain, F&& f) const {
         NodeId node = tree_.place_of_leaf(leaf);
-        add(node);
+        std::size_t size = 0;
+        const auto add = [&](WedgeId w) {
+            chain.nodes[size] = node;
+            chain.wedges[size] = w;
+            f(size++, w);
+        };
+        add(tree_.wedge_of_leaf(leaf));
         node = g_.parents[node];
         for (std::size_t step = 0; step < longest_chain && !is_above(node, vanishes_at); ++step) {
-            if (!joins_[node]) add(node);
+            if (!joins_[node]) add(tree_.wedge_at(node, leaf));
             node = g_.parents[node];
         }
-        chain.back().above = head_of(node);
+        chain.nodes[size] = head_of(node);
+        chain.size = size;
     }
 
-    // The largest one shall be unfolded where the smaller ones are active and its parent is unfolded: by the smallest of the
-    // nodes above the three.
-    void prevent(const Stand& a, const Stand& b, const Stand& c, std::vector<Need>& needs,
+    // The largest one of the nodes shall be unfolded where the smaller ones are active and its parent is unfolded: by the
+    // smallest of those above the three.
+    void prevent(const std::array<NodeId, 3>& nodes, const std::array<NodeId, 3>& above, std::vector<Need>& needs,
                  std::vector<Need>& impossible) const {
-        const Stand *large = &a, *one = &b, *other = &c;
-        if (is_smaller(large->node, one->node)) std::swap(large, one);
-        if (is_smaller(large->node, other->node)) std::swap(large, other);
-        NodeId above = is_smaller(one->above, other->above) ? one->above : other->above;
-        if (const Need need{above, large->node}; is_smaller(need.node, need.needed)) {
-            if (needs.empty() || needs.back() != need) needs.push_back(need); // neighbouring ways mostly find the same
+        constexpr std::size_t most_compared = 4; // neighbouring ways mostly find the same
+        const std::array<std::uint64_t, 3> orders{order_of(nodes[0]), order_of(nodes[1]), order_of(nodes[2])};
+        std::size_t large = orders[0] < orders[1] ? 1 : 0, other = 2;
+        const std::size_t one = 1 - large;
+        if (orders[large] < orders[2]) std::swap(large, other);
+        NodeId node = is_smaller(above[one], above[other]) ? above[one] : above[other];
+        if (const Need need{node, nodes[large]}; order_of(node) < orders[large]) {
+            for (std::size_t i = needs.size(); i-- > 0 && i + most_compared >= needs.size();)
+                if (follows(need, needs[i])) return;
+            needs.push_back(need);
             return;
         }
-        if (is_smaller(large->above, above)) above = large->above;
-        impossible.push_back({above, large->node});
+        if (is_smaller(above[large], node)) node = above[large];
+        impossible.push_back({node, nodes[large]});
     }
 
-    // Without those that follow from another one, for an unfolded node is under unfolded ones.
-    void keep_least(std::vector<Need>& needs) const {
-        std::ranges::sort(needs, {}, [](const Need& need) { return std::uint64_t{need.needed} << 32 | need.node; });
-        std::size_t kept = 0;
-        for (const Need& need : needs) {
-            if (kept > 0 && needs[kept - 1].needed == need.needed &&
-                need.node < g_.subtree_end[needs[kept - 1].node]) // ancestors come first
-                continue;
-            needs[kept++] = need;
+    // An unfolded node is under unfolded ones.
+    bool follows(const Need& need, const Need& from) const {
+        return need.needed == from.needed && is_above(from.node, need.node);
+    }
+
+    // By one number, then by the other.
+    static void sort(std::vector<Need>& needs, NodeId Need::*first, NodeId Need::*second) {
+        constexpr std::size_t few = 64;
+        const auto key = [&](const Need& need) { return std::uint64_t{need.*first} << 32 | need.*second; };
+        if (needs.size() < few) return std::ranges::sort(needs, {}, key), void();
+        std::vector<CodedIndex> items(needs.size()), scratch(needs.size());
+        for (std::size_t i = 0; i < needs.size(); ++i) items[i] = {key(needs[i]), 0};
+        sort_by_code(items, scratch);
+        for (std::size_t i = 0; i < needs.size(); ++i) {
+            needs[i].*first = static_cast<NodeId>(items[i].code >> 32);
+            needs[i].*second = static_cast<NodeId>(items[i].code);
         }
+    }
+
+    // Without those that follow from another one.
+    void keep_least(std::vector<Need>& needs) const {
+        if (needs.size() < 2) return;
+        sort(needs, &Need::needed, &Need::node);
+        std::size_t kept = 1; // ancestors come first
+        for (const Need& need : needs)
+            if (!follows(need, needs[kept - 1])) needs[kept++] = need;
         needs.resize(kept);
     }
 
     NeedArrays<Vector> arrays_of(std::vector<Need> needs) const {
         NeedArrays<Vector> arrays;
-        keep_least(needs);
         if (needs.empty()) return arrays;
-        std::ranges::sort(needs);
+        keep_least(needs);
+        sort(needs, &Need::node, &Need::needed);
         const std::size_t words = tree_.interior() / 32 + 1;
         arrays.needing.resize(words);
         for (std::size_t i = 0; i < needs.size(); ++i) {
