@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include <glm/gtc/type_ptr.hpp>
+
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/tree_shape.h>
@@ -30,7 +32,8 @@ constexpr std::size_t longest_chain = 64;     // nodes above a corner that are l
 class NeedFinder {
 public:
     explicit NeedFinder(const TreeGeometry& geometry)
-        : g_(geometry), tree_(links_of(geometry)), order_(tree_.interior()), joins_(tree_.interior(), 0) {
+        : g_(geometry), tree_(links_of(geometry)), order_(tree_.interior()), joins_(tree_.interior(), 0),
+          first_leaf_(tree_.wedge_of_leaf(0)) {
         std::vector<float> size(tree_.interior());
         for (NodeId node = tree_.interior(); node-- > 0;) {
             size[node] = std::max(size[node], g_.support_spheres[node].radius);
@@ -38,6 +41,7 @@ public:
             order_[node] = std::uint64_t{std::bit_cast<std::uint32_t>(size[node])} << 32 | (no_node - node);
         }
         find_vanishing();
+        list_wedges();
         if (!g_.uvs.empty()) find_mirrors();
     }
 
@@ -66,6 +70,8 @@ private:
         std::size_t size;
         std::array<NodeId, longest_chain + 2> nodes; // and the next one above
         std::array<WedgeId, longest_chain + 1> wedges;
+        std::array<std::uint64_t, longest_chain + 2>
+            orders; // of the nodes; only found where a way turns the triangle over
     };
     // Each triangle that turns over in some cut adds one or more; one without nodes, if nothing has to be needed.
     struct NeedOfTriangle {
@@ -82,6 +88,20 @@ private:
         for (NodeId node = 0; node < tree_.interior(); ++node)
             std::fill(vanishes_at_.begin() + g_.first_triangle[node],
                       vanishes_at_.begin() + g_.first_triangle[node + 1], node);
+    }
+
+    void list_wedges() {
+        above_leaf_.reserve(tree_.leaves());
+        for (Index leaf = 0; leaf < tree_.leaves(); ++leaf)
+            above_leaf_.push_back(g_.parents[tree_.place_of_leaf(leaf)]);
+        if (!tree_.has_seams()) return;
+        for (NodeId node = 0; node < tree_.interior(); ++node)
+            wedge_of_node_.push_back(is_in(tree_.several, node) ? several_wedges : tree_.first_wedge_of(node));
+    }
+    WedgeId wedge_at(NodeId node, Index leaf) const {
+        if (wedge_of_node_.empty()) return node;
+        const WedgeId only = wedge_of_node_[node];
+        return only != several_wedges ? only : tree_.wedge_at(node, leaf);
     }
 
     // Where a map folds over itself, triangles of both orientations in the texture meet at a leaf. What is drawn across that
@@ -135,38 +155,50 @@ private:
     public:
         static constexpr std::size_t lanes = 4;
 
-        // Places are shown along the triangle's normal on the plane of two axes, relative to a corner: there the triangle
-        // runs counter-clockwise.
-        UNSEEN_INLINE void aim(const glm::vec3& corner, const glm::dvec3& normal) {
-            const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
-            const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-            constexpr std::array<int, 5> after{0, 1, 2, 0, 1};
-            const int u = after[static_cast<std::size_t>(axis + (normal[axis] > 0 ? 1 : 2))], v = 3 - axis - u;
-            const double by = 1 / normal[axis];
-            axes_ = {axis, u, v};
-            corner_ = {corner[axis], corner[u], corner[v]};
-            u_by_ = static_cast<float>(normal[u] * by), v_by_ = static_cast<float>(normal[v] * by);
-            farthest_ = 0;
-        }
-        // Places of chain k, one after the other.
-        UNSEEN_INLINE void add(std::size_t k, std::size_t i, const glm::vec3& p) {
-            const float along = p[axes_[0]] - corner_[0], u = p[axes_[1]] - corner_[1], v = p[axes_[2]] - corner_[2];
-            farthest_ = std::max(farthest_, along * along + u * u + v * v);
-            x_[k][i] = u - along * u_by_, y_[k][i] = v - along * v_by_; // up to twice as far as the place
-        }
-        UNSEEN_INLINE void finish(const std::array<Chain, 3>& chains) {
+        // Shows places along the triangle's normal on the plane of two axes, relative to a corner: there the triangle runs
+        // counter-clockwise.
+        class Aim {
+        public:
+            UNSEEN_INLINE Aim(const glm::vec3& corner, const glm::dvec3& normal) {
+                const glm::dvec3 size(std::fabs(normal.x), std::fabs(normal.y), std::fabs(normal.z));
+                axis_ = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+                const double *n = glm::value_ptr(normal), by = 1 / n[axis_];
+                constexpr std::array<int, 5> after{0, 1, 2, 0, 1};
+                u_ = after[static_cast<std::size_t>(axis_ + (n[axis_] > 0 ? 1 : 2))], v_ = 3 - axis_ - u_;
+                const float* p = glm::value_ptr(corner);
+                at_ = p[axis_], at_u_ = p[u_], at_v_ = p[v_];
+                u_by_ = static_cast<float>(n[u_] * by), v_by_ = static_cast<float>(n[v_] * by);
+            }
+            UNSEEN_INLINE glm::vec2 operator()(const glm::vec3& place) {
+                const float* p = glm::value_ptr(place);
+                const float along = p[axis_] - at_, u = p[u_] - at_u_, v = p[v_] - at_v_;
+                farthest_ = std::max(farthest_, along * along + u * u + v * v);
+                return {u - along * u_by_, v - along * v_by_}; // up to twice as far as the place
+            }
+            float farthest() const { return farthest_; } // of the places, squared
+
+        private:
+            int axis_, u_, v_;
+            float at_, at_u_, at_v_, u_by_, v_by_, farthest_ = 0;
+        };
+
+        // The i-th place of chain k.
+        UNSEEN_INLINE void put(std::size_t k, std::size_t i, glm::vec2 p) { x_[k][i] = p.x, y_[k][i] = p.y; }
+        UNSEEN_INLINE void finish(const std::array<Chain, 3>& chains, float farthest) {
             constexpr float share = 2e-5f;          // of the farthest one's square; roundings are below a tenth of that
             constexpr float least_squared = 1e-30f; // below, floats are too coarse for shares of it
-            slack_ = farthest_ > least_squared ? share * farthest_ : std::numeric_limits<float>::infinity();
+            slack_ = farthest > least_squared ? share * farthest : std::numeric_limits<float>::infinity();
             for (std::size_t k = 1; k < 3; ++k)
                 for (std::size_t i = chains[k].size; i % lanes != 0; ++i)
                     x_[k][i] = x_[k][i - 1], y_[k][i] = y_[k][i - 1];
-            low_x_ = high_x_ = x_[2][0], low_y_ = high_y_ = y_[2][0];
-            for (std::size_t k = 1; k < chains[2].size; ++k) {
-                const float x = x_[2][k], y = y_[2][k];
-                low_x_ = std::min(low_x_, x), high_x_ = std::max(high_x_, x);
-                low_y_ = std::min(low_y_, y), high_y_ = std::max(high_y_, y);
+            Float4 low_x = lanes_of(x_[2], 0), high_x = low_x, low_y = lanes_of(y_[2], 0), high_y = low_y;
+            for (std::size_t i = lanes; i < chains[2].size; i += lanes) {
+                const Float4 x = lanes_of(x_[2], i), y = lanes_of(y_[2], i);
+                low_x = x < low_x ? x : low_x, high_x = x > high_x ? x : high_x;
+                low_y = y < low_y ? y : low_y, high_y = y > high_y ? y : high_y;
             }
+            low_x_ = FourWide::least_of(low_x), high_x_ = -FourWide::least_of(-high_x);
+            low_y_ = FourWide::least_of(low_y), high_y_ = -FourWide::least_of(-high_y);
         }
         // Of the second chain's places from `first` on, as many as there are lanes: a bit for each with which the triangle
         // may be turned over, wherever in their box the last chain's places are.
@@ -197,9 +229,7 @@ private:
             return some;
         }
 
-        std::array<int, 3> axes_;
-        std::array<float, 3> corner_;
-        float u_by_, v_by_, farthest_, slack_, low_x_, high_x_, low_y_, high_y_;
+        float slack_, low_x_, high_x_, low_y_, high_y_;
         std::array<Coordinates, 3> x_, y_;
     };
 
@@ -246,7 +276,7 @@ private:
         for (NodeId node = 1; node < tree_.interior(); ++node) is_under[node] |= is_under[g_.parents[node]];
         const auto is_near = [&](Index t) {
             return std::ranges::any_of(g_.triangles[t], [&](Index leaf) {
-                NodeId node = g_.parents[tree_.place_of_leaf(leaf)];
+                NodeId node = above_leaf_[leaf];
                 if (!is_under[node]) return false;
                 for (std::size_t step = 0; step < longest_chain && !is_one[node]; ++step) {
                     if (is_above(node, vanishes_at_[t]) && !joins_[node]) return false;
@@ -277,16 +307,16 @@ private:
             return g_.uvs.empty() ? TurnedTest::Uvs{} : TurnedTest::Uvs{g_.uvs[u], g_.uvs[v], g_.uvs[w]};
         };
         std::array<WedgeId, 3> leaves;
-        for (std::size_t k = 0; k < 3; ++k) leaves[k] = tree_.wedge_of_leaf(g_.triangles[t][k]);
+        for (std::size_t k = 0; k < 3; ++k) leaves[k] = first_leaf_ + g_.triangles[t][k];
         const TurnedTest test(positions_of(leaves[0], leaves[1], leaves[2]), uvs_of(leaves[0], leaves[1], leaves[2]));
         const bool is_mapped = test.uv_area() != 0;
         const auto on_texture = [&](WedgeId w) { return glm::vec3(g_.uvs[w], 0); };
-        ways.in_space.aim(g_.positions[leaves[0]], test.normal());
-        if (is_mapped) ways.in_texture.aim(on_texture(leaves[0]), {0, 0, test.uv_area()});
+        Front::Aim in_space(g_.positions[leaves[0]], test.normal());
+        Front::Aim in_texture(is_mapped ? on_texture(leaves[0]) : glm::vec3(0), {0, 0, test.uv_area()});
         for (std::size_t k = 0; k < 3; ++k)
             find_chain(g_.triangles[t][k], vanishes_at_[t], ways.chains[k], [&](std::size_t i, WedgeId w) {
-                ways.in_space.add(k, i, g_.positions[w]);
-                if (is_mapped) ways.in_texture.add(k, i, on_texture(w));
+                ways.in_space.put(k, i, in_space(g_.positions[w]));
+                if (is_mapped) ways.in_texture.put(k, i, in_texture(on_texture(w)));
             });
         const std::size_t count = a.size * b.size * c.size;
         if (count == 1) return;
@@ -296,35 +326,19 @@ private:
             if (test.is_turned(positions_of(u, v, w))) return true;
             return is_mapped && !(on_mirror_[u] | on_mirror_[v] | on_mirror_[w]) && test.is_mirrored(uvs_of(u, v, w));
         };
+        const std::size_t before = found.impossible.size();
         const auto try_way = [&](std::size_t i, std::size_t j, std::size_t k, bool is_known = false) {
             if (!is_known && !is_turned(a.wedges[i], b.wedges[j], c.wedges[k])) return;
-            any = true;
-            prevent({a.nodes[i], b.nodes[j], c.nodes[k]}, {a.nodes[i + 1], b.nodes[j + 1], c.nodes[k + 1]}, ways.needs,
-                    found.impossible);
+            if (!std::exchange(any, true))
+                for (Chain& chain : ways.chains) find_orders(chain);
+            prevent(ways.chains, {i, j, k}, ways.needs, found.impossible);
         };
         if (count <= ways.left) {
             ways.left -= count;
-            ways.in_space.finish(ways.chains);
-            if (is_mapped) ways.in_texture.finish(ways.chains);
-            const auto try_side = [&](std::size_t i, std::size_t j) {
-                for (std::size_t first = 0; first < c.size; first += Front::lanes) {
-                    auto [suspects, turned] = ways.in_space.suspects(i, j, first);
-                    if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first).all;
-                    for (; suspects; suspects &= suspects - 1) {
-                        const std::size_t k = first + static_cast<std::size_t>(std::countr_zero(suspects));
-                        if (k < c.size) try_way(i, j, k, (turned & suspects & -suspects) != 0);
-                    }
-                }
-            };
-            for (std::size_t i = 0; i < a.size; ++i)
-                for (std::size_t first = 0; first < b.size; first += Front::lanes) {
-                    std::uint32_t suspects = ways.in_space.suspect_sides(i, first);
-                    if (is_mapped) suspects |= ways.in_texture.suspect_sides(i, first);
-                    for (; suspects; suspects &= suspects - 1) {
-                        const std::size_t j = first + static_cast<std::size_t>(std::countr_zero(suspects));
-                        if (j < b.size) try_side(i, j);
-                    }
-                }
+            ways.in_space.finish(ways.chains, in_space.farthest());
+            if (is_mapped) ways.in_texture.finish(ways.chains, in_texture.farthest());
+            try_suspects(ways, is_mapped, try_way);
+            std::reverse(found.impossible.begin() + static_cast<std::ptrdiff_t>(before), found.impossible.end());
         } else {
             std::array<std::size_t, 3> at{};
             do try_way(at[0], at[1], at[2]);
@@ -334,6 +348,31 @@ private:
         keep_least(ways.needs);
         if (ways.needs.empty()) ways.needs.push_back({no_node, no_node});
         for (const Need& need : ways.needs) found.needs.push_back({t, need});
+    }
+
+    // From the largest nodes on: what these need covers most of what the others would.
+    template <class TryWay>
+    UNSEEN_INLINE static void try_suspects(const Ways& ways, bool is_mapped, TryWay&& try_way) {
+        const auto& [a, b, c] = ways.chains;
+        const auto from_last = [](std::size_t first, std::uint32_t suspects, std::size_t size, auto&& f) {
+            for (; suspects; suspects ^= std::bit_floor(suspects))
+                if (const std::size_t at = first + static_cast<std::size_t>(std::bit_width(suspects)) - 1; at < size)
+                    f(at);
+        };
+        for (std::size_t i = a.size; i-- > 0;)
+            for (std::size_t j_end = (b.size + Front::lanes - 1) / Front::lanes; j_end-- > 0;) {
+                std::uint32_t sides = ways.in_space.suspect_sides(i, j_end * Front::lanes);
+                if (is_mapped) sides |= ways.in_texture.suspect_sides(i, j_end * Front::lanes);
+                from_last(j_end * Front::lanes, sides, b.size, [&](std::size_t j) {
+                    for (std::size_t k_end = (c.size + Front::lanes - 1) / Front::lanes; k_end-- > 0;) {
+                        const std::size_t first = k_end * Front::lanes;
+                        auto [suspects, turned] = ways.in_space.suspects(i, j, first);
+                        if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first).all;
+                        from_last(first, suspects, c.size,
+                                  [&](std::size_t k) { try_way(i, j, k, (turned >> (k - first) & 1) != 0); });
+                    }
+                });
+            }
     }
 
     // To the next cut by size.
@@ -350,41 +389,48 @@ private:
     // Calls f(i, wedge) for each.
     template <class F>
     UNSEEN_INLINE void find_chain(Index leaf, NodeId vanishes_at, Chain& chain, F&& f) const {
-        NodeId node = tree_.place_of_leaf(leaf);
+        NodeId node = no_node; // stands for the place, which no node needs
         std::size_t size = 0;
         const auto add = [&](WedgeId w) {
             chain.nodes[size] = node;
             chain.wedges[size] = w;
             f(size++, w);
         };
-        add(tree_.wedge_of_leaf(leaf));
-        node = g_.parents[node];
+        add(first_leaf_ + leaf);
+        node = above_leaf_[leaf];
         for (std::size_t step = 0; step < longest_chain && !is_above(node, vanishes_at); ++step) {
-            if (!joins_[node]) add(tree_.wedge_at(node, leaf));
+            if (!joins_[node]) add(wedge_at(node, leaf));
             node = g_.parents[node];
         }
         chain.nodes[size] = head_of(node);
         chain.size = size;
     }
 
-    // The largest one of the nodes shall be unfolded where the smaller ones are active and its parent is unfolded: by the
-    // smallest of those above the three.
-    void prevent(const std::array<NodeId, 3>& nodes, const std::array<NodeId, 3>& above, std::vector<Need>& needs,
+    void find_orders(Chain& chain) const {
+        for (std::size_t i = 0; i <= chain.size; ++i) chain.orders[i] = order_of(chain.nodes[i]);
+    }
+
+    // The largest one of three nodes shall be unfolded where the smaller ones are active and its parent is unfolded: by the
+    // smallest of the next ones above the three.
+    void prevent(const std::array<Chain, 3>& chains, const std::array<std::size_t, 3>& at, std::vector<Need>& needs,
                  std::vector<Need>& impossible) const {
         constexpr std::size_t most_compared = 4; // neighbouring ways mostly find the same
-        const std::array<std::uint64_t, 3> orders{order_of(nodes[0]), order_of(nodes[1]), order_of(nodes[2])};
-        std::size_t large = orders[0] < orders[1] ? 1 : 0, other = 2;
+        const auto order = [&](std::size_t k) { return chains[k].orders[at[k]]; };
+        const auto order_above = [&](std::size_t k) { return chains[k].orders[at[k] + 1]; };
+        const auto above = [&](std::size_t k) { return chains[k].nodes[at[k] + 1]; };
+        std::size_t large = order(0) < order(1) ? 1 : 0, other = 2;
         const std::size_t one = 1 - large;
-        if (orders[large] < orders[2]) std::swap(large, other);
-        NodeId node = is_smaller(above[one], above[other]) ? above[one] : above[other];
-        if (const Need need{node, nodes[large]}; order_of(node) < orders[large]) {
+        if (order(large) < order(2)) std::swap(large, other);
+        const std::size_t least = order_above(one) < order_above(other) ? one : other;
+        const NodeId needed = chains[large].nodes[at[large]];
+        if (order_above(least) < order(large)) {
+            const Need need{above(least), needed};
             for (std::size_t i = needs.size(); i-- > 0 && i + most_compared >= needs.size();)
                 if (follows(need, needs[i])) return;
             needs.push_back(need);
-            return;
+        } else {
+            impossible.push_back({above(order_above(large) < order_above(least) ? large : least), needed});
         }
-        if (is_smaller(above[large], node)) node = above[large];
-        impossible.push_back({node, nodes[large]});
     }
 
     // An unfolded node is under unfolded ones.
@@ -437,9 +483,13 @@ private:
 
     const TreeGeometry& g_;
     const TreeLinks tree_;
-    std::vector<std::uint64_t> order_;    // by interior node: sizes first, and behind parents
-    std::vector<std::uint8_t> joins_;     // by interior node: folds and unfolds with its parent
-    std::vector<NodeId> vanishes_at_;     // by triangle
+    std::vector<std::uint64_t> order_; // by interior node: sizes first, and behind parents
+    std::vector<std::uint8_t> joins_;  // by interior node: folds and unfolds with its parent
+    std::vector<NodeId> vanishes_at_;  // by triangle
+    const WedgeId first_leaf_;
+    std::vector<NodeId> above_leaf_; // by leaf: its place's parent
+    static constexpr WedgeId several_wedges = ~WedgeId{0};
+    std::vector<WedgeId> wedge_of_node_;  // by interior node; empty where each has its own number
     std::vector<std::uint8_t> on_mirror_; // by wedge; empty without uvs
 };
 
