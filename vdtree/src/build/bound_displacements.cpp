@@ -54,8 +54,11 @@ public:
         std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
         out.normals = ParallelArray<glm::vec3>(out.start.back(), Unfilled());
         out.is_held.resize(in_.shape.leaves());
-        parallel_loop(Index{0}, in_.shape.leaves(),
-                      [&](Index place) { out.is_held[place] = irregular_[place] && is_tip(place); });
+        parallel_loop_over(tbb::blocked_range<Index>(0, in_.shape.leaves()), [&](const auto& places) {
+            Tip tip;
+            for (Index place = places.begin(); place < places.end(); ++place)
+                out.is_held[place] = irregular_[place] && is_tip(place, tip);
+        });
         // From the end of each place's range, which is its start when all are in.
         for_each_side([&](const TreePart& part, const Triangle& corners, std::size_t k, bool stands, auto&& normal) {
             const Index from = corners[k], to = corners[(k + 1) % 3];
@@ -93,22 +96,26 @@ private:
         });
     }
 
+    struct Tip {
+        std::vector<Index> preceding, following, ends;
+        std::vector<glm::dvec3> ways;
+    };
     // Whether an irregular edge ends at the place and none goes on about as it does: planes that stand on the two edges of
     // a sharp tip hardly hold it along its middle.
-    bool is_tip(Index place) const {
+    bool is_tip(Index place, Tip& tip) const {
         constexpr double most_cosine = -0.5;      // of the angle between edges that go on, 120 degrees or more
         constexpr std::size_t most_compared = 64; // irregular edges of one place
         const auto ring = in_.rings.around(place);
-        std::vector<Index> preceding, following;
+        auto& [preceding, following, ends, ways] = tip;
+        preceding.clear(), following.clear(), ends.clear(), ways.clear();
         for (std::size_t i = 0; i < ring.size(); i += 2) preceding.push_back(ring[i]), following.push_back(ring[i + 1]);
         std::ranges::sort(preceding);
         std::ranges::sort(following);
-        std::vector<Index> ends; // that do not follow once and precede once
+        // That do not follow once and precede once.
         std::ranges::set_symmetric_difference(preceding, following, std::back_inserter(ends));
         for (std::size_t i = 1; i < following.size(); ++i)
             if (following[i] == following[i - 1]) ends.push_back(following[i]);
         if (ends.size() > most_compared) return true;
-        std::vector<glm::dvec3> ways;
         for (const Index end : ends) ways.push_back(unit(in_.leaf_position(end) - in_.leaf_position(place)));
         return std::ranges::any_of(ways, [&](const glm::dvec3& way) {
             return std::ranges::none_of(ways,
@@ -229,7 +236,7 @@ public:
         const TreeShape& shape = in_.shape;
         proxy_ = in_.position(node);
         NormalCone cone;
-        double moved = 0, bounded = 0;
+        double moved = 0, bounded = 0, of_places = 0;
         shape.for_each_child(
             node,
             [&](NodeId child) {
@@ -239,15 +246,16 @@ public:
             },
             [&](Index place) {
                 include(cone, around(planes_.around(place)), planes_.is_held[place]);
-                bounded = std::max(bounded, off_planes(place));
+                of_places = std::max(of_places, off_planes(place));
             });
+        bounded = std::max(bounded, of_places);
         const double radius = static_cast<double>(support_[node].radius), whole = farthest_place(node);
         negligible_ = negligible_share * radius;
         if (!cone.is_everything() && bounded > negligible_ &&
             shape.leaf_end[node] - shape.first_leaf[node] <= most_measured_places) {
-            farthest_ = accepted_ = 0;
+            farthest_ = of_places, accepted_ = 0;
             enough_ = whole * static_cast<double>(cone.cosine);
-            measure(node);
+            measure(node, true);
             if (farthest_ < enough_) bounded = std::max(farthest_, accepted_);
         }
         bounded = std::min(whole, bounded + displacement_rounding * radius);
@@ -289,13 +297,22 @@ private:
                         farthest_place(node));
     }
 
-    // Looks where a farther plane may be, likely places first, until it is far enough.
-    void measure(NodeId node) {
+    // Looks where a farther plane may be, likely places first, until it is far enough. `is_known`: the node's own places
+    // have been looked at.
+    void measure(NodeId node, bool is_known = false) {
         const TreeShape& shape = in_.shape;
         if (farthest_ >= enough_) return;
+        const auto measure_places = [&](Index begin, Index end) {
+            for (Index place = begin; place < end; ++place) farthest_ = std::max(farthest_, off_planes(place));
+        };
+        const auto measure_place = [&](Index place) {
+            if (!is_known) measure_places(place, place + 1);
+        };
         if (shape.leaf_end[node] - shape.first_leaf[node] <= few_places) {
-            for (Index place = shape.first_leaf[node]; place < shape.leaf_end[node]; ++place) measure_place(place);
-            return;
+            const auto measure_child = [&](NodeId child) {
+                measure_places(shape.first_leaf[child], shape.leaf_end[child]);
+            };
+            return shape.for_each_child(node, measure_child, measure_place);
         }
         NodeId likely = no_node;
         double most = farthest_;
@@ -306,7 +323,7 @@ private:
                 if (most_here <= negligible_) accepted_ = std::max(accepted_, most_here);
                 else if (most_here > most) most = most_here, likely = child;
             },
-            [&](Index place) { measure_place(place); });
+            measure_place);
         if (likely == no_node) return;
         measure(likely);
         shape.for_each_child(
@@ -316,7 +333,6 @@ private:
             },
             [](Index) {});
     }
-    void measure_place(Index place) { farthest_ = std::max(farthest_, off_planes(place)); }
 
     const BoundInput& in_;
     const PlaneNormals& planes_;

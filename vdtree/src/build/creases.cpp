@@ -109,11 +109,21 @@ private:
 
 // ---- edges around one place
 
-// A corner at a place has two edges that end there.
-struct EdgeOfCorner {
-    Index neighbour; // the place at the edge's other end; later one of several that faces without an area make one edge
-    Index corner;    // among those of the place
-    bool follows;    // the triangle runs from the place to the neighbour
+// A corner at a place has two edges that end there. They are sorted by neighbour, then by corner.
+class EdgeOfCorner {
+public:
+    // `neighbour`: the place at the edge's other end; later one of several that faces without an area make one edge.
+    // `corner`: among those of the place. `follows`: the triangle runs from the place to the neighbour.
+    EdgeOfCorner(Index neighbour, std::size_t corner, bool follows)
+        : bits_(std::uint64_t{neighbour} << 32 | corner << 1 | (follows ? 1 : 0)) {}
+
+    Index neighbour() const { return static_cast<Index>(bits_ >> 32); }
+    Index corner() const { return static_cast<Index>(bits_) >> 1; } // three a triangle fill less than 31 bits here
+    bool follows() const { return (bits_ & 1) != 0; }
+    auto operator<=>(const EdgeOfCorner&) const = default;
+
+private:
+    std::uint64_t bits_;
 };
 
 // Looks at one place after another. Corners are numbered at the place.
@@ -132,9 +142,9 @@ public:
     void for_each_edge(Use&& use) {
         collect_edges();
         for (auto run = edges_.begin(); run != edges_.end();) {
-            const auto end =
-                std::find_if(run, edges_.end(), [&](const EdgeOfCorner& e) { return e.neighbour != run->neighbour; });
-            use(std::span(run, end), run->neighbour);
+            const auto end = std::find_if(run, edges_.end(),
+                                          [&](const EdgeOfCorner& e) { return e.neighbour() != run->neighbour(); });
+            use(std::span(run, end), run->neighbour());
             run = end;
         }
     }
@@ -142,12 +152,12 @@ public:
     // Unites corners across edges. Corners in smoothing groups take no part.
     void unite(double least_cosine, CornerSets& groups) {
         for_each_edge([&](std::span<EdgeOfCorner> edges, Index neighbour) {
-            const auto is_solid = [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); };
+            const auto is_solid = [&](const EdgeOfCorner& e) { return has_area(normal(e.corner())); };
             auto solid = std::ranges::find_if_not(edges, is_solid);
             if (solid != edges.end()) solid = std::stable_partition(solid, edges.end(), is_solid);
             const auto faces = static_cast<std::size_t>(solid - edges.begin());
-            if (faces == 2 && is_smooth(edges[0].corner, edges[1].corner, least_cosine))
-                groups.unite(edges[0].corner, edges[1].corner);
+            if (faces == 2 && is_smooth(edges[0].corner(), edges[1].corner(), least_cosine))
+                groups.unite(edges[0].corner(), edges[1].corner());
             if (faces > 2) unite_around(edges.first(faces), neighbour, least_cosine, groups);
         });
         join_faces_without_area(groups);
@@ -177,11 +187,11 @@ private:
         for (std::size_t i = 0; i < corners_.size(); ++i) {
             if (!in_.smoothing.empty() && in_.smoothing[corners_[i] / 3] != 0) continue;
             const auto [following, preceding] = neighbours_of(i);
-            edges_.push_back({following, static_cast<Index>(i), true});
-            edges_.push_back({preceding, static_cast<Index>(i), false});
+            edges_.emplace_back(following, i, true);
+            edges_.emplace_back(preceding, i, false);
             all_solid = all_solid && has_area(normal(static_cast<Index>(i)));
         }
-        sort_edges();
+        std::sort(edges_.begin(), edges_.end());
         if (!all_solid) close_slivers();
     }
 
@@ -191,41 +201,45 @@ private:
         return {places[(k + 1) % 3], places[(k + 2) % 3]};
     }
 
-    void sort_edges() {
-        std::ranges::sort(edges_, {},
-                          [](const EdgeOfCorner& e) { return std::uint64_t{e.neighbour} << 32 | e.corner; });
-    }
-
     // The two edges of a face without an area become one.
     void close_slivers() {
         neighbours_.clear();
         for (const EdgeOfCorner& e : edges_)
-            if (neighbours_.empty() || neighbours_.back() != e.neighbour) neighbours_.push_back(e.neighbour);
+            if (neighbours_.empty() || neighbours_.back() != e.neighbour()) neighbours_.push_back(e.neighbour());
         const auto number = [&](Index neighbour) {
             return static_cast<Index>(std::lower_bound(neighbours_.begin(), neighbours_.end(), neighbour) -
                                       neighbours_.begin());
         };
         ends_.reset(neighbours_.size());
         for (const EdgeOfCorner& e : edges_) {
-            if (has_area(normal(e.corner))) continue;
-            const auto [following, preceding] = neighbours_of(e.corner);
+            if (has_area(normal(e.corner()))) continue;
+            const auto [following, preceding] = neighbours_of(e.corner());
             ends_.unite(number(following), number(preceding));
         }
-        for (EdgeOfCorner& e : edges_) e.neighbour = neighbours_[ends_.find(number(e.neighbour))];
-        sort_edges();
+        for (EdgeOfCorner& e : edges_)
+            e = EdgeOfCorner(neighbours_[ends_.find(number(e.neighbour()))], e.corner(), e.follows());
+        std::sort(edges_.begin(), edges_.end());
     }
 
     // Any two of the faces around an edge. Their normals lie on a circle, so it suffices to compare those that follow
     // each other there.
     void unite_around(std::span<EdgeOfCorner> edges, Index neighbour, double least_cosine, CornerSets& groups) {
+        constexpr std::size_t most_in_pairs = 4; // there it takes no angles
+        if (edges.size() <= most_in_pairs) {
+            for (std::size_t i = 0; i < edges.size(); ++i)
+                for (std::size_t j = 0; j < i; ++j)
+                    if (is_smooth(edges[i].corner(), edges[j].corner(), least_cosine))
+                        groups.unite(edges[i].corner(), edges[j].corner());
+            return;
+        }
         const Index place = in_.triangles[corners_[0] / 3][corners_[0] % 3];
         const glm::dvec3 axis = unit(in_.positions[neighbour] - in_.positions[place]);
         const glm::dvec3 aside = std::abs(axis.x) < 0.7 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
         const glm::dvec3 first = unit(glm::cross(axis, aside)), second = glm::cross(axis, first);
         angles_.clear();
         for (const EdgeOfCorner& e : edges) {
-            const glm::dvec3 n(normal(e.corner));
-            angles_.emplace_back(std::atan2(glm::dot(n, second), glm::dot(n, first)), e.corner);
+            const glm::dvec3 n(normal(e.corner()));
+            angles_.emplace_back(std::atan2(glm::dot(n, second), glm::dot(n, first)), e.corner());
         }
         std::sort(angles_.begin(), angles_.end());
         Index before = angles_.back().second;
@@ -239,15 +253,15 @@ private:
     void join_faces_without_area(CornerSets& groups) {
         if (edges_.empty()) return;
         const auto solid =
-            std::ranges::find_if(edges_, [&](const EdgeOfCorner& e) { return has_area(normal(e.corner)); });
-        const Index any = (solid == edges_.end() ? edges_.front() : *solid).corner;
-        Index edge = edges_.front().neighbour, host = any;
+            std::ranges::find_if(edges_, [&](const EdgeOfCorner& e) { return has_area(normal(e.corner())); });
+        const Index any = (solid == edges_.end() ? edges_.front() : *solid).corner();
+        Index edge = edges_.front().neighbour(), host = any;
         for (auto e = edges_.begin(); e != edges_.end(); ++e) {
-            const bool begins = e == edges_.begin() || e->neighbour != edge;
-            edge = e->neighbour;
-            const bool is_solid = has_area(normal(e->corner)); // these come first at each edge
-            if (begins) host = is_solid ? e->corner : any;
-            if (!is_solid) groups.unite(host, e->corner); // both edges of the face are this one
+            const bool begins = e == edges_.begin() || e->neighbour() != edge;
+            edge = e->neighbour();
+            const bool is_solid = has_area(normal(e->corner())); // these come first at each edge
+            if (begins) host = is_solid ? e->corner() : any;
+            if (!is_solid) groups.unite(host, e->corner()); // both edges of the face are this one
         }
     }
 
@@ -279,8 +293,8 @@ EdgeCounts count_edges(const CornerInput& in, const FaceNormals& faces) {
             if (static_cast<double>(faces.least_cosines[place]) >= no_edges) continue;
             fan.look_at(in.surface.corners.at(place));
             fan.for_each_edge([&](std::span<const EdgeOfCorner> edges, Index neighbour) {
-                if (edges.size() != 2 || neighbour < place || edges[0].follows == edges[1].follows) return;
-                const Index a = edges[0].corner, b = edges[1].corner;
+                if (edges.size() != 2 || neighbour < place || edges[0].follows() == edges[1].follows()) return;
+                const Index a = edges[0].corner(), b = edges[1].corner();
                 if (!has_area(fan.normal(a)) || !has_area(fan.normal(b))) return;
                 counts.above_made += !fan.is_smooth(a, b, made);
                 counts.above_organic += !fan.is_smooth(a, b, organic);
