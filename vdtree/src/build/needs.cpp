@@ -272,12 +272,13 @@ private:
     std::vector<Index> take_around(std::span<const NodeId> nodes, std::vector<NeedOfTriangle>& found) const {
         std::vector<std::uint8_t> is_one(tree_.interior());
         for (const NodeId node : nodes) is_one[node] = 1;
-        std::vector<std::uint8_t> is_under(is_one);
-        for (NodeId node = 1; node < tree_.interior(); ++node) is_under[node] |= is_under[g_.parents[node]];
+        std::vector<std::uint8_t> is_under(tree_.leaves());
+        for (const NodeId node : nodes)
+            std::fill(is_under.begin() + g_.first_leaf[node], is_under.begin() + g_.leaf_end[node], std::uint8_t{1});
         const auto is_near = [&](Index t) {
             return std::ranges::any_of(g_.triangles[t], [&](Index leaf) {
+                if (!is_under[leaf]) return false;
                 NodeId node = above_leaf_[leaf];
-                if (!is_under[node]) return false;
                 for (std::size_t step = 0; step < longest_chain && !is_one[node]; ++step) {
                     if (is_above(node, vanishes_at_[t]) && !joins_[node]) return false;
                     node = g_.parents[node];

@@ -360,27 +360,31 @@ private:
         return gap_weight * (a * b / (a + b)) * glm::dot(d, d);
     }
 
-    // Keeps the errors of pairs whose clusters have not changed since the last round.
+    // Keeps the errors of pairs whose clusters have not changed since the last round. Which are known is as good as random,
+    // and the processor is not to guess.
     void update_errors(std::size_t first) {
         pair_errors_.resize(c_.pairs.size(), unknown_error);
-        unknown_.clear();
-        unknown_pairs_.clear();
-        several_.clear();
-        const bool any_several = has_seams();
+        unknown_.resize(c_.pairs.size() - first);
+        std::size_t count = 0;
         for (std::size_t i = first; i < c_.pairs.size(); ++i) {
-            if (pair_errors_[i] >= 0) continue;
-            if (pair_errors_[i] == waiting_error) {
+            if (pair_errors_[i] == waiting_error) [[unlikely]] {
                 pair_errors_[i] = unknown_error;
                 waits_[c_.pairs[i].a] = waits_[c_.pairs[i].b] = 1;
                 continue;
             }
-            if (any_several && !are_simple(c_.pairs[i])) {
-                several_.push_back(static_cast<Index>(i));
-                continue;
-            }
-            unknown_.push_back(static_cast<Index>(i));
-            unknown_pairs_.push_back(c_.pairs[i]);
+            unknown_[count] = static_cast<Index>(i);
+            count += pair_errors_[i] < 0;
         }
+        unknown_.resize(count);
+        several_.clear();
+        if (has_seams())
+            std::erase_if(unknown_, [&](Index pair) {
+                if (are_simple(c_.pairs[pair])) return false;
+                several_.push_back(pair);
+                return true;
+            });
+        unknown_pairs_.clear();
+        for (const Index pair : unknown_) unknown_pairs_.push_back(c_.pairs[pair]);
         found_errors_.resize(unknown_.size());
         find_errors(unknown_pairs_, found_errors_.data());
         for (std::size_t i = 0; i < unknown_.size(); ++i) pair_errors_[unknown_[i]] = found_errors_[i];
@@ -712,7 +716,7 @@ private:
             ++kept;
         }
         for (Index s = 0; s < live_.size(); ++s) // `into_` of a cluster that was joined is one that was not
-            if (into_[s] != s) new_number_[s] = new_number_[into_[s]];
+            new_number_[s] = new_number_[into_[s]];
         live_.clusters.resize(kept);
         live_.places.resize(kept);
         component_.resize(kept);
