@@ -151,36 +151,33 @@ std::vector<HardMesh> ship_hulls() { return {ship_hull("hull", 0.85f, 0.06f), sh
 // Beside a bright deck a side's nodes, all dark, fold at any size. Then triangles stretch from the deck's edge over the
 // side, with a gradient of luminances that no ring of the mesh's own has: the safe test knows of it. And far from the
 // gaze, lower frequencies than that of half a wave show in a row of such triangles.
-TEST(ShipHulls, AreFoldedUnseenByTheSafeTest) {
-    for (const HardMesh& hull : ship_hulls()) {
-        SCOPED_TRACE(hull.name);
-        Seen seen(built(hull));
-        const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
-        const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.5}};
-        seen.expect_nothing(directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
-            return perception::luebke_hallen_safe_distances(seen.tree(), rings, view, options);
-        });
-    }
+class ShipHulls : public testing::TestWithParam<std::size_t> {};
+INSTANTIATE_TEST_SUITE_P(All, ShipHulls, testing::Values(0, 1));
+
+TEST_P(ShipHulls, AreFoldedUnseenByTheSafeTest) {
+    Seen seen(built(ship_hulls()[GetParam()]));
+    const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
+    const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.5}};
+    seen.expect_nothing(directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
+        return perception::luebke_hallen_safe_distances(seen.tree(), rings, view, options);
+    });
 }
 
 // The same by light that comes from above.
-TEST(ShipHulls, AreFoldedUnseenUnderLights) {
+TEST_P(ShipHulls, AreFoldedUnseenUnderLights) {
     vdtree::Lighting from_above;
     from_above.ambient = 0.1;
     from_above.lights.push_back({.intensity = 0.8, .direction = glm::normalize(glm::dvec3(0.2, 1, 0.1))});
-    for (HardMesh& hull : ship_hulls()) {
-        SCOPED_TRACE(hull.name);
-        Seen seen(built(hull), from_above);
-        const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
-        const auto bounds =
-            std::make_shared<const vdtree::LightBounds>(*perception::bound_lit_cut_rings(seen.tree(), rings));
-        const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.2}};
-        seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {
-            options.scene = perception::lit_scene(seen.tree(), *bounds, from_above,
-                                                  vdtree::eye_in_tree(seen.tree(), view, {}), oracle::background);
-            return perception::lit_safe_distances(seen.tree(), rings, bounds, view, options);
-        });
-    }
+    Seen seen(built(ship_hulls()[GetParam()]), from_above);
+    const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
+    const auto bounds =
+        std::make_shared<const vdtree::LightBounds>(*perception::bound_lit_cut_rings(seen.tree(), rings));
+    const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.2}};
+    seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {
+        options.scene = perception::lit_scene(seen.tree(), *bounds, from_above,
+                                              vdtree::eye_in_tree(seen.tree(), view, {}), oracle::background);
+        return perception::lit_safe_distances(seen.tree(), rings, bounds, view, options);
+    });
 }
 
 // Measured once for all lights: a far one, a near one, and a spot that ends on the mesh.

@@ -5,6 +5,7 @@
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/layers.h>
 #include <unseen/render/renderer.h>
+#include <unseen/session/load.h>
 #include <unseen/session_gpu/internal/level_pictures.h>
 #include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/scene_renderer.h>
@@ -21,7 +22,7 @@ using namespace unseen::session;
 using LevelControlTest = render::testing::GlTest;
 
 const vdtree::VertexTree& body() {
-    static const vdtree::VertexTree tree = support::measured(support::built(shapes::bumpy_sphere(6, 0.05)));
+    static const vdtree::VertexTree tree = support::measured(support::built(shapes::bumpy_sphere(5, 0.05)));
     return tree;
 }
 
@@ -186,7 +187,7 @@ TEST_F(LevelControlTest, AStillPictureSettlesAndStays) {
         for (; frames < 300 && !control->is_settled(); ++frames) ASSERT_TRUE(control->draw(ahead(128)));
         ASSERT_LT(frames, 300) << "it does not settle";
         const std::vector<int> levels = control->draw(ahead(128))->levels;
-        for (int i = 0; i < 60; ++i) {
+        for (int i = 0; i < 20; ++i) {
             const auto frame = require(control->draw(ahead(128)));
             ASSERT_EQ(frame->levels, levels) << i << " frames after it was settled in " << frames;
         }
@@ -255,19 +256,19 @@ TEST_F(LevelControlTest, TheBestIsHeldAgainstTheNextAndTheWorstToo) {
 // l_HQ: the farther the layer, the worse is what its levels are held against; every so many frames.
 TEST_F(LevelControlTest, FartherLayersAreTestedLessOftenAndAgainstLess) {
     Session session = bodies(row);
-    auto control = LevelControl::create(context(), session, ahead(128));
-    ASSERT_TRUE(control->settle(ahead(128)));
+    auto control = LevelControl::create(context(), session, ahead(64));
+    ASSERT_TRUE(control->settle(ahead(64)));
     const auto centres = [&] {
         std::vector<glm::dvec3> all;
         for (const glm::dvec3& at : row) all.push_back(at);
         return all;
     }();
-    const auto split = require(render::split_into_layers(centres, ahead(128)));
+    const auto split = require(render::split_into_layers(centres, ahead(64)));
     ASSERT_EQ(split->count, 5);
     std::vector<int> tested(row.size(), 0);
     constexpr int frames = 240; // of which 60, 30, 20, 15, 12 are a layer's
     for (int i = 0; i < frames; ++i) {
-        const auto frame = control->draw(ahead(128));
+        const auto frame = control->draw(ahead(64));
         ASSERT_TRUE(context().finish()); // so that no test waits for another
         for (std::size_t k = 0; k < row.size(); ++k) {
             if (frame->tested_with[k] < 0) continue;
@@ -409,7 +410,8 @@ TEST_F(LevelControlTest, OutlivesTheHandleOfItsContext) {
 
 // Bodies in a sun from this direction.
 Session sunlit(const std::vector<glm::dvec3>& places, glm::dvec3 towards, bool casts) {
-    static const vdtree::VertexTree plain = support::built(shapes::bumpy_sphere(5, 0.02));
+    static const vdtree::VertexTree plain =
+        *session::measured_under_lights(support::built(shapes::bumpy_sphere(4, 0.02))); // once for all
     Scene scene;
     for (const glm::dvec3& at : places) scene.objects.emplace_back(Object{plain.share()}).placement.translation = at;
     vdtree::Lighting lighting;

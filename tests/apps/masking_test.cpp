@@ -7,6 +7,7 @@
 #include <unseen/perception/judge.h>
 #include <unseen/perception/masking.h>
 #include <unseen/render/internal/visibility_passes.h>
+#include <unseen/session/load.h>
 #include <unseen/session_gpu/gpu_judge.h>
 #include <unseen/session_gpu/scene_renderer.h>
 
@@ -379,7 +380,8 @@ class PassesTest : public MaskedSceneTest {
 protected:
     // A second ball far behind, if wanted, and what stands around; lit by a sun, which casts shadows or none.
     static Session session_of(bool has_second, std::optional<Mesh> around, std::optional<bool> casts = {}) {
-        static const vdtree::VertexTree ball = support::measured(support::built(shapes::bumpy_sphere(4, 0.01)));
+        static const vdtree::VertexTree ball =
+            *measured_under_lights(support::measured(support::built(shapes::bumpy_sphere(4, 0.01)))); // once for all
         Scene scene = Scene::of(ball.share());
         if (has_second) scene.objects.push_back({ball.share(), {.translation = {1, 0, -60}}, "far"});
         if (around) scene.backdrop.push_back({support::built(*around, {.prelit = !casts.has_value()})});

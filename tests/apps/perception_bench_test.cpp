@@ -12,8 +12,7 @@ protected:
     void SetUp() override {
         CommandTest::SetUp();
         build_ball();
-        const Outcome probe = run({"render", "ball.vdt", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
-        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
+        if (!no_opengl().empty()) GTEST_SKIP() << no_opengl();
     }
     Json perception(const std::string& groups) const {
         const Outcome outcome =

@@ -21,9 +21,14 @@ class RemoteWindow {
 public:
     explicit RemoteWindow(Display* display) : display_(display) {}
 
-    bool find() {
+    // Waits for it, as long as a process runs.
+    bool find(pid_t process) {
+        const auto has_ended = [&] {
+            siginfo_t info{};
+            return waitid(P_PID, static_cast<id_t>(process), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid;
+        };
         const auto end = std::chrono::steady_clock::now() + patience;
-        while (std::chrono::steady_clock::now() < end) {
+        while (std::chrono::steady_clock::now() < end && !has_ended()) {
             window_ = search(DefaultRootWindow(display_));
             if (window_) return true;
             std::this_thread::sleep_for(poll_pause);

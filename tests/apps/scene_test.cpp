@@ -100,9 +100,6 @@ protected:
         const auto loaded = load(file.glb());
         return loaded ? "" : loaded.error().message;
     }
-    bool can_draw() const {
-        return run({"render", "s.glb", "-o", "can.png", "--size", "8x8"}).err.find("No OpenGL") == std::string::npos;
-    }
     // Pixels that the judge sees change between two pictures, drawn by these words.
     void expect_same_picture(Words a, Words b) const {
         for (const auto& [words, picture] : {std::pair(&a, "a.pfm"), std::pair(&b, "b.pfm")}) {
@@ -295,7 +292,7 @@ TEST_F(SceneTest, NodesMultiplyAFileWithinBounds) {
 
 TEST_F(SceneTest, LooksLikeTheSameThingsAsOneModel) {
     write_text(path("s.glb"), File(all_kinds).add(body()).glb());
-    if (!can_draw()) GTEST_SKIP() << "no OpenGL";
+    if (!no_opengl().empty()) GTEST_SKIP() << "no OpenGL";
     const Words view = {"--eye", "2", "3", "12", "--target", "0", "1.5", "0", "--fov", "50"};
     Words scene = joined({"s.glb", "--full"}, view);
     const Words model = joined({"s.glb", "--full", "--as", "model"}, view);
@@ -306,7 +303,7 @@ TEST_F(SceneTest, LooksLikeTheSameThingsAsOneModel) {
 
 TEST_F(SceneTest, WritesScenesThatLookTheSame) {
     write_text(path("s.glb"), File(all_kinds).add(body()).glb());
-    if (!can_draw()) GTEST_SKIP() << "no OpenGL";
+    if (!no_opengl().empty()) GTEST_SKIP() << "no OpenGL";
     const Words view = {"--eye", "2", "3", "12", "--target", "0", "1.5", "0", "--fov", "50"};
     const Json report =
         succeed(

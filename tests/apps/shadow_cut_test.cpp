@@ -117,7 +117,7 @@ vdtree::VertexTree ball_of(float grey) {
     static std::map<float, vdtree::VertexTree> measured;
     const auto found = measured.find(grey);
     if (found != measured.end()) return found->second.share();
-    vdtree::Mesh mesh = shapes::bumpy_sphere(6, 0.0001);
+    vdtree::Mesh mesh = shapes::bumpy_sphere(4, 0.0001);
     mesh.colours.assign(mesh.positions.size(), glm::vec4(glm::vec3(grey), 1));
     auto tree = require(session::measured_under_lights(support::built(mesh)));
     return measured.emplace(grey, std::move(*tree)).first->second.share();
@@ -233,7 +233,7 @@ TEST_F(ShadowCut, FollowsAnEyeThatMoves) {
     request.purpose = session::Purpose::picture;
     std::vector<vdtree::Cut> full;
     full.emplace_back(session->tree()).unfold_all();
-    constexpr int frames = 60, judged_every = 15;
+    constexpr int frames = 30, judged_every = 10;
     for (int frame = 0; frame <= frames; ++frame) {
         const double x = -4 + 3.0 * frame / frames;
         setting.eye.x = setting.target.x = x;

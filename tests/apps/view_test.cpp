@@ -203,6 +203,7 @@ TEST_F(ViewCommandTest, GlidesComeToRestByThemselves) {
 }
 
 TEST_F(ViewCommandTest, FoldingCanBeginAtTheFullModel) {
+    succeed({"build", "ball.obj", "-o", "ball.vdt", "--no-fold-errors"});
     const auto imperceptible = [&](const Words& words, bool begins_whole) {
         if (!open(words)) return std::string();
         if (begins_whole) {

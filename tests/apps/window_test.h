@@ -44,7 +44,7 @@ protected:
     bool open_program(const std::vector<std::string>& words) {
         process_ = start_program(words, path("out.txt"), path("err.txt"));
         window_ = std::make_unique<RemoteWindow>(display_);
-        return process_ > 0 && window_->find();
+        return process_ > 0 && window_->find(process_);
     }
     int ended() {
         const int status = wait_for(process_);

@@ -344,8 +344,8 @@ TEST(Slivers, AreMeasuredInTimeInProportion) {
         EXPECT_TRUE(measure_folds(tree));
         return static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     };
-    const double few = cpu_seconds(7500), many = cpu_seconds(60000);
-    std::cout << "discs of 7,500 and 60,000 triangles in " << few << " and " << many << " s\n";
+    const double few = cpu_seconds(3750), many = cpu_seconds(30000);
+    std::cout << "discs of 3,750 and 30,000 triangles in " << few << " and " << many << " s\n";
     EXPECT_LT(many, 16 * few) << "8 is linear, 64 the square";
 }
 

@@ -123,7 +123,7 @@ TEST(TexturedFolds, OfAWhiteTextureAreThoseOfTheMesh) {
 
 TEST(TexturedFolds, StayInFiles) {
     const support::TempFolder folder;
-    const VertexTree tree = measured(textures::textured_sphere(3, textures::noise(64, 64, 2)));
+    const VertexTree tree = measured(textures::textured_sphere(2, textures::noise(64, 64, 2)));
     ASSERT_TRUE(write_tree(folder / "tree.vdt", *require(LitFolds::measure(tree)->with_attributes(tree))));
     const auto read = require(read_tree(folder / "tree.vdt"));
     EXPECT_TRUE(has_fold_measurement(*read));
@@ -201,7 +201,7 @@ TEST(StandIns, CountWhereNoImageIsDrawn) {
 }
 
 TEST(StandIns, AreKeptInFilesAndUnderLights) {
-    Mesh mesh = textures::textured_sphere(3, {});
+    Mesh mesh = textures::textured_sphere(2, {});
     const VertexTree tree = measured(mesh, false);
     const support::TempFolder folder;
     ASSERT_TRUE(write_tree(folder / "tree.vdt", tree));

@@ -42,8 +42,8 @@ case "$start" in *./quickstart*) ;; *) echo "README.md has no ./quickstart under
 count=$(printf '%s\n' "$commands" | grep -c '^unseen ') || true
 [ "$count" -ge 6 ] || { echo "README.md has $count commands under Six commands"; exit 1; }
 # A window would wait for a person.
-commands=$(printf '%s\n' "$commands" | sed 's/^unseen view .*/& --frames 60/')
-case "$commands" in *"--frames 60"*) ;; *) echo "README.md does not open the viewer"; exit 1 ;; esac
+commands=$(printf '%s\n' "$commands" | sed 's/^unseen view .*/& --frames 12/')
+case "$commands" in *"--frames 12"*) ;; *) echo "README.md does not open the viewer"; exit 1 ;; esac
 
 exec 3>"$work/display"
 Xvfb -displayfd 3 -screen 0 1280x1100x24 -nolisten tcp >/dev/null 2>&1 &

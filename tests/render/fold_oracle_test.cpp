@@ -178,7 +178,7 @@ TEST(FoldOracle, SeesNothingOfTheBunny) {
     const char* const file = "/usr/share/glmark2/models/bunny.obj"; // of Debian's package glmark2-data
     if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
     std::uint64_t triangles = 0;
-    EXPECT_EQ(seen_by_castle(measured_file(file), {.window_px = 512, .count = 3}, triangles), 0u);
+    EXPECT_EQ(seen_by_castle(measured_file(file), {.count = 3}, triangles), 0u);
 }
 
 TEST(FoldOracle, SeesNothingOfFurtherMeshes) {
@@ -227,7 +227,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(FoldMutations, AreSeen) {
     const VertexTree tree =
-        measured(painted(shapes::icosphere(6),
+        measured(painted(shapes::icosphere(5),
                          [](glm::dvec3 p) { return 0.5 + GetParam().pattern * std::sin(9 * p.x) * std::sin(9 * p.y); }),
                  true);
     std::uint64_t triangles = 0, fewer = 0;
@@ -245,7 +245,7 @@ TEST_P(FoldMutations, AreSeen) {
 // From far away everything folds to a few triangles, and in the corner of the eye sooner.
 TEST(FoldDistance, LeavesLittleOfAFarObject) {
     const VertexTree tree =
-        measured(shapes::bumpy_sphere(6, 0.002)); // rougher ones grow darker where they are folded, which shows
+        measured(shapes::bumpy_sphere(5, 0.002)); // rougher ones grow darker where they are folded, which shows
     const perception::Display display;
     View view;
     view.fov_y_degrees = perception::physical_field(display, view.height).value();

@@ -49,7 +49,7 @@ struct Case {
 };
 const Case cases[] = {
     {"checkerboard_on_a_sphere",
-     [] { return textures::textured_sphere(5, textures::checkerboard(128, 128, 16, 40, 220), 0.9); }},
+     [] { return textures::textured_sphere(4, textures::checkerboard(128, 128, 16, 40, 220), 0.9); }},
     {"noise_on_a_sphere", [] { return textures::textured_sphere(5, textures::noise(256, 256, 3, 100, 150)); }},
     {"hills_on_a_bumpy_sphere", [] { return textures::with_uvs(shapes::bumpy_sphere(5, 0.01), hills()); }},
     {"checkerboard_on_a_plane",

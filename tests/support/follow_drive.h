@@ -293,7 +293,7 @@ private:
         const double bad = in_.below(3) == 0 ? nan : in_.below(2) ? infinity : -infinity;
         Viewpoint viewpoint = viewpoint_;
         FollowOptions options;
-        switch (in_.below(11)) {
+        switch (in_.below(12)) {
         case 8: viewpoint.occluders = {{glm::vec3(9, 9, 9), static_cast<float>(bad)}}; break;
         case 9:
             viewpoint.occluders = {
@@ -307,6 +307,7 @@ private:
         case 5: viewpoint.frusta = {{Plane{{0, 0, 0}, 1}}}; break;
         case 6: options.threshold = in_.below(2) ? static_cast<float>(bad) : -0.0f; break;
         case 7: options.hysteresis = in_.below(2) ? static_cast<float>(bad) : 0.5f; break;
+        case 10: viewpoint.eye_spread = in_.below(2) ? bad : -1.0; break;
         default: options.milliseconds = in_.below(2) ? nan : -1.0; break;
         }
         const std::vector<bool> before = state_of(*cut_);

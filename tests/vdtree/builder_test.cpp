@@ -758,15 +758,6 @@ TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
     }
 }
 
-TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
-    const Mesh mesh = shapes::inside_out(shapes::icosphere(2));
-    const auto tree = require(build_tree(mesh.view()));
-    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
-        const WedgeId node = tree->wedge_of_leaf(leaf);
-        EXPECT_GT(glm::dot(glm::vec3(tree->normals()[node]), tree->positions()[node]), 0.9f);
-    }
-}
-
 // Two vertices at each position of the seam, of one colour or of two.
 TEST(BuildTree, KeepsTheSidesOfASeamApart) {
     for (const bool colours_differ : {false, true}) {

@@ -110,7 +110,7 @@ Mesh pole(Index n) {
     return m;
 }
 
-constexpr Index large = 60000; // vertices enough for several parts
+constexpr Index large = 36000; // vertices enough for several parts
 
 struct Hard {
     const char* name;
@@ -157,7 +157,7 @@ TEST(Clusterers, AreWholeAndFastOnHardMeshesWhateverTheThreads) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
             SCOPED_TRACE(std::string(hard.name) + ", " + std::string(name(kind)));
             Clustering first;
-            for (const std::size_t threads : {1u, 2u, 8u}) {
+            for (const std::size_t threads : {1u, 8u}) {
                 const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
                 const auto begin = std::chrono::steady_clock::now();
                 Clustering made = clustered(task, kind);
@@ -253,7 +253,8 @@ TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
         const Mesh mesh = hard.make();
         const ClusteringTask task(mesh);
         const Clustering alone = clustered(task, ClustererKind::quadric);
-        for (const int members : {1, 3, 40}) {
+        const bool is_first = &hard == hard_meshes; // of any size; the others of one
+        for (const int members : is_first ? std::vector{1, 3, 40} : std::vector{3}) {
             Mailboxes mail;
             std::vector<std::thread> others;
             for (int rank = 1; rank < members; ++rank)

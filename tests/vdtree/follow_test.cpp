@@ -1,4 +1,5 @@
-// Cuts that follow a viewpoint: whatever the way, they are what the criterion asks for, and the index buffer is theirs.
+// Cuts that follow a viewpoint: whatever the way, they are what the criterion asks for, and the index buffer is theirs. Calls
+// in any order, copied criteria, bad input and what is left when time is up: see follow_property_test.cpp.
 #include <unseen/vdtree/cut.h>
 
 #include <unseen/vdtree/builder.h>
@@ -258,38 +259,6 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
     if (GetParam().has_small_rings) EXPECT_GT(hiding_frames, frame_count() / 20);
 }
 
-// Straight at the model, past it and away from it, by steps of all sizes, with a gaze that goes its own way.
-TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
-    const VertexTree tree = built(GetParam().make());
-    const Sphere sphere = tree.bounding_sphere();
-    const std::vector<Sphere> occluders = occluders_in(tree);
-    std::mt19937_64 random(29);
-    for (const bool with_gaze : {false, true}) {
-        const DistanceCriterion criterion = rich_criterion(tree, 4, with_gaze);
-        Cut cut(tree);
-        for (int way = 0; way < frame_count() / 13; ++way) {
-            glm::dvec3 eye =
-                glm::dvec3(sphere.centre) + (1.5 + 6 * random_unit(random)) * sphere.radius * random_direction(random);
-            const glm::dvec3 target =
-                glm::dvec3(sphere.centre) + sphere.radius * random_unit(random) * random_direction(random);
-            const glm::dvec3 step =
-                (target - eye) * std::pow(10.0, -1 - 2 * random_unit(random)) * (way % 3 == 0 ? -1.0 : 1.0);
-            glm::dvec3 gaze = glm::normalize(target - eye);
-            const glm::dvec3 turn = 1e-3 * random_unit(random) * random_direction(random);
-            for (int frame = 0; frame < 30; ++frame) {
-                Viewpoint viewpoint{.eye = eye};
-                if (with_gaze) viewpoint.gaze = gaze;
-                if (way % 2 == 1) viewpoint.occluders = occluders_seen_from(eye, occluders);
-                ASSERT_TRUE(cut.follow(criterion, viewpoint));
-                ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {}))
-                    << "way " << way << ", frame " << frame;
-                eye += step;
-                gaze = glm::normalize(gaze + turn);
-            }
-        }
-    }
-}
-
 // Views of parts of the model, some two at a time, that turn, go on and zoom by steps of all sizes, with the eye or
 // apart from it: nodes are due by planes that cut the model, and blocks of them go in and out.
 TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
@@ -376,27 +345,13 @@ TEST_P(Follow, KeepsForAllEyesWithinTheSpreadWhatOneOfThemNeeds) {
     EXPECT_GT(of_all, of_one); // else the spread did nothing
 }
 
-#ifdef NDEBUG // else an assertion tells
-TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
-    const VertexTree tree = built(GetParam().make());
+TEST(FollowCriterion, KnowsWhetherItIsMonotone) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
     DistanceCriterion::Parts parts = rich_criterion(tree, 3, false).parts();
-    std::mt19937_64 random(17);
-    for (FoldClass& rows : parts.classes)
-        rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
-    const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
-    EXPECT_FALSE(criterion->is_monotone());
-    EXPECT_TRUE(rich_criterion(tree, 3, false).is_monotone());
-    Path path(tree, 19, false, true);
-    path.put_occluders();
-    Cut cut(tree);
-    for (int frame = 0; frame < frame_count() / 4; ++frame) {
-        const Viewpoint viewpoint = path.next();
-        ASSERT_TRUE(cut.follow(*criterion, viewpoint));
-        ASSERT_EQ(state_of(cut), from_scratch(tree, *criterion, viewpoint, {})) << "frame " << frame;
-        ASSERT_EQ(support::fault_in_cut(cut), "") << "frame " << frame;
-    }
+    EXPECT_TRUE(require(DistanceCriterion::create(tree, parts))->is_monotone());
+    parts.classes[VertexTree::root()] = {};
+    EXPECT_FALSE(require(DistanceCriterion::create(tree, parts))->is_monotone());
 }
-#endif
 
 // Decisions and costs of many nodes at once are those of the tests one by one.
 TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
@@ -537,43 +492,6 @@ TEST(FollowChanges, ReplayToTheSameCut) {
     }
 }
 
-TEST(FollowAfterOthers, StartsOverFromWhateverTheCutIs) {
-    const VertexTree tree = built(shapes::torus(40, 20));
-    const DistanceCriterion criterion = rich_criterion(tree, 7, false);
-    const Viewpoint viewpoint{.eye = {6, 1, 2}};
-    Cut cut(tree), other(tree);
-    ASSERT_TRUE(other.follow(criterion, viewpoint));
-    ASSERT_TRUE(cut.follow(criterion, viewpoint));
-    cut.unfold_all();
-    ASSERT_TRUE(cut.follow(criterion, viewpoint));
-    EXPECT_EQ(state_of(cut), state_of(other));
-    cut.fold_subtree(support::sound(tree).subtree_end()[1]);
-    ASSERT_TRUE(cut.follow(criterion, viewpoint));
-    EXPECT_EQ(state_of(cut), state_of(other));
-}
-
-TEST(FollowAfterOthers, TakesACopyOfTheCriterionInEveryFrame) {
-    const VertexTree tree = built(shapes::torus(40, 20));
-    const DistanceCriterion original = rich_criterion(tree, 7, true);
-    Path path(tree, 14, true, true);
-    Cut cut(tree);
-    for (int frame = 0; frame < 50; ++frame) {
-        const Viewpoint viewpoint = path.next();
-        const auto copy = std::make_unique<DistanceCriterion>(original); // gone after the frame
-        const DistanceCriterion on_stack = *copy;
-        ASSERT_TRUE(cut.follow(frame % 2 ? *copy : on_stack, viewpoint));
-        ASSERT_EQ(state_of(cut), from_scratch(tree, original, viewpoint, {})) << "frame " << frame;
-    }
-    std::optional<DistanceCriterion> in_place; // always at the same address, with its numbers elsewhere
-    for (int frame = 0; frame < 50; ++frame) {
-        const Viewpoint viewpoint = path.next();
-        const DistanceCriterion other = original;
-        in_place.emplace(other);
-        ASSERT_TRUE(cut.follow(*in_place, viewpoint));
-        ASSERT_EQ(state_of(cut), from_scratch(tree, original, viewpoint, {})) << "frame " << frame;
-    }
-}
-
 bool has_its_needs(const VertexTree& tree, std::uint32_t unfolded) {
     std::vector<bool> bits(tree.interior_count());
     for (NodeId node = 0; node < bits.size(); ++node) bits[node] = (unfolded >> node) & 1;
@@ -631,22 +549,6 @@ TEST(FollowBudget, HasTheLeastLargestCostOfAllCuts) {
                 ASSERT_LE(largest, others_largest) << "budget " << budget << ", seed " << seed;
             }
         }
-    }
-}
-
-TEST(FollowBudget, IsTheSameWhateverWasBefore) {
-    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.03));
-    const DistanceCriterion criterion = rich_criterion(tree, 8, true);
-    Path path(tree, 13, true, true);
-    Cut cut(tree);
-    for (int frame = 0; frame < 60; ++frame) {
-        const Viewpoint viewpoint = path.next();
-        const FollowOptions options{.triangle_budget = static_cast<Index>(100 + 37 * (frame % 7))};
-        const auto stats = require(cut.follow(criterion, viewpoint, options));
-        Cut fresh(tree);
-        ASSERT_TRUE(fresh.follow(criterion, viewpoint, options));
-        ASSERT_EQ(state_of(cut), state_of(fresh)) << "frame " << frame;
-        EXPECT_LE(stats->triangles, *options.triangle_budget);
     }
 }
 
@@ -721,25 +623,6 @@ TEST(FollowBudget, WithMuchHysteresisIsStillFollowed) {
         }
         EXPECT_LT(tests, tests_from_scratch / 4) << "hysteresis " << hysteresis;
     }
-}
-
-TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
-    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
-    const DistanceCriterion criterion = rich_criterion(tree, 10, false);
-    const Viewpoint viewpoint{.eye = {2, 1, 2}};
-    Cut whole(tree), hurried(tree);
-    ASSERT_TRUE(whole.follow(criterion, viewpoint));
-    auto stats = require(hurried.follow(criterion, viewpoint, {.milliseconds = 0.0}));
-    EXPECT_FALSE(stats->is_complete);
-    EXPECT_LT(hurried.triangle_count(), whole.triangle_count());
-    int calls = 0;
-    for (; !stats->is_complete && calls < 10000; ++calls) {
-        stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.05});
-        ASSERT_TRUE(stats);
-        ASSERT_EQ(support::fault_in_cut(hurried), "");
-    }
-    EXPECT_TRUE(stats->is_complete);
-    EXPECT_EQ(state_of(hurried), state_of(whole));
 }
 
 // The largest cost of a folded node under unfolded ones (or of the root).
@@ -922,31 +805,6 @@ TEST(FollowFarAway, FoldsToNothing) {
     EXPECT_GT(cut.triangle_count(), 0u);
     ASSERT_TRUE(cut.follow(*criterion, {.eye = {1e9, 0, 0}}));
     EXPECT_EQ(cut.triangle_count(), 0u);
-}
-
-TEST(FollowBadInput, IsRefusedAndChangesNothing) {
-    const VertexTree tree = built(shapes::bumpy_sphere(3));
-    const DistanceCriterion criterion = rich_criterion(tree, 2, true);
-    Cut cut(tree);
-    ASSERT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
-    const std::vector<bool> before = state_of(cut);
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {nan, 0, 0}}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {0, infinity, 0}}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {0, 1e30, 0}}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = nan}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = -1}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .eye_spread = infinity}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(0)}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(nan)}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .frusta = {{Plane{{0, 0, nan}, 0}}}}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = 0}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = std::nanf("")}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.hysteresis = 0.5f}));
-    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.milliseconds = -1.0}));
-    EXPECT_EQ(state_of(cut), before);
-    EXPECT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
-    EXPECT_EQ(state_of(cut), before);
 }
 
 TEST(FollowBadInput, ACriterionOfAnotherTreeIsRefused) {

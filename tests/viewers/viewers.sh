@@ -17,7 +17,7 @@ if [ "$1" = round_trips ]; then
     node "$here/round_trips.mjs" "$unseen" "$npm" "$out/files" "$npm/$models_folder/oculus-touch-v3/left.glb"
     exit
 fi
-# A headset's controllers: several parts, materials and images.
+# A headset's controllers: several parts, materials and images. One of them in all forms.
 for model in htc-vive/none oculus-touch-v3/left; do
     name=$out/$(dirname "$model")
     lod() {
@@ -28,8 +28,10 @@ for model in htc-vive/none oculus-touch-v3/left; do
         exit 1
     }
     lod -o "$name.glb" --json "$name.json" --separate
-    lod -o "$name-quantized.glb" --quantize
-    lod -o "$name-compressed.glb" --meshopt
+    if [ "$model" = oculus-touch-v3/left ]; then
+        lod -o "$name-quantized.glb" --quantize
+        lod -o "$name-compressed.glb" --meshopt
+    fi
     lod -o "$name-small.glb" --quantize --meshopt
     node "$here/read_levels.mjs" "$npm" "$name"
 done
