@@ -31,7 +31,8 @@ protected:
 
 TEST_F(UsageTest, EveryVerbHasHelpWithExamples) {
     const Outcome top = succeed({"--help"});
-    for (const std::string verb : {"build", "info", "simplify", "compare", "csf", "make"}) {
+    for (const std::string verb :
+         {"build", "info", "simplify", "render", "fly", "levels", "sheet", "view", "compare", "csf", "make"}) {
         EXPECT_THAT(top.out, HasSubstr("\n  " + verb + " ")) << top.out;
         const Outcome help = succeed({verb, "--help"});
         EXPECT_THAT(help.out, AllOf(HasSubstr("Examples:"), HasSubstr("unseen " + verb))) << verb;

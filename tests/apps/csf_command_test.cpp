@@ -104,16 +104,6 @@ TEST_F(CsfCommandTest, TheWorstFieldIsTheMoreSensitive) {
     EXPECT_EQ(in_field("worst"), in_field("nasal"));
 }
 
-TEST_F(CsfCommandTest, TheTableFollowsTheFormula) {
-    for (const std::string frequency : {"0.3", "1", "3", "10"}) {
-        const double formula = sensitivity({"--frequency", frequency, "--luminance", "37", "--eccentricity", "3"});
-        const double table =
-            sensitivity({"--frequency", frequency, "--luminance", "37", "--eccentricity", "3", "--table"});
-        EXPECT_NEAR(table / formula, 1, 0.005) << frequency;
-        EXPECT_NE(table, formula) << frequency;
-    }
-}
-
 TEST_F(CsfCommandTest, TablesCanBeSavedAndUsed) {
     ASSERT_EQ(run({"csf", "--table", "--save-table", "table.json"}).status, 0);
     const Words stimulus = {"--frequency", "5", "--luminance", "12"};

@@ -642,13 +642,6 @@ TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
                 fails(1, HasSubstr("--fold-test luebke-hallen")));
 }
 
-TEST_F(RenderCommandTest, VerbsThatDrawHaveHelpWithExamples) {
-    for (const std::string verb : {"render", "fly", "levels", "sheet", "view"}) {
-        const Outcome help = succeed({verb, "--help"});
-        EXPECT_THAT(help.out, ::testing::AllOf(HasSubstr("Examples:"), HasSubstr("unseen " + verb))) << verb;
-    }
-}
-
 TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
     const auto before = files();
     for (const Words& words :

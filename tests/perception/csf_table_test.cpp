@@ -342,20 +342,6 @@ TEST(CsfTable, FlatTableHidesNothingAboveItsLevel) {
     EXPECT_NEAR(inverse(table, 1 / 8.0, 0, 100), 16, 1e-9);
 }
 
-TEST(CsfTable, NothingThatIsNotANumberFolds) {
-    const CsfTable& table = CsfTable::standard();
-    EXPECT_EQ(inverse(table, not_a_number, 0, 100), infinity);
-    EXPECT_EQ(inverse(table, 0.5, not_a_number, 100), infinity);
-    EXPECT_EQ(inverse(table, 0.5, 0, not_a_number), infinity);
-    EXPECT_EQ(inverse(table, -0.5, 0, 100), infinity);
-    EXPECT_EQ(inverse(table, 0.5, 0, -1), infinity);
-    EXPECT_EQ(inverse(table, infinity, 0, 100), infinity);
-    EXPECT_EQ(inverse(table, 0, 0, 100), 0);
-    EXPECT_GT(inverse(table, 0.5, 0, 0), 0); // as at the lowest luminance of the table
-    EXPECT_EQ(inverse(table, 0.5, -3, 100), inverse(table, 0.5, 0, 100));
-    EXPECT_EQ(inverse(table, 0.5, infinity, 100), inverse(table, 0.5, 120, 100));
-}
-
 TEST(CsfTable, BatchesAgreeWithSingleQueries) {
     RandomPlaces random(13);
     for (const CsfTable& table : {CsfTable::standard(), noisy_table(14)}) {

@@ -240,13 +240,6 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
     EXPECT_GE(within * 20, compared * 19) << within << " of " << compared;
 }
 
-TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
-    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.02));
-    const auto one = require(measure_folds(tree, 1)), four = require(measure_folds(tree, 4));
-    EXPECT_EQ(errors_of(*one), errors_of(*four));
-    EXPECT_TRUE(std::ranges::equal(records_of(*one), records_of(*four)));
-}
-
 TEST(FoldErrors, TellHowFarTheyAreAndCanBeCancelledAtAnyTime) {
     const VertexTree tree = built(shapes::bumpy_sphere(4, 0.02));
     std::vector<double> shares;

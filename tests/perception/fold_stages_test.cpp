@@ -2,15 +2,12 @@
 // against surfaces that show nothing, and against the background alone.
 #include "measure/fold_record.h"
 
-#include <unseen/vdtree/tree_io.h>
-
 #include "fold/fold_errors.h"
 #include "measure/pyramid.h"
 #include "measure/stage_picture.h"
 #include "measured.h"
 #include "shapes.h"
 #include "sound.h"
-#include "temp_folder.h"
 #include "testing.h"
 
 namespace unseen::perception {
@@ -198,16 +195,6 @@ TEST(FoldStages, OfTranslucentVerticesAreNone) {
     Mesh mesh = grey(shapes::torus(16, 8), 0.5f);
     mesh.colours[3].a = 0.5f;
     EXPECT_TRUE(stages_of(built(mesh)).empty());
-}
-
-TEST(FoldStages, AreKeptInFiles) {
-    const support::TempFolder folder;
-    const VertexTree tree = built(shapes::torus(24, 12));
-    ASSERT_TRUE(write_tree(folder / "tree.vdt", tree));
-    for (const auto& read : {read_tree(folder / "tree.vdt"), map_tree(folder / "tree.vdt")}) {
-        ASSERT_TRUE(read) << read.error().message;
-        EXPECT_TRUE(std::ranges::equal(stages_of(*read), stages_of(tree)));
-    }
 }
 
 // Pages on one edge.

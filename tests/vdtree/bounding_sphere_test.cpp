@@ -139,16 +139,6 @@ TEST(SmallestSphere, KnowsTheSpheresOfSimpleSets) {
     EXPECT_NEAR(smallest_sphere(obtuse).radius, 1, 1e-12);
 }
 
-TEST(SmallestSphere, IsTheSameForTheSamePoints) {
-    std::mt19937_64 random(2);
-    for (const NamedPoints& set : point_sets()) {
-        const Points points = set.make(random);
-        const DSphere a = smallest_sphere(points), b = smallest_sphere(points);
-        EXPECT_EQ(a.centre, b.centre);
-        EXPECT_EQ(a.radius, b.radius);
-    }
-}
-
 // What a lane holds, and what is promised of its sphere.
 struct Lane {
     std::vector<glm::vec3> points;

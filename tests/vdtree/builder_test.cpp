@@ -714,24 +714,6 @@ TEST(BuildTree, RefusesOrRepairsAttributesThatAreNotFinite) {
     }
 }
 
-TEST(BuildTree, ComputesNormalsThatAreMissing) {
-    Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
-    const float nan = std::numeric_limits<float>::quiet_NaN();
-    mesh.normals[3] = {nan, 0, 0};
-    mesh.normals[7] = {0, 0, 0};
-    const auto tree = require(build_tree(mesh.view()));
-    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
-        const Index v = tree->source_vertices()[leaf];
-        const glm::vec3 n = tree->normals()[tree->wedge_of_leaf(leaf)];
-        EXPECT_NEAR(glm::length(n), 1, 1e-5);
-        if (v == 3 || v == 7) {
-            EXPECT_GT(glm::dot(glm::dvec3(n), mesh.positions[v]), 0.99);
-        } else {
-            EXPECT_GT(glm::dot(n, glm::normalize(mesh.normals[v])), 0.9999f);
-        }
-    }
-}
-
 TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
     Mesh one_turned = shapes::icosphere(1);
     std::swap(one_turned.triangles[7][0], one_turned.triangles[7][1]);
@@ -769,16 +751,6 @@ TEST(BuildTree, KeepsTheSidesOfASeamApart) {
             EXPECT_EQ(tree->place_count(), mesh.positions.size() - 2);
             EXPECT_EQ(tree->leaf_count(), mesh.positions.size() - (colours_differ ? 0 : 2));
         }
-    }
-}
-
-TEST(BuildTree, KeepsThePrecisionOfNorthings) {
-    // Metres of UTM: a float has a step of 0.5 m at 5e6, the tree's one of micrometres.
-    const Mesh mesh = shapes::placed(shapes::bumpy_sphere(3), 20, {4.5e5, 5.4e6, 300});
-    const auto tree = require(build_tree(mesh.view()));
-    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
-        const glm::dvec3 p = tree->origin() + glm::dvec3(tree->positions()[tree->wedge_of_leaf(leaf)]);
-        ASSERT_LT(glm::distance(p, mesh.positions[tree->source_vertices()[leaf]]), 5e-6);
     }
 }
 

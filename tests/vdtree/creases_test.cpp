@@ -3,8 +3,6 @@
 
 #include <set>
 
-#include <tbb/global_control.h>
-
 #include <unseen/vdtree/builder.h>
 
 #include "build/surface.h"
@@ -471,20 +469,6 @@ TEST(Creases, TreesHaveALeafForEachNormalAndSayHowItWasFound) {
     EXPECT_EQ(tree(flat)->creases(), Creases());
     options.crease = -1.0f;
     EXPECT_THAT(build_tree(flat.view(), options).error().message, HasSubstr("0 to 180 degrees"));
-}
-
-TEST(Creases, ThreadsDoNotMatter) {
-    const Mesh mesh = shapes::together(shapes::bumpy_sphere(5, 0.03), shapes::cube(50));
-    const auto with_threads = [&](std::size_t threads) {
-        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        return find(mesh);
-    };
-    const CornerNormals one = with_threads(1), four = with_threads(4);
-    EXPECT_EQ(fault(mesh, one), "");
-    EXPECT_TRUE(one.has_creases);
-    EXPECT_EQ(one.number, four.number);
-    EXPECT_EQ(one.normals, four.normals);
-    EXPECT_EQ(one.creases, four.creases);
 }
 
 } // namespace unseen::vdtree::creases_test

@@ -530,23 +530,6 @@ TEST(Budget, GivesTheLeastLargestCostOfAllCuts) {
     EXPECT_GT(compared, 100);
 }
 
-TEST(Budget, BreaksTiesByNodeNumber) {
-    const VertexTree tree = built(shapes::grid(6));
-    const std::vector<float> costs(tree.interior_count(), 2.0f);
-    const auto criterion = look_up(costs);
-    Cut cut(tree);
-    cut.adjust(criterion, tree.triangle_count() / 2);
-    // All cost the same, so the nodes are unfolded in the order of their numbers, up to the first that does not fit.
-    bool ended = false;
-    std::vector<bool> unfolded(tree.interior_count());
-    for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        unfolded[node] = true;
-        ended |= triangles_of(tree, support::with_needs(tree, unfolded)) > tree.triangle_count() / 2;
-        ASSERT_EQ(cut.is_wanted(node), !ended) << "node " << node;
-    }
-    EXPECT_TRUE(ended);
-}
-
 TEST(Budget, TakesZeroAndMoreThanThereIs) {
     const VertexTree tree = built(shapes::torus(10, 6));
     const std::vector<float> costs(tree.interior_count(), 3.0f);
@@ -568,25 +551,6 @@ TEST(Budget, LeavesFoldsThatCostNothing) {
     const auto criterion = look_up(costs);
     Cut cut(tree);
     EXPECT_EQ(cut.adjust(criterion, tree.triangle_count()).triangles, 0u);
-}
-
-TEST(Budget, OrdersUnboundedCostsAmongThemselves) {
-    const VertexTree tree = built(shapes::bumpy_sphere(1));
-    // All unbounded, ordered by the number of leaves.
-    std::vector<float> costs(tree.interior_count());
-    for (NodeId node = 0; node < tree.interior_count(); ++node)
-        costs[node] =
-            1e30f *
-            (1 + static_cast<float>(support::sound(tree).leaf_end()[node] - support::sound(tree).first_leaf()[node]));
-    const auto criterion = look_up(costs);
-    Cut cut(tree);
-    const AdjustStats stats = cut.adjust(criterion, tree.triangle_count() / 2);
-    EXPECT_TRUE(is_unbounded(stats.max_fold_cost));
-    float least_unfolded = std::numeric_limits<float>::infinity();
-    for (NodeId node = 0; node < tree.interior_count(); ++node)
-        if (cut.is_wanted(node)) least_unfolded = std::min(least_unfolded, costs[node]);
-    EXPECT_GE(least_unfolded, stats.max_fold_cost);
-    EXPECT_GT(cut.triangle_count(), 0u);
 }
 
 TEST(Adjust, AsksInBatchesOfLevels) {

@@ -436,20 +436,6 @@ TEST_P(Follow, PatchesTheIndexBufferThatACopyKeepsUpWith) {
     EXPECT_GT(patched, gathered_anew);
 }
 
-TEST(FollowStill, CostsNothingAndChangesNothing) {
-    const VertexTree tree = built(shapes::bumpy_sphere(4));
-    const DistanceCriterion criterion = rich_criterion(tree, 5, true);
-    Cut cut(tree);
-    const Viewpoint viewpoint{.eye = {3, 1, 2}, .gaze = glm::normalize(glm::dvec3(-3, -1, -2))};
-    ASSERT_TRUE(cut.follow(criterion, viewpoint));
-    for (int frame = 0; frame < 5; ++frame) {
-        const auto stats = require(cut.follow(criterion, viewpoint));
-        EXPECT_EQ(stats->node_tests, 0u);
-        EXPECT_EQ(stats->folds + stats->unfolds, 0u);
-        EXPECT_TRUE(cut.changes().empty());
-    }
-}
-
 // By distances alone, so that tests of planes would show: where a camera's frustum shows all of the model, they are
 // seldom.
 TEST(FollowFrustum, AddsHardlyATestWhereItShowsAllOfTheModel) {
@@ -489,66 +475,6 @@ TEST(FollowChanges, ReplayToTheSameCut) {
         for (const FoldChange& change : cut.changes())
             ASSERT_TRUE(change.folded ? replica.fold(change.node) : replica.unfold(change.node));
         ASSERT_EQ(state_of(cut), state_of(replica)) << "frame " << frame;
-    }
-}
-
-bool has_its_needs(const VertexTree& tree, std::uint32_t unfolded) {
-    std::vector<bool> bits(tree.interior_count());
-    for (NodeId node = 0; node < bits.size(); ++node) bits[node] = (unfolded >> node) & 1;
-    return support::with_needs(tree, bits) == bits;
-}
-
-// Every closed-upward set of nodes of a small tree, as bit patterns.
-std::vector<std::uint32_t> all_cuts(const VertexTree& tree) {
-    std::vector<std::uint32_t> cuts;
-    for (std::uint32_t bits = 0; bits < 1u << tree.interior_count(); ++bits) {
-        bool closed = true;
-        for (NodeId node = 1; node < tree.interior_count() && closed; ++node)
-            closed = !((bits >> node) & 1) || ((bits >> support::sound(tree).parents()[node]) & 1);
-        if (closed) cuts.push_back(bits);
-    }
-    return cuts;
-}
-
-TEST(FollowBudget, HasTheLeastLargestCostOfAllCuts) {
-    for (const unsigned seed : {1u, 2u, 3u, 4u}) {
-        const VertexTree tree = built(shapes::random_soup(12, 14, seed));
-        ASSERT_LE(tree.interior_count(), 16u);
-        const DistanceCriterion criterion = rich_criterion(tree, seed, false);
-        const Viewpoint viewpoint{.eye = {2, 1.5, 3}};
-        FoldTester tester(tree, criterion, false, 1, false);
-        tester.look_from(viewpoint, 1);
-        std::vector<NodeId> nodes(tree.interior_count());
-        for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
-        std::vector<float> own_cost(nodes.size()), seen_cost(nodes.size()), cost(nodes.size());
-        std::vector<std::uint64_t> unfolded((nodes.size() + 63) / 64);
-        tester.find_costs(nodes, {own_cost.data(), seen_cost.data(), unfolded.data()});
-        for (NodeId node = 0; node < nodes.size(); ++node)
-            cost[node] = node == 0 ? own_cost[0] : std::min(own_cost[node], cost[support::sound(tree).parents()[node]]);
-        const auto triangles_and_cost = [&](auto is_unfolded) {
-            Index triangles = 0;
-            float largest = 0;
-            for (NodeId node = 0; node < tree.interior_count(); ++node) {
-                if (is_unfolded(node))
-                    triangles +=
-                        support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
-                else largest = std::max(largest, cost[node]);
-            }
-            return std::pair(triangles, largest);
-        };
-        const std::vector<std::uint32_t> cuts = all_cuts(tree);
-        for (Index budget = 0; budget <= tree.triangle_count(); ++budget) {
-            Cut cut(tree);
-            ASSERT_TRUE(cut.follow(criterion, viewpoint, {.triangle_budget = budget}));
-            const auto [triangles, largest] = triangles_and_cost([&](NodeId node) { return cut.is_unfolded(node); });
-            EXPECT_LE(triangles, budget);
-            for (const std::uint32_t bits : cuts) {
-                const auto [others, others_largest] =
-                    triangles_and_cost([&](NodeId node) { return (bits >> node) & 1; });
-                if (others > budget || !has_its_needs(tree, bits)) continue;
-                ASSERT_LE(largest, others_largest) << "budget " << budget << ", seed " << seed;
-            }
-        }
     }
 }
 
