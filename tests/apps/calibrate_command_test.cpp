@@ -169,18 +169,6 @@ TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
     EXPECT_TRUE(run(with_json).json()["rms_error_db"].is_null());
 }
 
-// Settings that all agree make a place as certain as the grid is fine, and no more.
-TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
-    const Outcome outcome =
-        succeed({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings",
-                 "300", "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
-    EXPECT_LT(outcome.json()["rms_error_db"], 0.2);
-    const Json row = outcome.json()["measured"][0];
-    EXPECT_LT(row["low"], row["true_sensitivity"]);
-    EXPECT_GT(row["high"], row["true_sensitivity"]);
-    EXPECT_TRUE(fs::exists(path("X.JSON")));
-}
-
 TEST_F(CalibrateCommandTest, AdjustsToo) {
     const Outcome outcome =
         succeed({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});

@@ -13,7 +13,7 @@ class LevelCommandTest : public CommandTest {
 protected:
     void SetUp() override {
         CommandTest::SetUp();
-        succeed({"make", "scene", "treasure", "-o", "scene.glb", "--triangles", "30000"});
+        succeed({"make", "scene", "treasure", "-o", "scene.glb", "--triangles", "12000"});
         if (!no_opengl().empty()) GTEST_SKIP() << no_opengl();
     }
     Outcome render(Words more) const {
