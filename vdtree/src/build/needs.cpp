@@ -299,23 +299,29 @@ private:
         return triangles;
     }
 
+    TurnedTest::Positions positions_of(WedgeId u, WedgeId v, WedgeId w) const {
+        return {g_.positions[u], g_.positions[v], g_.positions[w]};
+    }
+    TurnedTest::Uvs uvs_of(WedgeId u, WedgeId v, WedgeId w) const {
+        return g_.uvs.empty() ? TurnedTest::Uvs{} : TurnedTest::Uvs{g_.uvs[u], g_.uvs[v], g_.uvs[w]};
+    }
+
     void look_at(Index t, Ways& ways, Found& found) const {
+        const auto& [u, v, w] = g_.triangles[t];
+        const TurnedTest test(positions_of(first_leaf_ + u, first_leaf_ + v, first_leaf_ + w),
+                              uvs_of(first_leaf_ + u, first_leaf_ + v, first_leaf_ + w));
+        if (test.uv_area() != 0) look_at<true>(t, test, ways, found);
+        else look_at<false>(t, test, ways, found);
+    }
+    template <bool is_mapped>
+    void look_at(Index t, const TurnedTest& test, Ways& ways, Found& found) const {
+        const Triangle& leaves = g_.triangles[t];
         const auto& [a, b, c] = ways.chains;
-        const auto positions_of = [&](WedgeId u, WedgeId v, WedgeId w) {
-            return TurnedTest::Positions{g_.positions[u], g_.positions[v], g_.positions[w]};
-        };
-        const auto uvs_of = [&](WedgeId u, WedgeId v, WedgeId w) {
-            return g_.uvs.empty() ? TurnedTest::Uvs{} : TurnedTest::Uvs{g_.uvs[u], g_.uvs[v], g_.uvs[w]};
-        };
-        std::array<WedgeId, 3> leaves;
-        for (std::size_t k = 0; k < 3; ++k) leaves[k] = first_leaf_ + g_.triangles[t][k];
-        const TurnedTest test(positions_of(leaves[0], leaves[1], leaves[2]), uvs_of(leaves[0], leaves[1], leaves[2]));
-        const bool is_mapped = test.uv_area() != 0;
-        const auto on_texture = [&](WedgeId w) { return glm::vec3(g_.uvs[w], 0); };
-        Front::Aim in_space(g_.positions[leaves[0]], test.normal());
-        Front::Aim in_texture(is_mapped ? on_texture(leaves[0]) : glm::vec3(0), {0, 0, test.uv_area()});
+        const auto on_texture = [&](WedgeId w) { return is_mapped ? glm::vec3(g_.uvs[w], 0) : glm::vec3(0); };
+        Front::Aim in_space(g_.positions[first_leaf_ + leaves[0]], test.normal());
+        Front::Aim in_texture(on_texture(first_leaf_ + leaves[0]), {0, 0, test.uv_area()});
         for (std::size_t k = 0; k < 3; ++k)
-            find_chain(g_.triangles[t][k], vanishes_at_[t], ways.chains[k], [&](std::size_t i, WedgeId w) {
+            find_chain(leaves[k], vanishes_at_[t], ways.chains[k], [&](std::size_t i, WedgeId w) {
                 ways.in_space.put(k, i, in_space(g_.positions[w]));
                 if (is_mapped) ways.in_texture.put(k, i, in_texture(on_texture(w)));
             });
@@ -338,7 +344,7 @@ private:
             ways.left -= count;
             ways.in_space.finish(ways.chains, in_space.farthest());
             if (is_mapped) ways.in_texture.finish(ways.chains, in_texture.farthest());
-            try_suspects(ways, is_mapped, try_way);
+            try_suspects<is_mapped>(ways, try_way);
             std::reverse(found.impossible.begin() + static_cast<std::ptrdiff_t>(before), found.impossible.end());
         } else {
             std::array<std::size_t, 3> at{};
@@ -352,8 +358,8 @@ private:
     }
 
     // From the largest nodes on: what these need covers most of what the others would.
-    template <class TryWay>
-    UNSEEN_INLINE static void try_suspects(const Ways& ways, bool is_mapped, TryWay&& try_way) {
+    template <bool is_mapped, class TryWay>
+    UNSEEN_INLINE static void try_suspects(const Ways& ways, TryWay&& try_way) {
         const auto& [a, b, c] = ways.chains;
         const auto from_last = [](std::size_t first, std::uint32_t suspects, std::size_t size, auto&& f) {
             for (; suspects; suspects ^= std::bit_floor(suspects))

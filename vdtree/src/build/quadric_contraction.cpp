@@ -740,19 +740,31 @@ private:
     // which a's other pairs are known. Which pairs go is as good as random: they are overwritten, for the processor is
     // not to guess.
     void renumber_pairs(Index clusters) {
+        const bool seams = has_seams();
         start_.assign(clusters + 1, 0);
         std::size_t inner = 0;
+        if (seams) {
+            origin_.resize(c_.pairs.size());
+            origin_of_partner_.resize(c_.pairs.size());
+            pair_now_.assign(c_.pairs.size(), none);
+            pair_with_.resize(clusters);
+        }
         for (std::size_t i = 0; i < c_.pairs.size(); ++i) {
             const Index number_a = new_number_[c_.pairs[i].a], number_b = new_number_[c_.pairs[i].b];
             const Index a = number_a & ~is_new, b = number_b & ~is_new;
             pair_errors_[inner] = (number_a | number_b) & is_new ? unknown_error : pair_errors_[i];
             c_.pairs[inner] = {std::min(a, b), std::max(a, b)};
+            if (seams) origin_[inner] = static_cast<Index>(i);
             inner += a != b;
             start_[std::min(a, b) + 1] += a != b;
         }
         std::partial_sum(start_.begin(), start_.end(), start_.begin());
         partners_.resize(inner);
-        for (std::size_t i = 0; i < inner; ++i) partners_[start_[c_.pairs[i].a]++] = {c_.pairs[i].b, pair_errors_[i]};
+        for (std::size_t i = 0; i < inner; ++i) {
+            const Index place = start_[c_.pairs[i].a]++;
+            partners_[place] = {c_.pairs[i].b, pair_errors_[i]};
+            if (seams) origin_of_partner_[place] = origin_[i];
+        }
         marks_.assign(clusters, none);
         std::size_t out = 0;
         for (Index a = 0; a < clusters; ++a) {
@@ -760,7 +772,12 @@ private:
                 const auto [b, error] = partners_[i];
                 c_.pairs[out] = {a, b};
                 pair_errors_[out] = error;
-                out += marks_[b] != a;
+                const bool is_first = marks_[b] != a;
+                if (seams) {
+                    if (is_first) pair_with_[b] = static_cast<Index>(out);
+                    pair_now_[origin_of_partner_[i]] = pair_with_[b];
+                }
+                out += is_first;
                 marks_[b] = a;
             }
         }
@@ -780,59 +797,40 @@ private:
             if (components[k] != no_component) components[k] = new_component(cluster_before, components[k]);
     }
 
-    // Links of all pairs that have become one go with it. Linear: the pairs from before are put in the order of their
-    // lower cluster now, and a mark says which pair leads to its partners.
+    // Links of all pairs that have become one go with it, each once.
     void renumber_links() {
-        first_before_.assign(live_.size() + 1, 0);
+        links_of_pairs_before_.swap(c_.links_of_pairs);
+        links_before_.swap(c_.links);
+        c_.links_of_pairs.assign(c_.pairs.size(), {});
         const auto for_each_before = [&](auto&& f) {
             for (Index i = 0; i < pairs_before_.size(); ++i) {
-                const Index x = new_number_[pairs_before_[i].a] & ~is_new,
-                            y = new_number_[pairs_before_[i].b] & ~is_new;
-                if (x != y && !(live_.is_simple(x) && live_.is_simple(y))) f(i, std::min(x, y));
+                const Index pair = pair_now_[i];
+                if (pair == none || are_simple(c_.pairs[pair])) continue;
+                const ClusterPair before = pairs_before_[i];
+                const bool were_simple = several_before_[before.a].count == 0 && several_before_[before.b].count == 0;
+                const LinkRange range = were_simple ? LinkRange{} : links_of_pairs_before_[i];
+                f(before, pair,
+                  were_simple ? std::span<const Link>(links_of_each_class_)
+                              : std::span<const Link>(links_before_).subspan(range.first, range.count));
             }
         };
-        for_each_before([&](Index, Index low) { ++first_before_[low + 1]; });
-        std::partial_sum(first_before_.begin(), first_before_.end(), first_before_.begin());
-        in_order_.resize(first_before_.back());
-        for_each_before(
-            [&](Index i, Index low) { in_order_[first_before_[low]++] = i; }); // moves each start to its end
-        found_links_.clear();
-        marks_.resize(live_.size());
-        for (std::size_t pair = 0, i = 0; pair < c_.pairs.size();) {
-            const Index low = c_.pairs[pair].a;
-            for (; pair < c_.pairs.size() && c_.pairs[pair].a == low; ++pair)
-                marks_[c_.pairs[pair].b] = static_cast<Index>(pair);
-            for (; i < first_before_[low]; ++i) find_links(in_order_[i], low);
-        }
-        sort_links();
-    }
-
-    // Of a pair from before the round whose lower cluster is `low` now; marks_ leads to the pairs.
-    void find_links(Index pair_before, Index low) {
-        const ClusterPair before = pairs_before_[pair_before];
-        const Index x = new_number_[before.a] & ~is_new, y = new_number_[before.b] & ~is_new;
-        const Index pair = marks_[x == low ? y : x];
-        const bool were_simple = several_before_[before.a].count == 0 && several_before_[before.b].count == 0;
-        for (const Link& link : were_simple ? std::span<const Link>(links_of_each_class_) : links_of(pair_before)) {
-            const Index a = new_component(before.a, link.a), b = new_component(before.b, link.b);
-            found_links_.push_back({pair, x == low ? Link{a, b} : Link{b, a}});
-        }
-    }
-
-    // From found_links_ to links by pair, each once.
-    void sort_links() {
-        c_.links_of_pairs.assign(c_.pairs.size(), {});
-        for (const FoundLink& found : found_links_) ++c_.links_of_pairs[found.pair].count;
+        for_each_before([&](ClusterPair, Index pair, std::span<const Link> links) {
+            c_.links_of_pairs[pair].count += static_cast<Index>(links.size());
+        });
         Index first = 0;
         for (LinkRange& range : c_.links_of_pairs) {
             range.first = first;
             first += std::exchange(range.count, 0);
         }
         c_.links.resize(first);
-        for (const FoundLink& found : found_links_) {
-            LinkRange& range = c_.links_of_pairs[found.pair];
-            c_.links[range.first + range.count++] = found.link;
-        }
+        for_each_before([&](ClusterPair before, Index pair, std::span<const Link> links) {
+            LinkRange& range = c_.links_of_pairs[pair];
+            const bool turns = (new_number_[before.a] & ~is_new) != c_.pairs[pair].a;
+            for (const Link& link : links) {
+                const Index a = new_component(before.a, link.a), b = new_component(before.b, link.b);
+                c_.links[range.first + range.count++] = turns ? Link{b, a} : Link{a, b};
+            }
+        });
         for (std::size_t i = 0; i < c_.pairs.size(); ++i) {
             if (pair_errors_[i] >= 0) continue; // its clusters are as before, and so are its links
             LinkRange& range = c_.links_of_pairs[i];
@@ -854,13 +852,14 @@ private:
             LiveClusters::Several& several = live_.several[s];
             if (several.count == 0) continue;
             const auto now = std::span(live_.components).subspan(several.first, several.count);
-            if (all || has_to_close(several)) choose_components(s);
-            else chosen_.assign(now.begin(), now.end());
-            if (chosen_.size() == classes_.count) {
+            const bool is_chosen = all || has_to_close(several);
+            if (is_chosen) choose_components(s);
+            if (is_chosen && chosen_.size() == classes_.count) {
                 make_simple(s, chosen_);
             } else {
-                several = {static_cast<Index>(list.size()), static_cast<Index>(chosen_.size())};
-                list.insert(list.end(), chosen_.begin(), chosen_.end());
+                const std::span<const ClassComponent> kept = is_chosen ? std::span(chosen_) : now;
+                several = {static_cast<Index>(list.size()), static_cast<Index>(kept.size())};
+                list.insert(list.end(), kept.begin(), kept.end());
             }
         }
         live_.components.swap(list);
@@ -979,15 +978,13 @@ private:
 
     // What a round does to components. A cluster's components get the numbers that lie in numbers_ from numbers_of_ of
     // it on; none: they keep theirs.
-    struct FoundLink {
-        Index pair;
-        Link link;
-    };
-    std::vector<Link> links_of_each_class_;
+    std::vector<Link> links_of_each_class_, links_before_;
+    std::vector<LinkRange> links_of_pairs_before_;
     std::vector<LiveClusters::Several> several_before_;
     std::vector<ClusterPair> pairs_before_;
-    std::vector<Index> numbers_of_, numbers_, first_before_, in_order_, order_of_components_;
-    std::vector<FoundLink> found_links_;
+    std::vector<Index> pair_now_;                               // by pair before the round; none: its clusters are one
+    std::vector<Index> origin_, origin_of_partner_, pair_with_; // see renumber_pairs()
+    std::vector<Index> numbers_of_, numbers_, order_of_components_;
     std::vector<std::uint8_t> linked_; // by component
     std::vector<ClassComponent> chosen_, tidy_;
 };
