@@ -43,9 +43,26 @@ void ComponentMerger::add(const View& from, const Offset<float>& to, Index numbe
     }
     const std::size_t channels = classes_.channels[from.attribute_class];
     ClassComponent& onto = components_[numbers_[number] = numbers_[root]];
-    std::array<float, most_class_channels> raised{};
-    for (std::size_t c = 0; c < channels; ++c) raised[c] = from.references[c] - onto.references[c];
-    add_block(onto.block.data(), from.block, to, raised.data(), channels, onto.block.data(), base_.data());
+    // As add_block(), with a row, and what is beside it in the base, in a register.
+    const Float4 offset{to.x, to.y, to.z};
+    const float weight = from.block[channels * quadric::row_size];
+    Float4 linear;
+    std::memcpy(&linear, base_.data() + quadric::hx, sizeof(linear));
+    for (std::size_t c = 0; c < channels; ++c) {
+        const float step = from.references[c] - onto.references[c];
+        Float4 row, sum;
+        std::memcpy(&row, from.block + c * quadric::row_size, sizeof(row));
+        std::memcpy(&sum, onto.block.data() + c * quadric::row_size, sizeof(sum));
+        const Float4 along = row * offset;
+        const float moved = row[quadric::d] - (along[quadric::gx] + along[quadric::gy] + along[quadric::gz]);
+        row[quadric::d] = 2 * moved + step * weight;
+        linear += step * row;
+        row[quadric::d] = moved + step * weight;
+        sum += row;
+        std::memcpy(onto.block.data() + c * quadric::row_size, &sum, sizeof(sum));
+    }
+    std::memcpy(base_.data() + quadric::hx, &linear, sizeof(linear));
+    onto.block[channels * quadric::row_size] += weight;
 }
 
 void ComponentMerger::copy(const View& from, const Offset<float>& to) {
@@ -53,13 +70,15 @@ void ComponentMerger::copy(const View& from, const Offset<float>& to) {
     if (count_ == components_.size()) components_.emplace_back();
     ClassComponent& made = components_[count_++];
     made.attribute_class = from.attribute_class;
+    // A row is a register.
+    const Float4 offset{to.x, to.y, to.z};
     for (std::size_t c = 0; c < channels; ++c) {
         made.references[c] = from.references[c];
-        const float* row = from.block + c * quadric::row_size;
-        float* moved = made.block.data() + c * quadric::row_size;
-        for (std::size_t i = quadric::gx; i <= quadric::gz; ++i) moved[i] = row[i];
-        moved[quadric::d] =
-            row[quadric::d] - (row[quadric::gx] * to.x + row[quadric::gy] * to.y + row[quadric::gz] * to.z);
+        Float4 row;
+        std::memcpy(&row, from.block + c * quadric::row_size, sizeof(row));
+        const Float4 along = row * offset;
+        row[quadric::d] -= along[quadric::gx] + along[quadric::gy] + along[quadric::gz];
+        std::memcpy(made.block.data() + c * quadric::row_size, &row, sizeof(row));
     }
     made.block[channels * quadric::row_size] = from.block[channels * quadric::row_size];
 }
