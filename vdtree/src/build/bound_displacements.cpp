@@ -106,7 +106,8 @@ private:
         constexpr double most_cosine = -0.5;      // of the angle between edges that go on, 120 degrees or more
         constexpr std::size_t most_compared = 64; // irregular edges of one place
         const auto ring = in_.rings.around(place);
-        auto& [preceding, following, ends, ways] = tip;
+        std::vector<Index>&preceding = tip.preceding, &following = tip.following, &ends = tip.ends;
+        std::vector<glm::dvec3>& ways = tip.ways;
         preceding.clear(), following.clear(), ends.clear(), ways.clear();
         for (std::size_t i = 0; i < ring.size(); i += 2) preceding.push_back(ring[i]), following.push_back(ring[i + 1]);
         std::ranges::sort(preceding);

@@ -316,7 +316,7 @@ private:
     template <bool is_mapped>
     void look_at(Index t, const TurnedTest& test, Ways& ways, Found& found) const {
         const Triangle& leaves = g_.triangles[t];
-        const auto& [a, b, c] = ways.chains;
+        const Chain &a = ways.chains[0], &b = ways.chains[1], &c = ways.chains[2];
         const auto on_texture = [&](WedgeId w) { return is_mapped ? glm::vec3(g_.uvs[w], 0) : glm::vec3(0); };
         Front::Aim in_space(g_.positions[first_leaf_ + leaves[0]], test.normal());
         Front::Aim in_texture(on_texture(first_leaf_ + leaves[0]), {0, 0, test.uv_area()});
@@ -360,7 +360,7 @@ private:
     // From the largest nodes on: what these need covers most of what the others would.
     template <bool is_mapped, class TryWay>
     UNSEEN_INLINE static void try_suspects(const Ways& ways, TryWay&& try_way) {
-        const auto& [a, b, c] = ways.chains;
+        const Chain &a = ways.chains[0], &b = ways.chains[1], &c = ways.chains[2];
         const auto from_last = [](std::size_t first, std::uint32_t suspects, std::size_t size, auto&& f) {
             for (; suspects; suspects ^= std::bit_floor(suspects))
                 if (const std::size_t at = first + static_cast<std::size_t>(std::bit_width(suspects)) - 1; at < size)
@@ -373,10 +373,10 @@ private:
                 from_last(j_end * Front::lanes, sides, b.size, [&](std::size_t j) {
                     for (std::size_t k_end = (c.size + Front::lanes - 1) / Front::lanes; k_end-- > 0;) {
                         const std::size_t first = k_end * Front::lanes;
-                        auto [suspects, turned] = ways.in_space.suspects(i, j, first);
-                        if (is_mapped) suspects |= ways.in_texture.suspects(i, j, first).all;
-                        from_last(first, suspects, c.size,
-                                  [&](std::size_t k) { try_way(i, j, k, (turned >> (k - first) & 1) != 0); });
+                        Front::Suspects found = ways.in_space.suspects(i, j, first);
+                        if (is_mapped) found.all |= ways.in_texture.suspects(i, j, first).all;
+                        from_last(first, found.all, c.size,
+                                  [&](std::size_t k) { try_way(i, j, k, (found.turned >> (k - first) & 1) != 0); });
                     }
                 });
             }
