@@ -175,21 +175,6 @@ TEST(GreedySelection, LowersWhatCostsLeastForATriangle) {
     }
 }
 
-// Of what is counted anew only when it comes first.
-TEST(GreedySelection, IsHardlyWorseThanThePlainOne) {
-    double ours = 0, plain = 0;
-    for (unsigned seed = 1; seed <= 12; ++seed) {
-        const LayeredPicture picture = discs(14, 5, seed);
-        const std::uint64_t budget = triangles_of(picture, at_level(picture, 0)) / 4;
-        const auto found = select_greedily(picture, SelectionQuality::ssim, {}, budget);
-        ASSERT_TRUE(found);
-        const auto loss = PictureLoss::create(SelectionQuality::ssim, picture.width, picture.height,
-                                              put_together(picture, at_level(picture, 0)));
-        ours += found->loss, plain += loss_of(*loss, put_together(picture, plain_greedy(picture, budget)));
-    }
-    EXPECT_LT(ours, 1.02 * plain);
-}
-
 // By trying all levels.
 double least_loss(const LayeredPicture& picture, std::uint64_t budget) {
     const auto loss = PictureLoss::create(SelectionQuality::ssim, picture.width, picture.height,

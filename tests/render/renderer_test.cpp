@@ -142,40 +142,6 @@ TEST_F(RendererTest, CoversPixelsByTheirShareOfARectangle) {
         }
 }
 
-TEST_F(RendererTest, CoversATrianglesArea) {
-    const int n = 64;
-    const Scene scene(triangle({-0.83, -0.71, 0}, {0.77, -0.52, 0}, {-0.11, 0.86, 0}, 1, 1, 1));
-    DrawOptions options;
-    options.background = 0;
-    const Frame frame = draw(scene, frontal_view(n, n), options);
-    double covered = 0;
-    int partly = 0;
-    for (float value : frame.luminance) {
-        EXPECT_TRUE(value >= 0 && value <= 1 + value_tolerance);
-        covered += value;
-        partly += value > 0.01 && value < 0.99;
-    }
-    const double area = 0.5 * ((0.77 + 0.83) * (0.86 + 0.71) - (-0.11 + 0.83) * (-0.52 + 0.71)) * n * n / 4;
-    EXPECT_GT(partly, n) << "edges are antialiased";
-    EXPECT_NEAR(covered, area, sample_share * partly) << "within a sample at each edge pixel";
-    EXPECT_NEAR(covered, area, 0.005 * area) << "and the errors cancel out";
-}
-
-TEST_F(RendererTest, InterpolatesLuminanceLinearlyOverAFrontalTriangle) {
-    const int n = 64;
-    const auto truth = [](double x, double y) { return 0.1 + 0.05 * (x + 3) + 0.07 * (y + 3); };
-    const auto corner = [&](double x, double y) { return static_cast<float>(truth(x, y)); };
-    const Scene scene(triangle({-3, -3, 0}, {5, -3, 0}, {-3, 5, 0}, corner(-3, -3), corner(5, -3), corner(-3, 5)));
-    DrawOptions options;
-    options.samples = 1; // at the pixels' centres
-    const Frame frame = draw(scene, frontal_view(n, n), options);
-    for (int row = 0; row < n; ++row)
-        for (int column = 0; column < n; ++column)
-            EXPECT_NEAR(at(frame, column, row), truth(-1 + (2 * column + 1.0) / n, 1 - (2 * row + 1.0) / n),
-                        value_tolerance)
-                << column << ", " << row;
-}
-
 TEST_F(RendererTest, InterpolatesLuminanceInSpaceNotOnTheScreen) {
     // A floor that runs from the viewer to the distance: y = -1, z from 2 (behind the eye) to -20.
     const auto truth = [](double z) { return 0.9 + 0.04 * (z - 2); };
@@ -404,19 +370,6 @@ TEST_F(RendererTest, ShadesFlatWithTheMeanOfTheCorners) {
     EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.4f, stored_tolerance)));
 }
 
-TEST_F(RendererTest, ShadesColoursSoThatTheirLuminanceIsTheVertexs) {
-    Mesh mesh = bumpy_sphere(30);
-    for (std::size_t i = 0; i < mesh.colours.size(); ++i)
-        mesh.colours[i] = glm::vec4(0.9, 0.1 + 0.01 * static_cast<double>(i % 50), 0.2, 1);
-    View view = frontal_view(64, 64);
-    view.eye = {0, 0, 3};
-    const Frame frame = draw(Scene(mesh), view);
-    for (int i = 0; i < 64 * 64; ++i) {
-        const glm::vec3 c = colour_at(frame, i % 64, i / 64);
-        EXPECT_NEAR(at(frame, i % 64, i / 64), 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b, 1e-5);
-    }
-}
-
 // A ball, white on one side and red on the other, seen from where the light is and from behind.
 TEST_F(RendererTest, DrawsColoursTimesTheLight) {
     const unseen::vdtree::Light light;
@@ -540,27 +493,6 @@ TEST_F(RendererTest, DrawsACutWithoutTriangles) {
     options.wireframe = true;
     const Frame frame = draw(scene.tree, folded, frontal_view(8, 8), options);
     EXPECT_THAT(frame.luminance, ::testing::Each(options.background));
-}
-
-TEST_F(RendererTest, FollowsTheCutAsItChanges) {
-    Scene scene(bumpy_sphere(30));
-    View view = frontal_view(48, 48);
-    view.eye = {0, 0, 2.5};
-    auto renderer = require(Renderer::create(context(), scene.tree));
-    const auto full = require(renderer->draw(scene.cut, view));
-    scene.cut.fold_all();
-    for (int level = 0; level < 3; ++level) {
-        std::vector<unseen::vdtree::NodeId> folded;
-        for (unseen::vdtree::NodeId node = 0; node < scene.tree.interior_count(); ++node)
-            if (!scene.cut.is_unfolded(node) && scene.cut.is_active(node)) folded.push_back(node);
-        for (unseen::vdtree::NodeId node : folded) scene.cut.unfold(node);
-    }
-    ASSERT_GT(scene.cut.triangle_count(), 0u);
-    const auto coarse = require(renderer->draw(scene.cut, view));
-    EXPECT_GT(difference(*full, *coarse).mean, 1e-3);
-    EXPECT_EQ(coarse->luminance, draw(scene, view).luminance) << "as if drawn by a new renderer";
-    scene.cut.unfold_all();
-    EXPECT_EQ(require(renderer->draw(scene.cut, view))->luminance, full->luminance);
 }
 
 // Where a picture of faces of one luminance each is the same for five pixels all around, another one must be so, too:

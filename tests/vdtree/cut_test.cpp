@@ -530,21 +530,6 @@ TEST(Budget, GivesTheLeastLargestCostOfAllCuts) {
     EXPECT_GT(compared, 100);
 }
 
-TEST(Budget, TakesZeroAndMoreThanThereIs) {
-    const VertexTree tree = built(shapes::torus(10, 6));
-    const std::vector<float> costs(tree.interior_count(), 3.0f);
-    const auto criterion = look_up(costs);
-    Cut cut(tree);
-    cut.unfold_all();
-    EXPECT_EQ(cut.adjust(criterion, 0).triangles, 0u);
-    EXPECT_EQ(fault_in_cut(cut), "");
-    for (const Index budget : {tree.triangle_count(), tree.triangle_count() + 1, std::numeric_limits<Index>::max()}) {
-        const AdjustStats stats = cut.adjust(criterion, budget);
-        EXPECT_EQ(stats.triangles, tree.triangle_count());
-        EXPECT_EQ(stats.max_fold_cost, 0);
-    }
-}
-
 TEST(Budget, LeavesFoldsThatCostNothing) {
     const VertexTree tree = built(shapes::torus(10, 6));
     const std::vector<float> costs(tree.interior_count(), 0.0f);
@@ -566,27 +551,6 @@ TEST(Adjust, AsksInBatchesOfLevels) {
     cut.adjust(criterion);
     EXPECT_GT(largest, 100u); // many nodes a call
     EXPECT_LT(calls, tree.interior_count() / 4);
-}
-
-TEST(Cuts, ShareOneTreeBetweenThreads) {
-    const VertexTree tree = built(shapes::bumpy_sphere(3));
-    std::vector<State> states(4);
-    const auto work = [&](std::size_t thread) {
-        std::mt19937_64 random(100 + thread % 2);
-        Cut cut(tree);
-        for (int round = 0; round < 20; ++round) {
-            const std::vector<float> costs = random_costs(tree, random);
-            const auto criterion = look_up(costs);
-            cut.adjust(criterion, round % 2 ? std::optional<Index>(500) : std::nullopt);
-            states[thread] = state_of(cut);
-        }
-    };
-    {
-        std::vector<std::jthread> threads;
-        for (std::size_t thread = 0; thread < states.size(); ++thread) threads.emplace_back(work, thread);
-    }
-    EXPECT_EQ(states[0], states[2]); // the same random numbers
-    EXPECT_EQ(states[1], states[3]);
 }
 
 constexpr float packed_normal_error = 6.6e-5f; // length; see <unseen/vdtree/vertex_tree.h>
