@@ -181,6 +181,15 @@ TEST(FoldOracle, SeesNothingOfTheBunny) {
     EXPECT_EQ(seen_by_castle(measured_file(file), {.count = 3}, triangles), 0u);
 }
 
+// Slivers are narrower than the cells of the pictures that measure them, and at a blunt tip thousands meet.
+TEST(FoldOracle, SeesNothingOfSlivers) {
+    for (const double tip : {0.001, 1.0}) {
+        const VertexTree tree = measured(shapes::turned(2000, {{1, 0}, {tip, 10}}, true));
+        std::uint64_t triangles = 0;
+        EXPECT_EQ(seen_by_castle(tree, {.count = 3}, triangles), 0u) << tip;
+    }
+}
+
 TEST(FoldOracle, SeesNothingOfFurtherMeshes) {
     const support::TempFolder scratch;
     int looked_at = 0;

@@ -388,4 +388,31 @@ inline std::vector<Named> all() {
     };
 }
 
+// Rings of so many vertices, each of a radius and a height, with quads between; closed by hubs where asked.
+inline Mesh turned(int around, std::initializer_list<glm::dvec2> rings, bool has_hubs) {
+    Mesh mesh;
+    const auto n = static_cast<Index>(around);
+    for (const glm::dvec2& ring : rings)
+        for (Index i = 0; i < n; ++i) {
+            const double angle = 2 * std::numbers::pi * i / around;
+            mesh.positions.push_back({ring.x * std::cos(angle), ring.x * std::sin(angle), ring.y});
+        }
+    const auto last = static_cast<Index>(rings.size() - 1) * n, low = last + n, high = low + 1;
+    for (Index from = 0; from < last; from += n)
+        for (Index i = 0; i < n; ++i) {
+            const Index j = (i + 1) % n;
+            mesh.triangles.push_back({from + i, from + j, from + n + j});
+            mesh.triangles.push_back({from + i, from + n + j, from + n + i});
+        }
+    if (!has_hubs) return mesh;
+    mesh.positions.push_back({0, 0, rings.begin()->y});
+    mesh.positions.push_back({0, 0, std::prev(rings.end())->y});
+    for (Index i = 0; i < n; ++i) {
+        const Index j = (i + 1) % n;
+        mesh.triangles.push_back({low, j, i});
+        mesh.triangles.push_back({high, last + i, last + j});
+    }
+    return mesh;
+}
+
 } // namespace unseen::shapes

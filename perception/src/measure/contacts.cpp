@@ -1,9 +1,12 @@
 #include "measure/contacts.h"
 
 #include <cmath>
+#include <numeric>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <unseen/vdtree/internal/fold_sequence.h>
 #include <unseen/vdtree/internal/parallel.h>
@@ -16,14 +19,17 @@ namespace {
 
 using Corners = std::array<glm::vec3, 3>;
 
-constexpr float near_share =
-    0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
+// Of a triangle's size: no triangles of a smooth surface come so near but neighbours.
+constexpr float near_share = 0.25f;
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
-constexpr Index at_once = 16;                // triangles looked at together,
-constexpr std::size_t most_candidates = 512; // unless so many are near any of them
-constexpr std::size_t most_listed = 100;     // triangles around a triangle's corners; amid more, pairs are looked at
-constexpr std::size_t most_looks = 16000;    // at triangles around corners, for one triangle; amid more, it touches one
+// Triangles looked at together. Amid more than so many, halves of them are, if they are apart by a share of what they
+// look around, or around several hubs; else they look less far by this factor, again and again, down to this share.
+constexpr Index at_once = 16;
+constexpr std::size_t most_candidates = 1024;
+constexpr float apart_share = 0.25f, less_far = 0.25f, least_far = 1e-6f;
+constexpr std::size_t most_listed = 100;  // triangles around a triangle's corners; amid more, pairs are looked at
+constexpr std::size_t most_looks = 16000; // at triangles around corners, for one triangle; amid more, it touches one
 constexpr std::size_t most_boxes =
     std::size_t{1} << 32; // for all triangles together, in trees so flat that nodes have very many: some seconds
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -78,9 +84,10 @@ glm::vec3 way_between(const Corners& a, const Corners& b) {
     return least;
 }
 
+constexpr float along = 0.5f; // the cosine between way and normal, at most
+
 // Whether the one lies beside the other in one sheet, not over it: the way between them runs along both.
 bool is_beside(const Corners& a, const Corners& b, const glm::vec3& way) {
-    constexpr float along = 0.5f; // the cosine between way and normal, at most
     const auto runs_along = [&](const Corners& t) {
         const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
         return std::abs(glm::dot(n, way)) <= along * glm::length(n) * glm::length(way);
@@ -138,13 +145,87 @@ struct Box {
     }
 };
 
+// A box along the longest side of the first triangle in it: slivers are far from filling a box along the axes.
+class TurnedBox {
+public:
+    void include(const Corners& c, float near = 0) {
+        if (is_empty_) turn_to(c);
+        is_empty_ = false;
+        box_.include(seen_along_axes(c).wider(near));
+    }
+    void include(const TurnedBox& other) {
+        if (other.is_empty_) return;
+        if (is_empty_) *this = other;
+        else box_.include(other.seen_along(axes_));
+    }
+    glm::vec3 extent() const { return box_.hi - box_.lo; }
+    glm::vec3 extent(const Corners& c) const {
+        const Box own = seen_along_axes(c);
+        return own.hi - own.lo;
+    }
+    bool meets(const Corners& c) const { return box_.meets(seen_along_axes(c)); }
+    // Whether a triangle is beside the only one in here, included with `near`, whichever way between them is taken.
+    bool is_surely_beside(const Corners& own, const Corners& c, float near) const {
+        constexpr float surely = 0.9f; // for rounding
+        const Box other = seen_along_axes(c);
+        const glm::vec3 gaps = glm::max(other.lo - box_.hi, box_.lo - other.hi) + near;
+        const float way = surely * along * std::max({gaps.x, gaps.y, gaps.z});
+        const float height = std::max(box_.hi.z - other.lo.z, other.hi.z - box_.lo.z) - near;
+        if (!is_in_plane_ || !(height <= way)) return false;
+        const glm::vec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const float most = way * glm::length(n);
+        return std::ranges::all_of(own, [&](const glm::vec3& p) { return std::abs(glm::dot(n, p - c[0])) <= most; });
+    }
+    bool meets(const TurnedBox& other) const { return !other.is_empty_ && box_.meets(other.seen_along(axes_)); }
+
+private:
+    Box seen_along_axes(const Corners& c) const {
+        Box box;
+        for (const glm::vec3& p : c) box.include(p * axes_);
+        return box;
+    }
+    Box seen_along(const glm::mat3& axes) const {
+        const glm::mat3 between = glm::transpose(axes) * axes_;
+        const glm::vec3 centre = between * ((box_.lo + box_.hi) / 2.0f), half = (box_.hi - box_.lo) / 2.0f;
+        const glm::vec3 reach =
+            glm::abs(between[0]) * half.x + glm::abs(between[1]) * half.y + glm::abs(between[2]) * half.z;
+        return {centre - reach, centre + reach};
+    }
+    void turn_to(const Corners& c) {
+        glm::vec3 side = c[1] - c[0], other = c[2] - c[0];
+        if (glm::length(other) > glm::length(side)) std::swap(side, other);
+        if (glm::length(c[2] - c[1]) > glm::length(side)) side = c[2] - c[1];
+        const float size = glm::length(side);
+        const glm::vec3 normal = glm::cross(side / size, other / size);
+        constexpr float least_height = 1e-7f; // of a triangle, over its size: below, floats know no direction
+        if (!(glm::length(normal) > least_height)) return;
+        axes_ = {side / size, glm::normalize(glm::cross(normal, side / size)), glm::normalize(normal)};
+        is_in_plane_ = true;
+    }
+
+    Box box_; // along the axes
+    glm::mat3 axes_ = glm::mat3(1);
+    bool is_empty_ = true, is_in_plane_ = false; // of the first triangle
+};
+
+// What is nearer to triangles than a distance.
+struct Vicinity {
+    Box box;
+    TurnedBox turned;
+
+    void include(const Corners& c, float near) {
+        for (const glm::vec3& p : c) box.include(Box{p - near, p + near});
+        turned.include(c, near);
+    }
+};
+
 // Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
 class ContactFinder {
 public:
     explicit ContactFinder(std::span<const SoundTree> trees)
         : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
-          boxes_(interior_), mesh_(tree_),
+          boxes_(interior_), turned_boxes_(interior_), mesh_(tree_),
           boxes_a_triangle_(std::max(most_looks, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         is_textured_ = !trees.front().texture().empty();
         for (const SoundTree& tree : trees) {
@@ -156,8 +237,10 @@ public:
             positions_[place] = tree_.position(interior_ + place) * scale_;
         for (NodeId node = interior_; node-- > 0;) {
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t)
-                boxes_[node].include(box_of(corners(t)));
-            if (node > 0) boxes_[tree_.parents()[node]].include(boxes_[node]);
+                boxes_[node].include(box_of(corners(t))), turned_boxes_[node].include(corners(t));
+            if (node == 0) break;
+            boxes_[tree_.parents()[node]].include(boxes_[node]);
+            turned_boxes_[tree_.parents()[node]].include(turned_boxes_[node]);
         }
         find_hubs();
     }
@@ -230,26 +313,31 @@ private:
             if (is_hub(corner)) first = std::min(first, corner);
         return first;
     }
+    bool has_hub(Index triangle, Index hub) const {
+        return hub == Parts::no_hub ? hub_of(triangle) == hub : has_corner(triangle, hub);
+    }
     Index hub_of(Index triangle) const { return parts_.empty() ? Parts::no_hub : first_hub(triangle); }
-    // Whether triangles at a node or below it, except for those around the hub, may meet a box.
-    bool may_meet(const Box& box, NodeId node, Index hub) const {
-        if (!box.meets(boxes_[node])) return false;
+    // Whether triangles at a node or below it, except for those around the hub, may be near.
+    bool may_meet(const Vicinity& around, NodeId node, Index hub) const {
+        if (!around.box.meets(boxes_[node]) || !around.turned.meets(turned_boxes_[node])) return false;
         if (hub == Parts::no_hub) return true;
         const Parts& parts = parts_[node];
-        return box.meets(parts.without) || (parts.hub != hub && box.meets(parts.with));
+        return around.box.meets(parts.without) || (parts.hub != hub && around.box.meets(parts.with));
     }
 
     std::vector<Contact> by_triangle(MeasuringProgress& progress) const {
-        std::vector<Contact> contacts(triangles_.size());
-        parallel_loop_over(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
-                           [&](const auto& part) {
-                               Scratch scratch;
-                               for (Index t = part.begin(); t < part.end() && !progress.is_cancelled(); t += at_once) {
-                                   const Index end = std::min(t + at_once, part.end());
-                                   find(t, end, contacts, scratch);
-                                   progress.add(end - t);
-                               }
-                           });
+        const auto count = static_cast<Index>(triangles_.size());
+        std::vector<Contact> contacts(count);
+        parallel_loop_over(tbb::blocked_range<Index>(0, (count + at_once - 1) / at_once, 64), [&](const auto& part) {
+            Scratch scratch;
+            for (Index i = part.begin(); i < part.end() && !progress.is_cancelled(); ++i) {
+                std::array<Index, at_once> triangles;
+                std::iota(triangles.begin(), triangles.end(), i * at_once);
+                const std::span group(triangles.data(), std::min(at_once, count - i * at_once));
+                find(group, 1, contacts, scratch);
+                progress.add(static_cast<double>(group.size()));
+            }
+        });
         return contacts;
     }
 
@@ -389,33 +477,48 @@ private:
                std::max({glm::length(c[0] - centre), glm::length(c[1] - centre), glm::length(c[2] - centre)});
     }
 
-    // Consecutive triangles are near each other, but for some: then one walk down the tree serves all of them.
-    void find(Index begin, Index end, std::span<Contact> contacts, Scratch& scratch) const {
-        Box around;
+    // Consecutive triangles are near each other, but for some: one walk down the tree serves all of them. Amid so many
+    // triangles that only a share of what is near is looked at, others may touch them just beyond.
+    void find(std::span<Index> group, float share, std::span<Contact> contacts, Scratch& scratch) const {
+        Vicinity around;
         Looks looks;
-        Index hub = hub_of(begin);
-        for (Index t = begin; t < end; ++t) {
-            if (hub != Parts::no_hub && !has_corner(t, hub)) hub = Parts::no_hub;
+        const Index hub = hub_of(group.front());
+        glm::vec3 widest(0);
+        for (const Index t : group) {
             const Corners own = corners(t);
-            if (const float near = nearness(own); near > 0) around.include(box_of(own).wider(near)), include(t, looks);
-        }
-        const bool is_for_all = look_around(around, looks, hub, most_candidates, scratch);
-        for (Index t = begin; t < end; ++t) {
-            const Corners own = corners(t);
-            const float near = nearness(own);
+            const float near = share * nearness(own);
             if (!(near > 0)) continue;
-            const Box own_around = box_of(own).wider(near);
-            Looks own_looks;
-            if (!is_for_all) include(t, own_looks);
-            const bool is_sparse =
-                is_for_all || look_around(own_around, own_looks, hub_of(t), triangles_.size(), scratch);
-            contacts[t] = is_sparse ? find(t, near, own_around, scratch) : Contact{0, 0};
+            around.include(own, near), include(t, looks);
+            widest = glm::max(widest, around.turned.extent(own) + 2 * near);
+        }
+        const auto others = std::stable_partition(group.begin(), group.end(), [&](Index t) { return has_hub(t, hub); });
+        const auto same_hub = static_cast<std::size_t>(others - group.begin());
+        const bool is_one = same_hub == group.size(), is_nearest = share <= least_far;
+        if (look_around(around, looks, is_one ? hub : Parts::no_hub, scratch)) {
+            for (const Index t : group) {
+                const float near = share * nearness(corners(t));
+                if (!(near > 0)) continue;
+                contacts[t] = find(t, near, scratch);
+                if (share < 1) contacts[t].include({near, 0});
+            }
+            return;
+        }
+        const bool are_apart =
+            !is_one || is_nearest || glm::any(glm::greaterThan(around.turned.extent(), (1 + apart_share) * widest));
+        if (group.size() > 1 && are_apart) {
+            const std::size_t first = is_one ? group.size() / 2 : same_hub;
+            for (const auto part : {group.first(first), group.subspan(first)})
+                find(part, is_nearest ? less_far : share, contacts, scratch);
+        } else if (!is_nearest) {
+            find(group, less_far * share, contacts, scratch);
+        } else {
+            contacts[group.front()] = {0, 0};
         }
     }
 
     // Makes candidates of the triangles whose boxes meet one, but for those around a hub, and whole subtrees of those
     // that are alike. False amid too many.
-    bool look_around(const Box& around, const Looks& looks, Index hub, std::size_t most, Scratch& scratch) const {
+    bool look_around(const Vicinity& around, const Looks& looks, Index hub, Scratch& scratch) const {
         scratch.candidates.clear();
         int nodes = 0;
         std::size_t boxes = 0;
@@ -427,9 +530,10 @@ private:
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) {
                 if (++boxes > boxes_a_triangle_) return false;
                 if (hub != Parts::no_hub && has_corner(t, hub)) continue;
-                if (const Box box = box_of(corners(t)); around.meets(box)) scratch.candidates.push_back({box, t});
+                if (const Box box = box_of(corners(t)); around.box.meets(box) && around.turned.meets(corners(t)))
+                    scratch.candidates.push_back({box, t});
             }
-            if (scratch.candidates.size() > most) return false;
+            if (scratch.candidates.size() > most_candidates) return false;
             tree_.for_each_child(node, [&](NodeId child) {
                 if (child < interior_ && may_meet(around, child, hub) && !are_all_alike(looks, child))
                     scratch.waiting.push_back(child);
@@ -439,8 +543,10 @@ private:
     }
 
     // Among the candidates.
-    Contact find(Index triangle, float near, const Box& around, Scratch& scratch) const {
+    Contact find(Index triangle, float near, Scratch& scratch) const {
         const Corners own = corners(triangle);
+        Vicinity around;
+        around.include(own, near);
         Neighbours& neighbours = scratch.neighbours;
         find_neighbours(mesh_.corners(triangle), neighbours);
         std::size_t looked_at = 0;
@@ -450,10 +556,11 @@ private:
         };
         Contact contact;
         for (const auto& [box, other] : scratch.candidates) {
-            if (!around.meets(box)) continue;
+            const Corners its = corners(other);
+            if (!around.box.meets(box) || !around.turned.meets(its) || around.turned.is_surely_beside(own, its, near))
+                continue;
             const bool is_neighbour = is_near_by(mesh_.corners(other));
             if (looked_at > most_looks) return {0, 0};
-            const Corners its = corners(other);
             if (is_neighbour ? !are_back_to_back(own, its) : face_alike(own, its) && look_alike(triangle, other))
                 continue;
             const glm::vec3 way = is_neighbour ? way_over(own, its) : way_between(own, its);
@@ -472,7 +579,8 @@ private:
     std::vector<std::span<const PackedRange>> ring_luminances_; // by interior node, likewise
     bool is_textured_ = false;
     std::span<const Index> first_triangle_;
-    std::vector<Box> boxes_; // by interior node
+    std::vector<Box> boxes_;              // by interior node
+    std::vector<TurnedBox> turned_boxes_; // likewise
     // Empty without hubs.
     std::vector<Parts> parts_;  // likewise
     std::vector<Index> hub_at_; // by place: that it shares a triangle with

@@ -12,11 +12,12 @@ namespace unseen::perception {
 // A contact of triangles with others near them, over or under them and not beside them in one sheet. Neighbours, and
 // neighbours of neighbours, count only back to back, as the sides of a thin sheet, and apart from the corners that they
 // share. Triangles that face and look alike do not count: it makes no difference which of them is seen. Near means nearer
-// than a quarter of the circle around the first triangle.
+// than a quarter of the circle around the first triangle, or amid very many, as slivers are, than less.
 struct Contact {
-    float gap = std::numeric_limits<
-        float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
-    float sine = 1;         // of the least angle between the planes of such triangles
+    // Mesh units: the least distance, or how far was looked if that is less; 0 where they intersect; infinite where none
+    // is near.
+    float gap = std::numeric_limits<float>::infinity();
+    float sine = 1; // of the least angle between the planes of such triangles
 
     bool is_any() const { return gap < std::numeric_limits<float>::infinity(); }
     void include(const Contact& other) { gap = std::min(gap, other.gap), sine = std::min(sine, other.sine); }

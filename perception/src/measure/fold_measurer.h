@@ -197,6 +197,7 @@ private:
         for (std::size_t i = 0; i < luminances; ++i)
             raise(records[i].largest_luminance, worst.luminance[i]),
                 raise(records[i].mean_luminance, mean.luminance[i]);
+        add_slivers(ring, width, mean, records);
         facing.is_height_field &= is_shown;
         if constexpr (is_textured) {
             if (!is_shown || tree_.bounds()[node].ring.radius > factors::longest_ring * width)
@@ -249,6 +250,25 @@ private:
             mean.include(over_fine_after.value());
         }
         return mean;
+    }
+
+    // A ring narrower than a picture's cells falls between their middles: what it changes in the mean counts by its share
+    // of the cells, and of those of wider bands.
+    static void add_slivers(const Ring<channels>& ring, float width, const Difference& mean,
+                            std::span<FoldRecord, luminances> records) {
+        float area = 0;
+        for (const RingTriangle& t : ring.after) {
+            const glm::vec3 a = t.corner[0].position;
+            area += glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)) / 2;
+        }
+        for (std::size_t size = 0; size < picture_sizes.size(); ++size) {
+            const float cells = area / (2 * width) / (2 * picture_sizes[size] * width / picture_side);
+            for (std::size_t band = 0; band < picture_bands && cells < 1; ++band)
+                for (std::size_t i = 0; i < luminances; ++i) {
+                    float& amplitude = records[i].amplitudes[size][band];
+                    amplitude = std::max(amplitude, mean.luminance[i] * cells * std::exp2(-static_cast<float>(band)));
+                }
+        }
     }
 
     // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded.
