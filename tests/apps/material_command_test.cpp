@@ -185,7 +185,7 @@ TEST_F(MaterialCommandTest, SeamsHoldUnderMapsOfEveryKind) {
                     if (std::abs(row[4]) > 0.9f) continue;
                     const double turn = std::atan2(row[3], row[5]) / std::numbers::pi - static_cast<double>(row[6]);
                     EXPECT_LT(std::abs(turn - 2 * std::round(turn / 2)), 0.1) << row[6];
-                    EXPECT_NEAR(row[9], row[6] / 2, 0.1) << "the second set is the first, turned: a vertex's nearby";
+                    EXPECT_NEAR(row[9], row[6] / 2, 0.01) << "the second set is the first, turned";
                     EXPECT_LT(std::abs(row[6] - triangle[0][6]), 0.6) << "not through the image";
                 }
         }

@@ -20,6 +20,35 @@ using Part = SourceDocument::Part;
 // Matrices that flatten more than this, by share of their size, are not turned back.
 constexpr double least_determinant = 1e-12;
 
+// The linear function that fits values best (least squares), of differences from the mean.
+template <int n>
+class LinearFit {
+public:
+    using Place = glm::vec<n, double>;
+    void add(const Place& d, const glm::dvec4& value) {
+        spread_ += glm::outerProduct(d, d);
+        for (int k = 0; k < n; ++k) slopes_[static_cast<std::size_t>(k)] += d[k] * value;
+    }
+    void solve() {
+        double size = 0;
+        for (int k = 0; k < n; ++k) size += spread_[k][k];
+        // Across the surface nothing is known: there the least share of the spread that floats still tell from none.
+        constexpr double least_share = 1e-7;
+        inverse_ = size > 0 ? glm::inverse(spread_ / size + Matrix(least_share)) / size : Matrix(0);
+    }
+    glm::dvec4 at(const Place& d) const {
+        const Place to = inverse_ * d;
+        glm::dvec4 value(0);
+        for (int k = 0; k < n; ++k) value += to[k] * slopes_[static_cast<std::size_t>(k)];
+        return value;
+    }
+
+private:
+    using Matrix = glm::mat<n, n, double>;
+    Matrix spread_{0}, inverse_{0};
+    std::array<glm::dvec4, n> slopes_{};
+};
+
 class Restorer {
 public:
     Restorer(const VertexTree& tree, const LeafRuns& leaves, const ExtractedMesh& extracted,
@@ -83,10 +112,14 @@ private:
         return document_.parts[document_.vertex_parts[source]].channels >> channel & 1;
     }
 
-    // What the values of a wedge's leaves say of a proxy: the linear function of the place that fits best (least squares),
-    // at the proxy, and within their range. So what is linear over a flat surface stays that.
+    // What the values of a wedge's leaves say of a proxy: the linear function of the drawn coordinates that fits best, and
+    // one of the place for what is left (least squares), at the proxy. So what is linear over a flat surface stays that,
+    // and one set of coordinates goes with another where the surface is bent.
     std::array<double, 4> value_at(std::size_t number, WedgeId wedge, bool& have_all) const {
         const SourceDocument::Channel& channel = document_.channels[number];
+        const std::span<const glm::vec2> uvs = tree_.uvs();
+        const auto uv_of = [&](WedgeId of) { return uvs.empty() ? glm::dvec2(0) : glm::dvec2(uvs[of]); };
+        const auto place_of = [&](WedgeId of) { return glm::dvec3(tree_.positions()[of]); };
         const auto for_each = [&](auto&& visit) {
             for (Index rank = leaves_.begin(wedge); rank < leaves_.end(wedge); ++rank) {
                 const Index leaf = leaves_.leaf(rank), source = tree_.source_vertices()[leaf];
@@ -97,36 +130,35 @@ private:
                 glm::dvec4 value(0);
                 for (std::uint32_t k = 0; k < channel.components; ++k)
                     value[static_cast<int>(k)] = channel.values[source * std::size_t{channel.components} + k];
-                visit(glm::dvec3(tree_.positions()[tree_.wedge_of_leaf(leaf)]), value);
+                visit(tree_.wedge_of_leaf(leaf), value);
             }
         };
         constexpr double infinity = std::numeric_limits<double>::infinity();
         double count = 0;
+        glm::dvec2 uv(0);
         glm::dvec3 place(0);
         glm::dvec4 mean(0), low(infinity), high(-infinity);
-        for_each([&](const glm::dvec3& p, const glm::dvec4& value) {
-            ++count, place += p, mean += value;
+        for_each([&](WedgeId leaf, const glm::dvec4& value) {
+            ++count, uv += uv_of(leaf), place += place_of(leaf), mean += value;
             low = glm::min(low, value), high = glm::max(high, value);
         });
         if (count == 0) return {};
-        place /= count, mean /= count;
-        glm::dmat3 spread(0);
-        std::array<glm::dvec3, 4> slopes{};
-        for_each([&](const glm::dvec3& p, const glm::dvec4& value) {
-            const glm::dvec3 d = p - place;
-            spread += glm::outerProduct(d, d);
-            for (int k = 0; k < 4; ++k) slopes[static_cast<std::size_t>(k)] += (value[k] - mean[k]) * d;
+        uv /= count, place /= count, mean /= count;
+        LinearFit<2> by_uv;
+        for_each([&](WedgeId leaf, const glm::dvec4& value) { by_uv.add(uv_of(leaf) - uv, value - mean); });
+        by_uv.solve();
+        LinearFit<3> by_place;
+        for_each([&](WedgeId leaf, const glm::dvec4& value) {
+            by_place.add(place_of(leaf) - place, value - mean - by_uv.at(uv_of(leaf) - uv));
         });
-        // Across the surface nothing is known: there the least share of the spread that floats still tell from none.
-        constexpr double least_share = 1e-7;
-        const double size = spread[0][0] + spread[1][1] + spread[2][2];
-        const glm::dmat3 inverse = glm::inverse(spread / size + glm::dmat3(least_share));
-        const glm::dvec3 to = inverse * (glm::dvec3(tree_.positions()[wedge]) - place) / size;
+        by_place.solve();
+        const glm::dvec4 fitted = mean + by_uv.at(uv_of(wedge) - uv) + by_place.at(place_of(wedge) - place);
+        // Coordinates lie beyond those of the leaves, too, as the drawn ones do: a proxy is not between its leaves.
+        const glm::dvec4 beyond = channel.name.starts_with("TEXCOORD_") ? (high - low) / 2.0 : glm::dvec4(0);
         std::array<double, 4> values{};
-        for (int k = 0; k < 4; ++k) {
-            const double fitted = mean[k] + glm::dot(slopes[static_cast<std::size_t>(k)], to);
-            values[static_cast<std::size_t>(k)] = std::isfinite(fitted) ? std::clamp(fitted, low[k], high[k]) : mean[k];
-        }
+        for (int k = 0; k < 4; ++k)
+            values[static_cast<std::size_t>(k)] =
+                std::isfinite(fitted[k]) ? std::clamp(fitted[k], low[k] - beyond[k], high[k] + beyond[k]) : mean[k];
         return values;
     }
 
