@@ -18,6 +18,7 @@ using namespace vdtree;
 namespace {
 
 using Corners = std::array<glm::vec3, 3>;
+glm::vec3 normal_of(const Corners& t) { return glm::cross(t[1] - t[0], t[2] - t[0]); } // twice the area long
 
 // Of a triangle's size: no triangles of a smooth surface come so near but neighbours.
 constexpr float near_share = 0.25f;
@@ -40,7 +41,7 @@ glm::vec3 shorter(const glm::vec3& a, const glm::vec3& b) { return glm::dot(b, b
 
 // The shortest ways from a triangle to a point, and from one edge, a + [0, 1] u, to another, b + [0, 1] v.
 glm::vec3 way_to_point(const Corners& t, const glm::vec3& p) {
-    const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const glm::vec3 n = normal_of(t);
     const float squared = glm::dot(n, n);
     bool is_over = squared > 0;
     glm::vec3 least(infinity);
@@ -63,7 +64,7 @@ glm::vec3 way_between_edges(const glm::vec3& a, const glm::vec3& u, const glm::v
 }
 
 bool passes_through(const glm::vec3& a, const glm::vec3& b, const Corners& t) {
-    const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const glm::vec3 n = normal_of(t);
     const float over_a = glm::dot(a - t[0], n), over_b = glm::dot(b - t[0], n);
     if (!(over_a * over_b < 0)) return false;
     const glm::vec3 at = a + (over_a / (over_a - over_b)) * (b - a);
@@ -89,7 +90,7 @@ constexpr float along = 0.5f; // the cosine between way and normal, at most
 // Whether the one lies beside the other in one sheet, not over it: the way between them runs along both.
 bool is_beside(const Corners& a, const Corners& b, const glm::vec3& way) {
     const auto runs_along = [&](const Corners& t) {
-        const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+        const glm::vec3 n = normal_of(t);
         return std::abs(glm::dot(n, way)) <= along * glm::length(n) * glm::length(way);
     };
     return glm::dot(way, way) > 0 && runs_along(a) && runs_along(b);
@@ -115,7 +116,7 @@ glm::vec3 way_over(const Corners& a, const Corners& b) {
 }
 
 float sine_between(const Corners& a, const Corners& b) {
-    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    const glm::vec3 m = normal_of(a), n = normal_of(b);
     const float lengths = glm::length(m) * glm::length(n);
     return lengths > 0 ? std::min(glm::length(glm::cross(m, n)) / lengths, 1.0f) : 0.0f;
 }
@@ -125,7 +126,7 @@ constexpr float alike_cosine = 0.9f;
 constexpr float alike_luminance = 0.01f;   // relative, 0..1; of the means
 constexpr std::size_t most_luminances = 4; // measured at once
 float cosine_between(const Corners& a, const Corners& b) {
-    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    const glm::vec3 m = normal_of(a), n = normal_of(b);
     const float lengths = glm::length(m) * glm::length(n);
     return lengths > 0 ? glm::dot(m, n) / lengths : 0;
 }
@@ -172,7 +173,7 @@ public:
         const float way = surely * along * std::max({gaps.x, gaps.y, gaps.z});
         const float height = std::max(box_.hi.z - other.lo.z, other.hi.z - box_.lo.z) - near;
         if (!is_in_plane_ || !(height <= way)) return false;
-        const glm::vec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const glm::vec3 n = normal_of(c);
         const float most = way * glm::length(n);
         return std::ranges::all_of(own, [&](const glm::vec3& p) { return std::abs(glm::dot(n, p - c[0])) <= most; });
     }
@@ -428,7 +429,7 @@ private:
     };
     void include(Index triangle, Looks& looks) const {
         const Corners c = corners(triangle);
-        const glm::vec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const glm::vec3 normal = normal_of(c);
         const float length = glm::length(normal);
         looks.is_known = looks.is_known && length > 0 && !is_textured_ && luminances_.size() <= most_luminances;
         if (!looks.is_known) return;
