@@ -90,6 +90,15 @@ auto look_up(const std::vector<float>& costs) {
     };
 }
 
+TEST(Cut, StartsWhollyFolded) {
+    const VertexTree tree = built(shapes::torus(12, 6));
+    const Cut cut(tree);
+    EXPECT_EQ(cut.triangle_count(), 0u);
+    EXPECT_TRUE(cut.indices().empty());
+    EXPECT_TRUE(cut.is_active(VertexTree::root()));
+    EXPECT_EQ(fault_in_cut(cut), "");
+}
+
 TEST(Cut, KeepsItsInvariantsUnderRandomOperations) {
     std::mt19937_64 random(1);
     for (const shapes::Named& named : shapes::all()) {
@@ -627,6 +636,12 @@ TEST(ExtractMesh, DoesNotDependOnTheHistoryOfTheCut) {
         ASSERT_EQ(mesh.triangles, expected.triangles) << "frame " << frame;
     }
     EXPECT_GT(patched, 20);
+}
+
+TEST(ExtractMesh, IsEmptyForAFoldedCut) {
+    const VertexTree tree = built(shapes::with_attributes(shapes::cube(2)));
+    const Mesh nothing = extract_mesh(Cut(tree));
+    EXPECT_TRUE(nothing.positions.empty() && nothing.triangles.empty() && nothing.ranges.empty());
 }
 
 } // namespace unseen::vdtree::cut_test
