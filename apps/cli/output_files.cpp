@@ -65,10 +65,12 @@ Result<void> make_folder(const fs::path& folder) {
     std::error_code failure;
     if (folder.empty() || fs::is_directory(folder, failure)) return {};
     if (const auto parent = make_folder(folder.parent_path()); !parent) return parent;
-    if (fs::create_directory(folder, failure) && made_folder_count < made_folders.size()) {
-        made_folders[made_folder_count] = folder;
-        ++made_folder_count;
+    const std::size_t place = made_folder_count;
+    if (place < made_folders.size()) {
+        made_folders[place] = folder;
+        made_folder_count = place + 1; // before it is there: a signal may come at any time
     }
+    if (!fs::create_directory(folder, failure)) made_folder_count = place;
     if (!failure) return {};
     return Error{ErrorCode::io_failure, "Cannot make the folder '" + folder.string() + "': " + failure.message() + "."};
 }
