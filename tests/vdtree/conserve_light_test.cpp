@@ -56,10 +56,25 @@ TEST(ConserveLight, KeepsTheLightOfACurvedSurface) {
     EXPECT_LT(std::abs(whole - light_towards(*conserved, lit)), 0.7 * std::abs(whole - light_towards(plain, lit)));
 }
 
+// What light its edges lose is no reason to shade a face.
+TEST(ConserveLight, LeavesFlatFacesEven) {
+    const VertexTree plain = built(shapes::cube(6));
+    ASSERT_TRUE(plain.has_seams());
+    const Result<VertexTree> conserved = require(conserve_light(plain));
+    const auto leaves = plain.luminance().subspan(plain.interior_wedge_count());
+    WedgeId even = 0;
+    for (WedgeId w = 0; w < plain.interior_wedge_count(); ++w) {
+        if (std::ranges::find(leaves, plain.luminance()[w]) == leaves.end()) continue; // stands for several faces
+        EXPECT_EQ(conserved->luminance()[w], plain.luminance()[w]) << w;
+        ++even;
+    }
+    EXPECT_GT(even, plain.interior_wedge_count() / 2);
+}
+
 // Proxies of other luminances are drawn in other colours: all bounds go with them.
 TEST(ConserveLight, MovesTheBoundsWithTheProxies) {
-    for (const Mesh& mesh :
-         {shapes::torus(24, 12), shapes::bumpy_sphere(2, 0.03), shapes::grid(8), shapes::random_soup(200, 300, 1)}) {
+    for (const Mesh& mesh : {shapes::torus(24, 12), shapes::bumpy_sphere(2, 0.03), shapes::grid(8),
+                             shapes::random_soup(200, 300, 1), shapes::cube(6), shapes::torus(64, 4)}) {
         const VertexTree tree = built(coloured(mesh));
         const Result<VertexTree> conserved = require(conserve_light(tree));
         const Result<void> sound = verify(*conserved);

@@ -12,6 +12,10 @@ namespace {
 // Share of the area around a proxy that must face the same way; with less, its luminance has no sure effect.
 constexpr float least_facing = 0.2f;
 
+void include(LuminanceRange& range, float luminance) {
+    range = {std::min(range.lo, luminance), std::max(range.hi, luminance)};
+}
+
 class Conservation {
 public:
     explicit Conservation(const SoundTree& tree)
@@ -46,20 +50,26 @@ private:
         missing_[node] = light - kept;
     }
 
-    // Several wedges get brighter or darker by the same amount.
+    // Several wedges get brighter or darker by the same amount, each only within what its own triangles show: flat faces
+    // that meet at a hard edge stay as they are.
     void choose(NodeId node, const glm::vec3& light) {
         const WedgeId first = tree_.first_wedge(node), end = tree_.wedge_end(node);
         const bool is_single = end - first == 1;
         glm::vec3 area(0), others(0); // vector area; light of the other corners, and of those that stay with the node
         float total = 0;
+        shown_.assign(end - first, {1, 0});
         for (const Index t : mesh_.ring(node)) {
             const glm::vec3 of_triangle = mesh_.vector_area(t);
             area += of_triangle;
             total += glm::length(of_triangle);
             const std::array<WedgeId, 3> wedges = mesh_.wedges(t);
             float sum = 0;
-            for (std::size_t k = 0; k < 3; ++k)
-                sum += is_single && mesh_.corners(t)[k] == node ? 0 : luminance_[wedges[k]];
+            for (std::size_t k = 0; k < 3; ++k) {
+                const bool is_of_node = mesh_.corners(t)[k] == node;
+                sum += is_single && is_of_node ? 0 : luminance_[wedges[k]];
+                if (is_of_node)
+                    for (const WedgeId w : wedges) include(shown_[wedges[k] - first], luminance_[w]);
+            }
             others += sum / 3 * of_triangle;
         }
         const float facing = glm::length(area);
@@ -67,8 +77,11 @@ private:
         const float wanted = 3 * glm::dot(light - others, area) / (facing * facing);
         if (!std::isfinite(wanted)) return;
         const LuminanceRange ring = tree_.ring_luminance()[node];
-        for (WedgeId w = first; w < end; ++w)
-            luminance_[w] = std::clamp(is_single ? wanted : luminance_[w] + wanted, ring.lo, ring.hi);
+        if (is_single) luminance_[first] = std::clamp(wanted, ring.lo, ring.hi);
+        else
+            for (WedgeId w = first; w < end; ++w)
+                if (const LuminanceRange shown = shown_[w - first]; shown.lo <= shown.hi)
+                    luminance_[w] = std::clamp(luminance_[w] + wanted, shown.lo, shown.hi);
     }
 
     float luminance_of(Index triangle) const {
@@ -80,7 +93,8 @@ private:
     NodeId interior_;
     std::vector<float> luminance_;
     FoldSequence mesh_;
-    std::vector<glm::vec3> missing_; // light that the luminances of the ring could not make good
+    std::vector<LuminanceRange> shown_; // by the triangles at each wedge of the node that folds
+    std::vector<glm::vec3> missing_;    // light that the luminances of the ring could not make good
 };
 
 void include_proxies(const SoundTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {

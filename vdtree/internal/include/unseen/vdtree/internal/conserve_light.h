@@ -12,8 +12,9 @@ class VertexTree;
 // direction the sum over its triangles of luminance times vector area, times that direction.
 //
 // Nodes fold in the order of their support's radius. Each proxy gets the luminance with which its ring radiates as much as
-// before the fold, as nearly as ring_luminance() allows; the parent must conserve the remainder. Proxies keep theirs if
-// their leaves coincide, or their ring faces too many ways.
+// before the fold, as nearly as ring_luminance() allows; the parent must conserve the remainder. Where several wedges meet,
+// each stays within what its own triangles show, so that flat faces stay even. Proxies keep theirs if their leaves
+// coincide, or their ring faces too many ways.
 //
 // support_luminance() changes accordingly; ring_luminance() and adaptation_luminance() stay. The geometry is shared, and
 // attributes are dropped: conserve first, then measure. Doing it again changes nothing. Fails if check() fails, and on
