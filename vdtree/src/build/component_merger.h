@@ -27,17 +27,13 @@ private:
     Index count(Index cluster) const {
         return live_.is_simple(cluster) ? classes_.count : live_.several[cluster].count;
     }
-    View component(Index cluster, Index number) const {
-        if (!live_.is_simple(cluster)) {
-            const ClassComponent& c = live_.components[live_.several[cluster].first + number];
-            return {c.attribute_class, c.references.data(), c.block.data()};
-        }
-        return {number, live_.references.data() + cluster * channels_ + first_channel_[number],
-                live_.quadrics.data() + cluster * stride_ + first_float_[number]};
-    }
+    // Calls f(number, view) for each component.
+    template <class F>
+    UNSEEN_INLINE void for_each_component(Index cluster, F&& f) const;
     Index root_of(Index number);
-    void add(const View& from, const Offset<float>& to, Index number, Index root);
-    void copy(const View& from, const Offset<float>& to);
+    void add(const View& from, const Float4& offset, ClassComponent& onto);
+    template <class Move>
+    void copy(const View& from, Move&& move);
 
     const LiveClusters& live_;
     AttributeClasses classes_;
