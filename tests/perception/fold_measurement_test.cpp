@@ -300,12 +300,13 @@ TEST(FoldErrors, DoNotDependOnTheUnit) {
             power < -100; // lengths near the least numbers: what is multiplied with them is rounded
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             FoldRecord record = records[node];
-            for (float* length :
-                 {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap, &record.border})
+            for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap,
+                                  &record.border, &record.thickness})
                 *length = std::ldexp(*length, power);
             ASSERT_EQ(scaled_records[node], record) << "2^" << power << ", node " << node;
             FoldError expected = errors[node];
-            for (float* length : {&expected.distance, &expected.mean_distance, &expected.outline, &expected.extent})
+            for (float* length : {&expected.distance, &expected.mean_distance, &expected.border, &expected.outline,
+                                  &expected.extent, &expected.thickness})
                 *length = std::ldexp(*length, power);
             if (has_few_digits) {
                 EXPECT_NEAR(scaled_errors[node].distance, expected.distance, 1e-3f * expected.distance) << node;
@@ -336,7 +337,7 @@ TEST(FoldErrors, AreRefusedWhereTheyAreNone) {
         for (float FoldRecord::*const value :
              {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance, &FoldRecord::largest_luminance,
               &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::bias,
-              &FoldRecord::border})
+              &FoldRecord::border, &FoldRecord::thickness})
             EXPECT_NE(with([&](FoldRecord& r) { r.*value = wrong; }).find("node 1"), std::string::npos);
         EXPECT_NE(with([&](FoldRecord& r) { r.amplitudes[1][2] = wrong; }), "");
     }

@@ -195,7 +195,7 @@ TEST(LitFolds, AreTheSameFromAFile) {
 // As files keep them.
 struct Folds {
     using Component = float;
-    float values[37];
+    float values[38];
 };
 struct Albedo {
     using Component = float;
@@ -223,8 +223,8 @@ TEST(LitFolds, RefuseDamagedAttributes) {
         return with.with_attribute("lit_folds", domain, std::move(values));
     };
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
-    constexpr std::size_t gap = 5, sine = 6;
-    for (std::size_t i = 0; i < 37; ++i)
+    constexpr std::size_t gap = 6, sine = 7;
+    for (std::size_t i = 0; i < 38; ++i)
         for (const float value : {nan, -1.0f, infinity, -infinity}) {
             if (i == gap && value == infinity) continue; // nothing is near
             std::vector<Folds> values(folds.begin(), folds.end());

@@ -278,4 +278,73 @@ TEST(FoldDistance, LeavesLittleOfAFarObject) {
     EXPECT_LT(triangles(0.9, true), near);
 }
 
+// A cone without its floor; flat at height 0.
+Mesh fan(int spokes, double height) {
+    Mesh mesh = shapes::turned(spokes, {{1, 0}}, false);
+    const auto hub = static_cast<vdtree::Index>(spokes);
+    mesh.positions.push_back({0, 0, height});
+    for (vdtree::Index i = 0; i < hub; ++i) mesh.triangles.push_back({hub, i, (i + 1) % hub});
+    return mesh;
+}
+
+// From how far the first half of the folds counts as seen, over from how far it is seen in the most telling of some
+// directions. Less than 1 would be a change that shows.
+TEST(FoldDistance, IsNotManyTimesThatFromWhichFoldsShow) {
+    struct Case {
+        const char* name;
+        Mesh mesh;
+        double most;
+    };
+    const Case cases[] = {{"disc", fan(100, 0), 6},
+                          {"tube", shapes::turned(48, {{0.5, 0}, {0.5, 20}}, false), 7},
+                          {"cone", fan(100, 1), 5},
+                          {"slivers", shapes::turned(48, {{0.5, 0}, {0.5, 10}}, true), 5}};
+    auto context = require(render::Context::headless());
+    for (const auto& [name, mesh, most] : cases) {
+        const VertexTree tree = measured(mesh);
+        auto renderer = require(render::Renderer::create(*context, tree));
+        const vdtree::Sphere sphere = tree.bounding_sphere();
+        const vdtree::LuminanceRange range = tree.luminance_range();
+        oracle::Look look;
+        look.view.width = look.view.height = 256;
+        look.view.fov_y_degrees = perception::physical_field(look.options.display, look.view.height).value();
+        look.options.scene = {std::min(range.lo, oracle::background), std::max(range.hi, oracle::background)};
+        look.options.scene.behind = vdtree::LuminanceRange{oracle::background, oracle::background};
+        const auto stand = [&](glm::dvec3 direction, double radii) {
+            look.view.target = tree.origin() + glm::dvec3(sphere.centre);
+            look.view.eye = look.view.target + radii * static_cast<double>(sphere.radius) * glm::normalize(direction);
+            look.view.up = std::abs(direction.y) < 2 ? glm::dvec3(0, 1, 0) : glm::dvec3(1, 0, 0);
+        };
+        const glm::dvec3 directions[] = {{1, 2, 3}, {3, 0, 4}, {1, -3, 1}, {-3, -1, -2}, {-3, 2, 2}};
+        stand(directions[0], 10);
+        const auto criterion = require(perception::error_distances(tree, look.view, look.options));
+        Cut whole(tree), cut(tree);
+        whole.unfold_all();
+        double claimed = 1e4, nearer = 1.1;
+        while (claimed > 1.01 * nearer) {
+            const double middle = std::sqrt(claimed * nearer);
+            stand(directions[0], middle);
+            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options)));
+            (2 * cut.triangle_count() <= tree.triangle_count() ? claimed : nearer) = middle;
+        }
+        stand(directions[0], claimed);
+        ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options)));
+        const auto visibility = [&](glm::dvec3 direction, double radii) {
+            stand(direction, radii);
+            return oracle::judge(oracle::draw(*renderer, whole, look.view), oracle::draw(*renderer, cut, look.view),
+                                 look, perception::CsfModel::castle)
+                .max_ratio;
+        };
+        double seen = 0; // from how many radii at least
+        for (const glm::dvec3& direction : directions) {
+            EXPECT_LT(visibility(direction, claimed), 1) << name;
+            for (double radii = claimed / 1.2; radii > std::max(seen, 1.2); radii /= 1.2)
+                if (visibility(direction, radii) >= 1) seen = radii;
+        }
+        std::cout << name << ": half of the folds count as seen up to " << claimed << " radii, and are seen up to "
+                  << seen << '\n';
+        EXPECT_LT(claimed, most * seen) << name;
+    }
+}
+
 } // namespace unseen::fold_oracle_test

@@ -82,6 +82,10 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
         const bool is_shown = facing[node].is_height_field != 0 && ring <= factors::longest_ring * width;
         if (is_shown) {
             error.distance = std::max({error.distance, shift, record.mean_distance});
+            if (record.thickness > 0) {
+                error.thickness = record.thickness;
+                error.thin_luminance = factors::amplitude_of_point_mean * record.mean_luminance;
+            }
         } else { // something may be under what was drawn, or beside it
             error.distance = std::max({error.distance, shift, moved_point});
             error.luminance = std::max(error.luminance, record.largest_luminance);
@@ -93,7 +97,7 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.luminance *= factors::contrast_of_textures, error.wide_luminance *= factors::contrast_of_textures;
         }
         error.extent = std::max(error.extent, record.extent);
-        error.outline = std::max(error.outline, record.border);
+        error.border = std::max(error.border, record.border);
         error.facing |= facing[node].facing;
         error.bias = record.bias, error.fading = facing[node].fading;
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they
@@ -103,10 +107,11 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.facing = NormalSlabs::everything();
             error.distance = std::max(moved, std::min(moved / std::max(record.sine, least_sine), ring));
         }
-        error.outline = std::max(error.outline, error.distance);
+        error.outline = std::max({error.outline, error.distance, error.border});
         if (node == 0) break;
         FoldError& parent = errors[tree.parents()[node]];
         parent.distance = std::max(parent.distance, error.distance);
+        parent.border = std::max(parent.border, error.border);
         parent.outline = std::max(parent.outline, error.outline);
         parent.extent = std::max(parent.extent, error.extent);
         parent.facing |= error.facing;

@@ -13,12 +13,14 @@ namespace unseen::perception {
 struct FoldError {
     // Mesh units. By how far an outline moves, no less than the children's; and the mean distance of points.
     float distance = 0, mean_distance = 0;
-    // Likewise, by how far an outline moves where open borders count, too; no less than the distance.
-    float outline = 0;
+    // Likewise, by how far an open border moves, and the larger one of that and the distance.
+    float border = 0, outline = 0;
     // Relative, 0..1: what bands of spatial frequency see, as the amplitude of a grating. A band sees no more than of a
     // patch as wide as the node of the amplitude `wide_luminance`, side by side with others like it of random signs,
     // and of parts 2^-k as wide of 4^k times that, up to `luminance`.
     float luminance = 0, wide_luminance = 0;
+    // Of a ring narrower than its pictures' cells: its width, mesh units, and the amplitude of the light that moves across it.
+    float thickness = 0, thin_luminance = 0;
     float extent = 0;           // mesh units: see FoldRecord; no less than the children's
     float bias = 0;             // see FoldRecord
     vdtree::NormalSlabs facing; // see FoldFacing; all where parts of the surface meet; it includes the children's

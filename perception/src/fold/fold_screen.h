@@ -101,6 +101,8 @@ private:
 struct Surround {
     double darkest_cdm2 = 0;
     double coverage = 1; // share of its sphere's disc that the mesh covers, from all sides in the mean
+    // The width of a disc that all of the mesh fills, from wherever it covers most, over the sphere's.
+    double compactness = 1;
 
     // The mean light of a neighbourhood of which the mesh, of this luminance, covers the coverage times so much.
     double mean_cdm2(double luminance_cdm2, double share) const {
@@ -119,8 +121,10 @@ inline Surround surround_of(const vdtree::SoundTree& tree, const FoldTestOptions
     }
     const double radius = static_cast<double>(tree.bounding_sphere().radius), disc = std::numbers::pi * radius * radius;
     const float darkest = options.scene.behind ? options.scene.behind->lo : options.scene.darkest;
+    // Of a closed surface, half faces away from wherever one looks.
+    const double most = tree.closedness() == vdtree::Closedness::open ? area : area / 2;
     return {to_luminance(options.display, static_cast<double>(darkest)).value(),
-            disc > 0 ? std::min(1.0, area / 4 / disc) : 1};
+            disc > 0 ? std::min(1.0, area / 4 / disc) : 1, disc > 0 ? std::sqrt(std::min(1.0, most / disc)) : 1};
 }
 
 } // namespace unseen::perception

@@ -197,7 +197,7 @@ private:
         for (std::size_t i = 0; i < luminances; ++i)
             raise(records[i].largest_luminance, worst.luminance[i]),
                 raise(records[i].mean_luminance, mean.luminance[i]);
-        add_slivers(ring, width, mean, records);
+        raise(record.thickness, add_slivers(scratch, width, mean, records));
         facing.is_height_field &= is_shown;
         if constexpr (is_textured) {
             if (!is_shown || tree_.bounds()[node].ring.radius > factors::longest_ring * width)
@@ -252,23 +252,108 @@ private:
         return mean;
     }
 
-    // A ring narrower than a picture's cells falls between their middles: what it changes in the mean counts by its share
-    // of the cells, and of those of wider bands.
-    static void add_slivers(const Ring<channels>& ring, float width, const Difference& mean,
-                            std::span<FoldRecord, luminances> records) {
+    // A ring narrower than a picture's cells falls between their middles: the light that it adds somewhere along it, in the
+    // mean, counts by its share of the cells, and of those of wider bands. Returns the ring's mean width; 0 where no picture's
+    // cells are wider.
+    float add_slivers(Scratch& scratch, float width, const Difference& mean,
+                      std::span<FoldRecord, luminances> records) {
         float area = 0;
-        for (const RingTriangle& t : ring.after) {
-            const glm::vec3 a = t.corner[0].position;
-            area += glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)) / 2;
-        }
+        for (const RingTriangle& t : scratch.ring.after) area += area_of(t);
+        const auto cells_of = [&](std::size_t size) {
+            return area / (2 * width) / (2 * picture_sizes[size] * width / picture_side);
+        };
+        if (!(cells_of(picture_sizes.size() - 1) < 1)) return 0;
+        std::array<float, luminances> added = mean.luminance;
+        if constexpr (!is_textured)
+            if (scratch.ring.after.size() <= most_fine_triangles) added = added_along(scratch);
         for (std::size_t size = 0; size < picture_sizes.size(); ++size) {
-            const float cells = area / (2 * width) / (2 * picture_sizes[size] * width / picture_side);
+            const float cells = cells_of(size);
             for (std::size_t band = 0; band < picture_bands && cells < 1; ++band)
                 for (std::size_t i = 0; i < luminances; ++i) {
                     float& amplitude = records[i].amplitudes[size][band];
-                    amplitude = std::max(amplitude, mean.luminance[i] * cells * std::exp2(-static_cast<float>(band)));
+                    amplitude = std::max(amplitude, std::min(added[i], mean.luminance[i]) * cells *
+                                                        std::exp2(-static_cast<float>(band)));
                 }
         }
+        return area / (2 * width);
+    }
+    static float area_of(const RingTriangle& t) {
+        const glm::vec3 a = t.corner[0].position;
+        return glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)) / 2;
+    }
+
+    // By how much a narrow ring, folded, is brighter or darker than before across all of it: the most in any part of its
+    // length, over the ring's mean width.
+    std::array<float, luminances> added_along(Scratch& scratch) {
+        std::array<float, luminances> most{};
+        for (const auto& [before, around, after] :
+             {std::tuple(&scratch.ring.before, &scratch.ring.around, &scratch.ring.after),
+              std::tuple(&scratch.ring.fine_before, &scratch.ring.fine_around, &scratch.ring.fine_after)}) {
+            if (before == &scratch.ring.fine_before && !scratch.compares_fine) break;
+            scratch.before_surface.assign(*before, *around);
+            include_added(std::span<const RingTriangle>(*after), scratch, most);
+        }
+        return most;
+    }
+    void include_added(std::span<const RingTriangle> after, Scratch& scratch, std::array<float, luminances>& most) {
+        glm::vec3 axis(0); // the longest edge
+        float area = 0;
+        for (const RingTriangle& t : after) {
+            area += area_of(t);
+            for (std::size_t k = 0; k < 3; ++k) {
+                const glm::vec3 edge = t.corner[(k + 1) % 3].position - t.corner[k].position;
+                if (glm::dot(edge, edge) > glm::dot(axis, axis)) axis = edge;
+            }
+        }
+        if (!(area > 0) || scratch.before_surface.empty()) return;
+        Points& points = scratch.points;
+        points.clear();
+        const auto between = [](const Point& a, const Point& b, float share) {
+            Point to = a;
+            to.position += share * (b.position - a.position);
+            for (std::size_t i = 0; i < luminances; ++i) to.luminance[i] += share * (b.luminance[i] - a.luminance[i]);
+            return to;
+        };
+        std::vector<std::pair<float, float>> places; // along the axis, and the area that a point stands for
+        float low = std::numeric_limits<float>::infinity(), high = -low;
+        for (const RingTriangle& t : after) {
+            std::array<float, 3> along;
+            for (std::size_t k = 0; k < 3; ++k) along[k] = glm::dot(t.corner[k].position, axis);
+            const auto [first, last] = std::minmax({along[0], along[1], along[2]});
+            low = std::min(low, first), high = std::max(high, last);
+            // In slices across, which are as wide as they are far from the longest edge's ends.
+            std::size_t a = 0, c = 0;
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (along[k] == first) a = k;
+                if (along[k] == last) c = k;
+            }
+            if (a == c) continue; // across, or a point
+            const Point &from = t.corner[a], &to = t.corner[c], &aside = t.corner[3 - a - c];
+            const float bend = (along[3 - a - c] - first) / (last - first);
+            for (std::size_t slice = 0; slice < sliver_slices; ++slice) {
+                const float at = (static_cast<float>(slice) + 0.5f) / sliver_slices;
+                const Point on_edge = between(from, to, at),
+                            across = at < bend ? between(from, aside, at / bend)
+                                               : between(aside, to, (at - bend) / (1 - bend));
+                const float share = at < bend ? at / bend : (1 - at) / (1 - bend); // of the largest width
+                for (const float side : {1.0f / 6, 0.5f, 5.0f / 6}) {
+                    points.add(between(on_edge, across, side), t.sheet);
+                    places.emplace_back(first + at * (last - first), 2 * share * area_of(t) / (3 * sliver_slices));
+                }
+            }
+        }
+        if (points.size() == 0 || !(high > low)) return;
+        scratch.before_surface.compare(points, scratch.aside);
+        std::array<std::array<float, luminances>, sliver_slices> added{};
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const float part = (places[i].first - low) / (high - low) * sliver_slices;
+            auto& to = added[std::min(static_cast<std::size_t>(std::max(part, 0.0f)), sliver_slices - 1)];
+            const auto here = points.here(i), there = points.there(i);
+            for (std::size_t k = 0; k < luminances; ++k) to[k] += (here[k] - there[k]) * places[i].second;
+        }
+        for (const auto& part : added)
+            for (std::size_t k = 0; k < luminances; ++k)
+                most[k] = std::max(most[k], std::abs(part[k]) * sliver_slices / area);
     }
 
     // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded.

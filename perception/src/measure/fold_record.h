@@ -121,10 +121,11 @@ struct FoldRecord {
     // The largest distance between the surface's open border and what the fold makes of it; 0 where there is none. Seen
     // along the normal such a border moves as far as it does, whatever the heights.
     float border = 0;
+    float thickness = 0; // the mean width of a ring that is narrower than its pictures' cells; 0: it is not
 
     bool operator==(const FoldRecord&) const = default;
 };
-static_assert(sizeof(FoldRecord) == 18 * sizeof(float));
+static_assert(sizeof(FoldRecord) == 19 * sizeof(float));
 
 struct FoldFacing {
     using Component = std::uint8_t;
@@ -166,7 +167,7 @@ inline bool is_sound(const FoldTexture& texture) {
 inline bool is_sound(const FoldRecord& r) {
     bool sound = r.gap >= 0 && r.sine <= 1;
     for (const float value : {r.shift, r.farthest, r.mean_distance, r.largest_luminance, r.mean_luminance, r.extent,
-                              r.sine, r.bias, r.border})
+                              r.sine, r.bias, r.border, r.thickness})
         sound &= value >= 0 && std::isfinite(value);
     for (const auto& of_size : r.amplitudes)
         for (const float amplitude : of_size) sound &= amplitude >= 0 && std::isfinite(amplitude);

@@ -52,18 +52,19 @@ static_assert(sizeof(Shades) == 10 * sizeof(float));
 struct LitRecord {
     using Component = float;
 
-    float shift = 0, farthest = 0, mean_distance = 0, extent = 0, border = 0;
+    float shift = 0, farthest = 0, mean_distance = 0, extent = 0, border = 0, thickness = 0;
     float gap = 0, sine = 1;
     Shades of_axis[3]; // of a n_k in the pictures' luminances
 };
-static_assert(sizeof(LitRecord) == 37 * sizeof(float));
+static_assert(sizeof(LitRecord) == 38 * sizeof(float));
 
 constexpr std::pair<float LitRecord::*, float FoldRecord::*> lengths[] = {
     {&LitRecord::shift, &FoldRecord::shift},
     {&LitRecord::farthest, &FoldRecord::farthest},
     {&LitRecord::mean_distance, &FoldRecord::mean_distance},
     {&LitRecord::extent, &FoldRecord::extent},
-    {&LitRecord::border, &FoldRecord::border}};
+    {&LitRecord::border, &FoldRecord::border},
+    {&LitRecord::thickness, &FoldRecord::thickness}};
 
 bool is_sound(const Shades& shades) {
     bool sound = true;

@@ -17,8 +17,8 @@ using namespace measurement;
 namespace {
 
 void scale_lengths(FoldRecord& record, float scale) {
-    for (float* length :
-         {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap, &record.border})
+    for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap,
+                          &record.border, &record.thickness})
         *length *= scale;
 }
 

@@ -50,6 +50,9 @@ inline constexpr std::size_t border_looks_an_edge = 256;
 // Nodes near a border that lie each in the next: 40 in trees of foliage. Above more, nothing is looked at, either.
 inline constexpr int most_border_levels = 256;
 
+// ---- rings narrower than pictures' cells
+inline constexpr std::size_t sliver_slices = 8; // of the length, in which light is added up
+
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells
 inline constexpr std::size_t picture_bands = 4;           // an octave each, the finest first
