@@ -278,6 +278,40 @@ TEST(FoldDistance, LeavesLittleOfAFarObject) {
     EXPECT_LT(triangles(0.9, true), near);
 }
 
+// A flat sheet with holes, of which the window shows a part: what folds beyond its edge is joined to triangles that are as
+// long as the flat between the holes, and must not move what they show.
+TEST(FoldOracle, SeesNothingAtTheEdgesOfTheWindow) {
+    constexpr int holes = 4, side = 16 * holes - 1;
+    Mesh mesh = shapes::placed(shapes::grid(side), 1.0 / side);
+    std::erase_if(mesh.triangles, [&](const vdtree::Triangle& t) {
+        const glm::dvec3 p = (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) * (holes / 3.0);
+        return std::hypot(p.x - std::floor(p.x) - 0.5, p.y - std::floor(p.y) - 0.5) < 0.22;
+    });
+    const VertexTree tree = measured(mesh);
+    auto context = require(render::Context::headless());
+    auto renderer = require(render::Renderer::create(*context, tree));
+    oracle::Look look;
+    look.view.width = look.view.height = 400;
+    look.view.fov_y_degrees = perception::physical_field(look.options.display, look.view.height).value();
+    look.options.scene = {std::min(tree.luminance_range().lo, oracle::background),
+                          std::max(tree.luminance_range().hi, oracle::background)};
+    look.options.scene.behind = vdtree::LuminanceRange{oracle::background, oracle::background};
+    look.view.target = {0.5, 0.5, 0};
+    Cut whole(tree), cut(tree);
+    whole.unfold_all();
+    for (const glm::dvec3& eye :
+         {glm::dvec3(2.4044911, 1.3818196, -3.1639635), glm::dvec3(0.9287862, 0.2273521, -0.7660324)}) {
+        look.view.eye = eye;
+        const auto criterion = require(perception::error_distances(tree, look.view, look.options));
+        ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options)));
+        EXPECT_LT(2 * cut.triangle_count(), tree.triangle_count());
+        EXPECT_LT(oracle::judge(oracle::draw(*renderer, whole, look.view), oracle::draw(*renderer, cut, look.view),
+                                look, perception::CsfModel::castle)
+                      .max_ratio,
+                  1);
+    }
+}
+
 // A cone without its floor; flat at height 0.
 Mesh fan(int spokes, double height) {
     Mesh mesh = shapes::turned(spokes, {{1, 0}}, false);

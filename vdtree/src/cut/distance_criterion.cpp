@@ -153,6 +153,59 @@ float radius_of(const VertexTree& tree, const DistanceCriterion::Parts& parts, N
                                                              : tree.support_spheres()[node].radius;
 }
 
+// Which nodes unfold only where the eye is nearer than their radius: what is flat.
+bool is_flat(const VertexTree& tree, const DistanceCriterion::Parts& p, NodeId node) {
+    const float radius = radius_of(tree, p, node);
+    const FoldClass rows = p.classes.empty() ? FoldClass{} : p.classes[node];
+    const auto distance = [&](std::uint16_t row, const std::vector<float>& lengths) {
+        return (lengths.empty() ? radius : lengths[node]) * p.switch_distance[row * p.eccentricity_bins];
+    };
+    if (!(distance(rows.interior, p.lengths) < radius)) return false;
+    return !(tree.bounds()[node].flags & irregular_ring) ||
+           distance(rows.silhouette, p.silhouette_lengths.empty() ? p.lengths : p.silhouette_lengths) < radius;
+}
+
+// See DistanceCriterion::Reach: twice the radius of the largest flat nodes that triangles lead to. Files are not trusted:
+// nobody has looked at all of a mapped tree.
+std::shared_ptr<const DistanceCriterion::Reach> find_reach(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    auto reach = std::make_shared<DistanceCriterion::Reach>();
+    if (p.lit) return reach;
+    const NodeId nodes = tree.interior_count();
+    const auto& links = unchecked_links(tree);
+    std::vector<NodeId> flat(nodes, no_node); // the largest that a node is in
+    bool has_flat = false;
+    for (NodeId node = 0; node < nodes; ++node) {
+        const NodeId parent = links.parents[node];
+        if (parent < node) flat[node] = flat[parent];
+        if (flat[node] == no_node && is_flat(tree, p, node)) flat[node] = node, has_flat = true;
+    }
+    if (!has_flat) return reach;
+    std::vector<float> widths(nodes);
+    for (const Triangle& triangle : links.triangles) {
+        std::array<NodeId, 3> over; // the corners' places
+        bool is_sound = true;
+        for (std::size_t k = 0; k < 3 && is_sound; ++k) {
+            const NodeId place = triangle[k] < tree.leaf_count() ? tree.place_of_leaf(triangle[k]) : no_node;
+            is_sound = place < tree.node_count() && links.parents[place] < nodes;
+            if (is_sound) over[k] = links.parents[place];
+        }
+        for (std::size_t k = 0; k < 9 && is_sound; ++k)
+            if (const NodeId node = over[k / 3], beside = flat[over[k % 3]]; beside != no_node && beside != flat[node])
+                widths[node] = std::max(widths[node], 2 * radius_of(tree, p, beside));
+    }
+    for (NodeId node = nodes; node-- > 1;)
+        if (const NodeId parent = links.parents[node]; parent < node)
+            widths[parent] = std::max(widths[parent], widths[node]);
+    const float longest = *std::max_element(widths.begin(), widths.end());
+    if (!(longest > 0) || !std::isfinite(longest)) return reach;
+    reach->longest = longest;
+    constexpr int most_octaves = 63;
+    for (const float width : widths)
+        reach->octaves.push_back(static_cast<std::uint8_t>(
+            width > 0 ? std::max(1, most_octaves - static_cast<int>(std::log2(longest / width))) : 0));
+    return reach;
+}
+
 // Gives a row of one switch distance and no least cost to some nodes.
 Result<void> give_row(DistanceCriterion::Parts& parts, NodeId nodes, float switch_distance,
                       std::span<const std::uint64_t> which) {
@@ -203,6 +256,11 @@ void weigh(const VertexTree& tree, DistanceCriterion::Parts& parts) {
 } // namespace
 
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
+    return create(tree, std::move(parts), nullptr);
+}
+
+Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts,
+                                                    std::shared_ptr<const Reach> reach) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
     weigh(tree, parts);
     if (tree.is_locked()) {
@@ -212,14 +270,22 @@ Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Part
     }
     for (float& switch_distance : parts.switch_distance)
         switch_distance = std::clamp(switch_distance, never_visible, always_visible);
+    if (!reach) reach = find_reach(tree, parts);
     const bool uses_silhouettes = std::any_of(parts.classes.begin(), parts.classes.end(),
                                               [](FoldClass c) { return c.interior != c.silhouette; }) ||
                                   (!parts.classes.empty() && !parts.silhouette_lengths.empty()) || parts.lit;
     // With lights the ranges nest but for rounding, which may lift a child by a class.
     const bool is_monotone = !parts.lit && is_monotone_in(tree, parts);
-    return DistanceCriterion(
-        std::make_shared<const Values>(Values{std::move(parts), tree.interior_count(), uses_silhouettes, is_monotone}));
+    return DistanceCriterion(std::make_shared<const Values>(
+        Values{std::move(parts), std::move(reach), tree.interior_count(), uses_silhouettes, is_monotone}));
 }
+
+struct ChangedCriterion {
+    static Result<DistanceCriterion> of(const VertexTree& tree, const DistanceCriterion& from,
+                                        DistanceCriterion::Parts parts) {
+        return DistanceCriterion::create(tree, std::move(parts), from.values_->reach);
+    }
+};
 
 namespace {
 
@@ -263,7 +329,7 @@ Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterio
         return invalid_argument("The criterion, or what is to be kept, is not of this tree.");
     DistanceCriterion::Parts parts = criterion.parts();
     if (const auto done = keep(tree, parts, kept); !done) return done.error();
-    return DistanceCriterion::create(tree, std::move(parts));
+    return ChangedCriterion::of(tree, criterion, std::move(parts));
 }
 
 Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
@@ -274,7 +340,7 @@ Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceC
     if (parts.lit) return invalid_argument("Criteria with lights cannot fold what a picture hides.");
     if (const auto given = give_row(parts, tree.interior_count(), DistanceCriterion::never_visible, hidden); !given)
         return given.error();
-    return DistanceCriterion::create(tree, std::move(parts));
+    return ChangedCriterion::of(tree, criterion, std::move(parts));
 }
 
 } // namespace unseen::vdtree

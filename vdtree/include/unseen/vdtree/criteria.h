@@ -70,13 +70,25 @@ public:
     bool uses_gaze() const noexcept { return parts().eccentricity_bins > 1; }
     bool is_copy_of(const DistanceCriterion& other) const noexcept { return values_ == other.values_; }
 
+    // How far beyond its sphere a node's triangles may be drawn, by interior node. A flat part folds from wherever one
+    // looks, so its triangles may be as long as it; then what folds beside it shows as far. Nodes are outside a frustum or
+    // behind an occluder if they are with that around them. Not known of criteria with lights.
+    struct Reach {
+        float longest = 0;                      // mesh units
+        std::vector<std::uint8_t> octaves = {}; // 0: nowhere; else longest * 2^(octaves - 63); empty: nowhere for all
+    };
+    const Reach& reach() const noexcept { return *values_->reach; }
+
 private:
     struct Values {
         Parts parts;
+        std::shared_ptr<const Reach> reach;
         NodeId interior_count;
         bool uses_silhouettes, is_monotone;
     };
     explicit DistanceCriterion(std::shared_ptr<const Values> values) : values_(std::move(values)) {}
+    static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts, std::shared_ptr<const Reach> reach);
+    friend struct ChangedCriterion; // keeps the reach
 
     std::shared_ptr<const Values> values_;
 };

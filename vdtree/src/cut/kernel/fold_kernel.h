@@ -23,6 +23,7 @@ inline constexpr float kept_length = 1e30f;
 struct KernelView {
     float eye_high[3], eye_low[3]; // the eye in two floats each: differences to it stay good near and far
     float spread = 0;              // eyes may lie so far from there: spheres count as so much larger
+    float reach = 0;               // the longest; see DistanceCriterion::Reach
     float gaze[3];                 // unit
     bool has_gaze = false;
     // Planes of the frusta, relative to the eye: normal . (p - eye) + offset; those of frustum f are
@@ -60,6 +61,7 @@ struct NodeArrays {
     const FoldClass* classes = nullptr;
     const NormalSlabs* facing = nullptr;                           // null: those of the bounds
     const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
+    const std::uint8_t* reach = nullptr;                           // octaves; null: nowhere
 };
 
 // What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
@@ -80,7 +82,7 @@ struct alignas(64) FoldCandidate {
     FoldClass rows;
     Sphere ring;                  // whose facing counts
     NormalSlabs slabs;            // of the directions in the ring
-    std::uint8_t flags = 0;       // NodeFlags
+    std::uint8_t flags = 0;       // NodeFlags; above these two bits, the reach's octaves
     bool is_unfolded : 1 = false; // for the one who keeps it; tests do not ask
     bool is_waiting : 1 = false;  // likewise: to be unfolded
     NodeId node = no_node;

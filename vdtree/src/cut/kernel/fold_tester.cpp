@@ -34,7 +34,8 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
                data_of(parts.classes),
                data_of(parts.facing),
                data_of(parts.lengths),
-               data_of(parts.silhouette_lengths)};
+               data_of(parts.silhouette_lengths),
+               data_of(criterion.reach().octaves)};
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
     switch_distance_.resize(parts.switch_distance.size());
     for (std::size_t i = 0; i < parts.switch_distance.size(); ++i) {
@@ -47,6 +48,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     view_.bins = static_cast<std::int32_t>(parts.eccentricity_bins);
     view_.bins_per_radian = static_cast<float>(180 / (std::numbers::pi * parts.bin_degrees));
     view_.inverse_threshold = 1 / threshold;
+    view_.reach = criterion.reach().longest;
     view_.near_ones_too = cull_back_faces;
     view_.is_inside_out = tree.closedness() == Closedness::closed_inward;
     view_.nobody = !cull_back_faces && !criterion.uses_silhouettes();
@@ -94,7 +96,8 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
     if (arrays_.classes) candidate.rows = arrays_.classes[node];
     candidate.ring = around.ring;
     candidate.slabs = arrays_.facing ? arrays_.facing[node] : around.slabs;
-    candidate.flags = around.flags;
+    candidate.flags = around.flags & (irregular_ring | translucent_ring);
+    if (arrays_.reach) candidate.flags = static_cast<std::uint8_t>(candidate.flags | arrays_.reach[node] << 2);
     candidate.node = node;
     return candidate;
 }
@@ -106,6 +109,7 @@ void FoldTester::prefetch(NodeId node) const {
     if (arrays_.facing) vdtree::prefetch(arrays_.facing + node);
     if (arrays_.lengths) vdtree::prefetch(arrays_.lengths + node);
     if (arrays_.silhouette_lengths) vdtree::prefetch(arrays_.silhouette_lengths + node);
+    if (arrays_.reach) vdtree::prefetch(arrays_.reach + node);
     if (lit_) lit_->prefetch(node);
 }
 

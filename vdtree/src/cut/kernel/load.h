@@ -13,6 +13,10 @@ UNSEEN_INLINE Floats load_values(const float* from, At at) {
     return collect<Floats>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return from[at(lane)]; });
 }
 
+UNSEEN_INLINE Floats reach_of(const KernelView& view, const Ints& octaves) {
+    return octaves > 0 ? view.reach * reinterpret_cast<Floats>((octaves + (127 - 63)) << 23) : all(0);
+}
+
 // `at(lane)` is a lane's node.
 template <class At>
 UNSEEN_INLINE Nodes load_nodes(const KernelView& view, const NodeArrays& arrays, At at) {
@@ -23,6 +27,11 @@ UNSEEN_INLINE Nodes load_nodes(const KernelView& view, const NodeArrays& arrays,
     nodes.length = arrays.lengths ? load_values(arrays.lengths, at) : nodes.radius;
     nodes.silhouette_length = arrays.silhouette_lengths ? load_values(arrays.silhouette_lengths, at) : nodes.length;
     nodes.radius += view.spread; // the lengths are those of the node itself
+    nodes.reach = all(0);
+    if (arrays.reach)
+        nodes.reach = reach_of(view, collect<Ints>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
+                                   return static_cast<std::int32_t>(arrays.reach[at(lane)]);
+                               }));
     nodes.interior_row = nodes.silhouette_row = Ints{};
     if (arrays.classes) {
         nodes.interior_row = collect<Ints>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
@@ -56,7 +65,8 @@ UNSEEN_INLINE Candidates load_candidates(const KernelView& view, At at) {
             c + 4 * quarter);
     const auto bits = [&](std::size_t column) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<Ints>(c[column]); };
     const Ints interior_row = bits(6) & 0xffff, silhouette_row = (bits(6) >> 16) & 0xffff;
-    return {{{c[0], c[1], c[2]}, c[3] + view.spread, c[4], c[5], interior_row, silhouette_row},
+    const Floats reach = reach_of(view, (bits(14) >> 18) & 63);
+    return {{{c[0], c[1], c[2]}, c[3] + view.spread, c[4], c[5], reach, interior_row, silhouette_row},
             {c[7], c[8], c[9]},
             c[10] + view.spread,
             {{bits(11), bits(12), bits(13), bits(14)}}};
@@ -69,6 +79,7 @@ UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {
     if (arrays.facing) prefetch(arrays.facing + node);
     if (arrays.lengths) prefetch(arrays.lengths + node);
     if (arrays.silhouette_lengths) prefetch(arrays.silhouette_lengths + node);
+    if (arrays.reach) prefetch(arrays.reach + node);
 }
 
 // Nodes by their places in a list; beyond its end the last one again.

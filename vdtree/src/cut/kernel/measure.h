@@ -20,6 +20,7 @@ UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const I
 // What is tested: spheres, lengths, and rows of the criterion's table.
 struct Nodes {
     Floats centre[3], radius, length, silhouette_length; // the radius with the eyes' spread
+    Floats reach;                                        // beyond the radius
     Ints interior_row, silhouette_row;
 };
 // How that looks from the eye.
@@ -97,7 +98,7 @@ UNSEEN_INLINE Measures measures_of(const KernelView& view, const Nodes& of) {
         view.nobody ? m.interior : max_of(m.interior, distances(view, of.silhouette_row, m.bin, of.silhouette_length));
 
     const Ints is_kept = of.silhouette_length >= all(kept_length); // wherever it is
-    const Floats own_radius = of.radius - view.spread;             // frusta are where they are
+    const Floats own_radius = of.radius - view.spread + of.reach;  // frusta are where they are
     m.height = is_kept ? all(huge) : height(view, m.to_eye) + own_radius;
     m.uncovered = all(huge);
     // Far nodes fold anyway.
