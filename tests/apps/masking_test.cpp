@@ -348,7 +348,8 @@ TEST_F(MaskedSceneTest, BarsBeforeAModelMaskItTheFinerTheyAre) {
     double last = open;
     for (const double bars_per_unit : {1.0, 5.0, 12.0}) { // 0.3 to 3.5 cpd
         const double with = kept(grate(bars_per_unit, 1.5), masked).triangles;
-        EXPECT_LE(with, 1.0001 * last) << bars_per_unit; // what is beside flatter parts folds farther outside the window
+        EXPECT_LE(with, 1.0001 * last)
+            << bars_per_unit; // what is beside flatter parts folds farther outside the window
         last = with;
     }
     EXPECT_LT(last, 0.9 * open);
