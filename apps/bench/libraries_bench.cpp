@@ -46,8 +46,7 @@ std::vector<Cell> row_of_build(const std::string& file, const vdtree::Mesh& orig
     constexpr std::size_t kept_one_in = 10; // triangles of the cut that is compared
     const auto budget = static_cast<vdtree::Index>(std::max<std::size_t>(1, original.triangles.size() / kept_one_in));
     const vdtree::Mesh small = cut_to(tree, budget);
-    const double error = small.triangles.empty() ? std::numeric_limits<double>::quiet_NaN()
-                                                 : 1e6 * mean_surface_distance(original, small);
+    const double error = 1e6 * mean_surface_distance(original, small);
     const double mib = report.value("peak_bytes", 0.0) / (1 << 20);
     const Json repair = report.value("repair", Json());
     const auto bad_edges = examined.boundary_edges + examined.non_manifold_edges + examined.inconsistent_edges;

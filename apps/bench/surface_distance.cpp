@@ -82,6 +82,7 @@ double SurfaceDistance::operator()(glm::dvec3 p) const {
 }
 
 double mean_surface_distance(const vdtree::Mesh& original, const vdtree::Mesh& simple) {
+    if (simple.triangles.empty()) return std::numeric_limits<double>::quiet_NaN();
     glm::dvec3 low = original.positions[0], high = low;
     for (const glm::dvec3& p : original.positions) {
         low = glm::min(low, p);

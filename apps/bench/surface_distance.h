@@ -27,7 +27,8 @@ private:
     std::vector<std::vector<vdtree::Index>> lists_; // of triangles
 };
 
-// The mean over vertices of the original, some 20,000 at equal steps, as a share of its largest extent.
+// The mean over vertices of the original, some 20,000 at equal steps, as a share of its largest extent; NaN if nothing is
+// left.
 double mean_surface_distance(const vdtree::Mesh& original, const vdtree::Mesh& simple);
 
 } // namespace unseen::app
