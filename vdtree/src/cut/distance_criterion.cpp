@@ -199,10 +199,10 @@ std::shared_ptr<const DistanceCriterion::Reach> find_reach(const VertexTree& tre
     const float longest = *std::max_element(widths.begin(), widths.end());
     if (!(longest > 0) || !std::isfinite(longest)) return reach;
     reach->longest = longest;
-    constexpr int most_octaves = 63;
+    constexpr float most_octaves = 63;
     for (const float width : widths)
         reach->octaves.push_back(static_cast<std::uint8_t>(
-            width > 0 ? std::max(1, most_octaves - static_cast<int>(std::log2(longest / width))) : 0));
+            width > 0 ? std::max(1.0f, most_octaves - std::floor(std::log2(longest / width))) : 0.0f));
     return reach;
 }
 
