@@ -15,13 +15,12 @@ using vdtree::NodeId;
 // for the rows' numbers, begin again with coarser ones.
 class SwitchDistances {
 public:
-    // `compactness`: of the mesh, see there. `added`: rows that add() will ask for.
+    // `added`: rows that add() will ask for.
     SwitchDistances(const PatternLevels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
-                    const Surround& surround, const BandElevation& masking, float compactness, std::size_t bins,
-                    std::size_t added)
+                    const Surround& surround, const BandElevation& masking, std::size_t bins, std::size_t added)
         : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround), masking_(masking),
-          compactness_(compactness), bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins),
-          most_patterns_(last_row - added), discs_(pattern_luminance_count), eyes_(pattern_luminance_count) {
+          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
+          discs_(pattern_luminance_count), eyes_(pattern_luminance_count) {
         begin();
     }
 
@@ -137,7 +136,7 @@ private:
     // more of the mesh in it than one that all of the mesh fills, and what lies in a narrower one is seen no less.
     template <class F>
     void for_each_bias(const Pattern& p, F&& f) const {
-        const float filled = compactness_ * std::exp2(static_cast<float>(p.quarters) / 4);
+        const float filled = static_cast<float>(surround_.compactness) * std::exp2(static_cast<float>(p.quarters) / 4);
         for (int quarters = p.quarters; quarters >= 4; quarters = (quarters - 1) / 4 * 4) {
             const int contrast = p.bias - (quarters * p.fading * pattern_contrasts_per_octave / 2 + 3) / 4;
             if (contrast >= 0) f(contrast, std::min(std::exp2(static_cast<float>(quarters) / 4), filled));
@@ -164,7 +163,6 @@ private:
     const FoldModel& model_;
     const Surround surround_;
     const BandElevation& masking_;
-    const float compactness_;
     const PatternBands bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
@@ -297,7 +295,7 @@ public:
         pattern = switch_distances_.simplified(pattern);
         patch.row = switch_distances_.row(pattern);
         if (!(error.thickness > 0)) return patch;
-        // Of a narrow ring, one half becomes brighter and the other darker.
+        // One half of a narrow ring becomes brighter, the other darker.
         ShownFold thin{.pattern = {.luminance = levels_.luminance_level(middle)}, .length = error.thickness / 4};
         thin.pattern.largest = thin.pattern.typical =
             levels_.contrast_level(change(node, error.thin_luminance, moved, 0), middle);
@@ -453,8 +451,7 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const Surround surround = surround_of(tree, options);
-    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking,
-                                     static_cast<float>(surround.compactness), parts.eccentricity_bins,
+    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking, parts.eccentricity_bins,
                                      measured_stages.size());
     std::optional<ShownFolds> shown;
     while (!(shown = find_shown(as_lit, options, csf, screen.highest_cpd, switch_distances)))

@@ -121,7 +121,7 @@ inline Surround surround_of(const vdtree::SoundTree& tree, const FoldTestOptions
     }
     const double radius = static_cast<double>(tree.bounding_sphere().radius), disc = std::numbers::pi * radius * radius;
     const float darkest = options.scene.behind ? options.scene.behind->lo : options.scene.darkest;
-    // Of a closed surface, half faces away from wherever one looks.
+    // Half of a closed surface faces away from wherever one looks.
     const double most = tree.closedness() == vdtree::Closedness::open ? area : area / 2;
     return {to_luminance(options.display, static_cast<double>(darkest)).value(),
             disc > 0 ? std::min(1.0, area / 4 / disc) : 1, disc > 0 ? std::sqrt(std::min(1.0, most / disc)) : 1};

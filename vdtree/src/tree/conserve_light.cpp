@@ -67,7 +67,7 @@ private:
             for (std::size_t k = 0; k < 3; ++k) {
                 const bool is_of_node = mesh_.corners(t)[k] == node;
                 sum += is_single && is_of_node ? 0 : luminance_[wedges[k]];
-                if (is_of_node)
+                if (is_of_node && !is_single)
                     for (const WedgeId w : wedges) include(shown_[wedges[k] - first], luminance_[w]);
             }
             others += sum / 3 * of_triangle;

@@ -70,9 +70,9 @@ public:
     bool uses_gaze() const noexcept { return parts().eccentricity_bins > 1; }
     bool is_copy_of(const DistanceCriterion& other) const noexcept { return values_ == other.values_; }
 
-    // How far beyond its sphere a node's triangles may be drawn, by interior node. A flat part folds from wherever one
-    // looks, so its triangles may be as long as it; then what folds beside it shows as far. Nodes are outside a frustum or
-    // behind an occluder if they are with that around them. Not known of criteria with lights.
+    // How far beyond its sphere a node's triangles may be drawn, by interior node. Flat parts fold wherever the eye is, and
+    // their triangles become as long as the part; a fold beside it moves them. So a node is outside a frustum or behind an
+    // occluder only if its sphere is, widened by that much. Criteria with lights do not know it.
     struct Reach {
         float longest = 0;                      // mesh units
         std::vector<std::uint8_t> octaves = {}; // 0: nowhere; else longest * 2^(octaves - 63); empty: nowhere for all
