@@ -1,8 +1,25 @@
 #include "judged_model.h"
 
+#include <algorithm>
+
 #include "bench_tools.h"
 
 namespace unseen::app {
+
+session::PictureVerdict CarefulJudge::judge(session::SceneRenderer& renderer, std::span<const vdtree::Cut> cuts) {
+    session::PictureVerdict verdict;
+    for (const int samples : {samples_to_judge, 4 * samples_to_judge}) {
+        auto judge = judges_.find(samples);
+        if (judge == judges_.end()) {
+            auto made = require(session::PictureJudge::create(renderer_, session_, view_, samples));
+            judge = judges_.emplace(samples, std::move(made)).first;
+        }
+        const render::DrawOptions drawing = judge->second.drawing();
+        verdict = require(judge->second.judge(require(renderer.draw(session::drawn_cuts(cuts), view_, drawing))));
+        if (verdict.shows_nothing() || std::max(verdict.v, verdict.second_v) >= 2) break;
+    }
+    return verdict;
+}
 
 JudgedModel::JudgedModel(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px)
     : context_(context), name_(std::move(name)), window_px_(window_px), plain_(make_stand(std::move(tree))) {}
@@ -59,11 +76,9 @@ Seen JudgedModel::judge(const vdtree::Cut& cut) { return judge(stand(FoldTest::e
 Seen JudgedModel::judge(Stand& stand, std::span<const vdtree::Cut> cuts) {
     if (!judge_) {
         plain_.session->set_gaze(look_.gaze_px ? std::optional(session::Gaze{*look_.gaze_px}) : std::nullopt);
-        judge_ = std::make_unique<session::PictureJudge>(
-            require(session::PictureJudge::create(plain_.renderer, *plain_.session, view_, samples_to_judge)));
+        judge_.emplace(plain_.renderer, *plain_.session, view_);
     }
-    const render::Frame frame = require(stand.renderer->draw(session::drawn_cuts(cuts), view_, judge_->drawing()));
-    return {cuts.front().triangle_count(), require(judge_->judge(frame))};
+    return {cuts.front().triangle_count(), judge_->judge(*stand.renderer, cuts)};
 }
 
 } // namespace unseen::app

@@ -1,6 +1,7 @@
 // A model whose simplifications are drawn and judged, view by view.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,24 @@ struct Look {
     std::optional<glm::dvec2> gaze_px = {};
     perception::Display display = {}; // flat
     std::optional<perception::Luminance> background = {};
+};
+
+// Judges pictures of a view of 64 samples a pixel, whose steps by themselves may show where pixels are coarse and the
+// background is dark. So what shows, but by less than twice the threshold, is drawn again with 256 and judged by these.
+class CarefulJudge {
+public:
+    // The full model of the session, as this renderer of it draws it.
+    CarefulJudge(std::shared_ptr<session::SceneRenderer> renderer, const session::Session& session,
+                 const vdtree::View& view)
+        : renderer_(std::move(renderer)), session_(session), view_(view) {}
+
+    session::PictureVerdict judge(session::SceneRenderer& renderer, std::span<const vdtree::Cut> cuts);
+
+private:
+    std::shared_ptr<session::SceneRenderer> renderer_;
+    const session::Session& session_;
+    vdtree::View view_;
+    std::map<int, session::PictureJudge> judges_; // by samples
 };
 
 // What was seen of a cut, by both judges of the default observer.
@@ -60,7 +79,7 @@ private:
     Look look_;
     vdtree::View view_;
     Stand plain_, measured_; // the second when it is first asked for
-    std::unique_ptr<session::PictureJudge> judge_;
+    std::optional<CarefulJudge> judge_;
 };
 
 } // namespace unseen::app

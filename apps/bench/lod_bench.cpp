@@ -8,6 +8,7 @@
 
 #include "bench_tools.h"
 #include "benches.h"
+#include "judged_model.h"
 #include "peer_simplify.h"
 #include "session_options.h"
 #include "terminal.h"
@@ -70,12 +71,9 @@ void add_model(const render::Context& context, const std::string& model, BenchTa
         for (const glm::dvec3& direction :
              session::lod_directions(session::usual_lod_directions, other_directions + level)) {
             const vdtree::View seen = session::lod_view(lod, object.sphere, direction, distance);
-            auto judge = require(session::PictureJudge::create(renderer, session, seen, lod.samples));
-            ours.add(require(judge.judge(cuts)));
-            if (!peer) continue;
-            const auto whole = session::whole_cuts(peer->session);
-            theirs.add(
-                require(judge.judge(require(peer->renderer.draw(session::drawn_cuts(whole), seen, judge.drawing())))));
+            CarefulJudge judge(renderer, session, seen);
+            ours.add(judge.judge(*renderer, cuts));
+            if (peer) theirs.add(judge.judge(peer->renderer, session::whole_cuts(peer->session)));
         }
         const Cell empty("-", Json());
         table.rows.push_back({{level == 0 ? name : "", name},
