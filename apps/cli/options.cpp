@@ -383,6 +383,10 @@ void add_hiding_option(CLI::App& verb, WhatOptions& o) {
         verb, "--visibility", o.hiding, {{"spheres", Hiding::spheres}, {"picture", Hiding::picture}},
         "What counts as hidden: what faces away or lies behind spheres inside solids (spheres), or "
         "also what lies behind anything in the picture (picture)");
+    add_choice<session::Order, session::Order>(
+        verb, "--order", o.request.order, {{"sum", session::Order::sum}, {"largest", session::Order::largest}},
+        "What --triangles makes least in a picture: the error that adds up in it, which goes by what the picture shows "
+        "(sum, default), or the largest cost of a fold (largest)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {

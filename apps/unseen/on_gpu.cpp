@@ -9,9 +9,12 @@ namespace unseen::app {
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context) {
-    if (what.hiding == Hiding::spheres && !what.masks) return session.simplify(view, request);
+    const bool is_summed = request.goal.kind == Goal::Kind::budget && request.order == session::Order::sum &&
+                           request.fold_test.value_or(FoldTest::error) == FoldTest::error &&
+                           request.purpose == session::Purpose::picture && !view.orthographic_height;
+    if (what.hiding == Hiding::spheres && !what.masks && !is_summed) return session.simplify(view, request);
     session::AsSeenOptions options;
-    options.folds_hidden = what.hiding == Hiding::picture;
+    options.folds_hidden = what.hiding == Hiding::picture || is_summed;
     options.masking = what.masks ? session::Masking::scene : session::Masking::none;
     if (context) return session::simplify_as_seen(session, *context, view, request, options);
     const auto own = render::Context::headless();

@@ -71,6 +71,39 @@ TEST_F(AsSeen, FoldsWhatIsBehindAndShowsTheSame) {
     }
 }
 
+// Of luminance, over the picture.
+double squared_error(const perception::Image& a, const perception::Image& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.values.size(); ++i) sum += std::pow(a.values[i] - b.values[i], 2.0);
+    return sum;
+}
+
+TEST_F(AsSeen, BudgetsMakeTheSumOfErrorsLeast) {
+    Session session = session_of(ball_behind_wall());
+    const vdtree::View view = view_of(session, {-0.3, 0.2, 1});
+    vdtree::Cut whole(session.tree());
+    whole.unfold_all();
+    const perception::Image full = picture_of(context_, session, whole, view);
+    for (const vdtree::Index budget : {2'000u, 800u, 300u}) {
+        const auto simplified = [&](Order order) {
+            return require(simplify_as_seen(
+                session, context_, view, {.goal = Goal::budget(budget), .purpose = Purpose::picture, .order = order}));
+        };
+        const auto sum = simplified(Order::sum), largest = simplified(Order::largest);
+        EXPECT_LE(sum->stats.triangles, budget);
+        EXPECT_GE(sum->stats.triangles, 0.9 * budget);
+        EXPECT_LT(squared_error(picture_of(context_, session, sum->cuts[0], view), full),
+                  0.7 * squared_error(picture_of(context_, session, largest->cuts[0], view), full))
+            << budget;
+        EXPECT_TRUE(std::isfinite(sum->imperceptible_from_m));
+        for (const auto* made : {&*sum, &*largest}) {
+            const auto effect = std::ranges::find(made->effects, "sum of errors", &Effect::name);
+            ASSERT_NE(effect, made->effects.end());
+            EXPECT_EQ(effect->on, made == &*sum);
+        }
+    }
+}
+
 TEST_F(AsSeen, DepthsAreThoseOfTheFarthestSample) {
     const VertexTree tree = support::built(shapes::icosphere(5));
     vdtree::View view;

@@ -45,8 +45,8 @@ int change(Question& q, int number) {
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 
-    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, shown, masking, keeps_shadows,
-           may_measure, reasons] = q.request;
+    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, order, shown, masking,
+           keeps_shadows, may_measure, reasons] = q.request;
     set(goal, Goal::full());
     set(goal, Goal::budget(400));
     set(goal, Goal::budget(400, true));
@@ -57,6 +57,7 @@ int change(Question& q, int number) {
     set(threshold, 3.0);
     set(hysteresis, 2.0f);
     set(purpose, session::Purpose::picture);
+    set(order, session::Order::largest);
     set(keeps_shadows, false);
     set(may_measure, false);
     set(reasons, false);

@@ -94,7 +94,7 @@ TEST(CutRings, HoldEveryTriangleOfEveryCut) {
         for (const ClustererKind clusterer : {ClustererKind::quadric, ClustererKind::octree}) {
             const VertexTree tree = built(mesh, {.clusterer = clusterer});
             const CutRings rings = *bound_cut_rings(tree);
-            for (int trial = 0; trial < 60; ++trial) {
+            for (int trial = 0; trial < 24; ++trial) {
                 const Looked here = expect_within_rings(random_cut(tree, random), rings);
                 looked.at += here.at;
                 looked.outside_of_mesh_rings += here.outside_of_mesh_rings;
@@ -148,7 +148,7 @@ TEST(LitCutRings, HoldWhatLightsMakeOfEveryTriangleOfEveryCut) {
         const VertexTree tree = built(mesh);
         const LightBounds rings = *bound_lit_cut_rings(tree, *bound_cut_rings(tree)),
                           mesh_rings = *LightBounds::measure(tree);
-        for (int trial = 0; trial < 40; ++trial) {
+        for (int trial = 0; trial < 16; ++trial) {
             const Lighting lighting = random_lighting(of_lights, tree);
             const glm::dvec3 eye =
                 3.0 * static_cast<double>(tree.bounding_sphere().radius) * shapes::random_direction(of_lights);

@@ -130,6 +130,38 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     }
 }
 
+TEST(DepthPicture, ShowsADiscOfABall) {
+    const VertexTree tree = support::built(shapes::icosphere(5));
+    View view;
+    view.eye = {0, 0, 40};
+    view.fov_y_degrees = 4;
+    view.width = view.height = 256;
+    const double focal = 128 / std::tan(2 * std::numbers::pi / 180), radius = focal / std::sqrt(40.0 * 40 - 1);
+    const double disc = std::numbers::pi * radius * radius, circle = 2 * std::numbers::pi * radius;
+    for (const bool is_covered : {false, true}) { // its left half, by a plate
+        std::vector<float> depth(256 * 256, infinity);
+        for (int y = 0; y < 256; ++y)
+            for (int x = 0; x < 256; ++x) {
+                const glm::dvec2 at = glm::dvec2(x - 127.5, y - 127.5) / focal * 40.0;
+                float& here = depth[static_cast<std::size_t>(256 * y + x)];
+                if (glm::dot(at, at) < 1) here = static_cast<float>(40 - std::sqrt(1 - glm::dot(at, at)));
+                if (is_covered && x < 128) here = 20;
+            }
+        const DepthPicture picture = *DepthPicture::create(view, depth);
+        for (const bool only_front : {true, false}) { // the back is behind the front
+            const auto shown = require(find_shown(tree, {}, picture, only_front));
+            const double share = is_covered ? 0.5 : 1;
+            EXPECT_NEAR(shown->area[0], share * disc, 0.05 * disc) << only_front;
+            EXPECT_NEAR(shown->outline[0], share * circle, 0.06 * circle);
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                const Sphere& support = tree.support_spheres()[node];
+                if (support.centre.z + tree.origin().z + static_cast<double>(support.radius) < -0.2)
+                    EXPECT_EQ(shown->area[node] + shown->outline[node], 0) << node;
+            }
+        }
+    }
+}
+
 TEST(DepthPicture, RefusesWhatIsNone) {
     const View view = small_view();
     std::vector<float> depth(static_cast<std::size_t>(view.width * view.height), 1.0f);

@@ -228,6 +228,11 @@ Reason hidden_folding(const Cutting& c) {
                                 " spheres inside the solid is folded")};
 }
 
+Reason summed(const Cutting& c) {
+    if (const char* why = why_not_summed(c.sight, c.decision)) return {false, why};
+    return {true, "what folds change in the picture adds up to the least, as far as nothing sticks out"};
+}
+
 Reason masking(const Cutting& c) {
     if (c.decision.masking)
         return {true, "folds are tested against thresholds that the scene around the object raises in this view, by " +
@@ -274,6 +279,7 @@ constexpr EffectRow effect_rows[] = {
 constexpr EffectRow rows_of_folds[] = {
     {"back-face folding", Needs::picture, from_elsewhere, back_face_folding},
     {"hidden folding", Needs::picture, from_elsewhere, hidden_folding},
+    {"sum of errors", Needs::picture, "what adds up is seen in a picture alone", summed},
     {"masking", Needs::nothing, "", masking},
     {"time limit", Needs::nothing, "", time_limit},
 };

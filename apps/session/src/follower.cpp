@@ -73,7 +73,9 @@ public:
         const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
         report.adapt_ms = vdtree::ms_since(start);
         if (!stats) return stats.error();
-        conclude(report, *prepared, *stats);
+        std::vector<vdtree::AdjustStats> by_fold_test = *stats;
+        if (const auto judged = judge_by_fold_test(by_fold_test); !judged) return judged.error();
+        conclude(report, *prepared, by_fold_test);
 
         const auto adapted = vdtree::Clock::now();
         if (glide_s_)
@@ -185,8 +187,7 @@ private:
         std::vector<vdtree::SceneObject> objects;
         for (Followed& object : objects_) {
             CutRecipe& recipe = *object.recipe;
-            objects.push_back(
-                {*object.cut, *recipe.criterion, std::move(recipe.viewpoint), recipe.options.cull_back_faces});
+            objects.push_back({*object.cut, *recipe.criterion, recipe.viewpoint, recipe.options.cull_back_faces});
         }
         return vdtree::follow_scene(objects, request.goal.triangles);
     }
@@ -216,6 +217,23 @@ private:
             object.test_out_of_sight = decision.test;
         }
         return stats;
+    }
+
+    // From how far nobody sees a difference, the fold test says, whatever else a criterion counts.
+    Result<void> judge_by_fold_test(std::vector<vdtree::AdjustStats>& stats) const {
+        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            const Followed& object = objects_[i];
+            if (!object.recipe || !object.recipe->fold_test) continue;
+            const vdtree::VertexTree& tree = object.cut->tree();
+            const auto costs = vdtree::find_every_cost(tree, *object.recipe->fold_test, object.recipe->viewpoint,
+                                                       object.recipe->options);
+            if (!costs) return costs.error();
+            float largest = 0;
+            for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+                if (object.cut->is_active(node)) largest = std::max(largest, (*costs)[node]);
+            stats[i].max_fold_cost = largest;
+        }
+        return {};
     }
 
     void conclude(Report& report, Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const {

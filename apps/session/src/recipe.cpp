@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/node_bits.h>
+
 #include "shadow_outlines.h"
 
 namespace unseen::session {
@@ -108,6 +110,55 @@ bool folds_unseen(const Sight& sight, const Decision& decision) {
     return decision.request.shown && is_perceptual(decision) && !is_translucent(sight);
 }
 
+const char* why_not_summed(const Sight& sight, const Decision& decision) {
+    if (decision.request.goal.kind != Goal::Kind::budget) return "the goal is no budget";
+    if (decision.request.order != Order::sum) return "it is not asked for";
+    if (decision.test != FoldTest::error) return "only the fold test error measures what adds up";
+    if (!folds_unseen(sight, decision)) return "what a picture shows of each part is not known";
+    return nullptr;
+}
+
+namespace {
+
+using SharedCriterion = std::shared_ptr<const vdtree::DistanceCriterion>;
+
+// The criterion that folds what the view hides, and for budgets by the sum one that also counts what adds up.
+Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision, const vdtree::DistanceCriterion& own,
+                                   CutRecipe& recipe) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const auto share = [](auto made) { return std::make_shared<const vdtree::DistanceCriterion>(std::move(*made)); };
+    const auto hidden = vdtree::find_hidden(tree, sight.object.placement, *decision.request.shown);
+    if (!hidden) return hidden.error();
+    auto without_hidden = vdtree::folding_hidden(tree, own, *hidden);
+    if (!without_hidden) return without_hidden.error();
+    recipe.criterion = share(std::move(without_hidden));
+    if (why_not_summed(sight, decision)) return {};
+    const auto shown =
+        vdtree::find_shown(tree, sight.object.placement, *decision.request.shown, recipe.options.cull_back_faces);
+    if (!shown) return shown.error();
+    // Nothing of it is shown before it folds. That something would be afterwards, only what hides it for sure excludes.
+    std::vector<std::uint64_t> not_shown = *hidden;
+    for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
+        if (shown->area[node] == 0 && shown->outline[node] == 0) vdtree::set_bit(not_shown, node);
+    auto without = vdtree::folding_hidden(tree, own, not_shown);
+    if (!without) return without.error();
+    std::optional<vdtree::VertexTree> lit;
+    if (sight.lighting) {
+        auto under = sight.cache.lit_folds->under(tree, *sight.lighting);
+        if (!under) return under.error();
+        lit = under->share();
+    }
+    const auto costs = perception::summed_costs(lit ? *lit : tree, *shown, sight.view, sight.object.placement,
+                                                test_options(sight, decision.request));
+    if (!costs) return costs.error();
+    auto summed = vdtree::costing_at_least(tree, *without, recipe.viewpoint, *costs);
+    if (!summed) return summed.error();
+    recipe.fold_test = std::exchange(recipe.criterion, share(std::move(summed)));
+    return {};
+}
+
+} // namespace
+
 Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
     // What a view masks is of that view alone.
@@ -130,17 +181,17 @@ Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
         recipe.criterion = std::move(*with_outlines);
         return recipe;
     }
-    const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
-    if (!hidden) return hidden.error();
-    auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
-    if (!without) return without.error();
+    if (const auto made = fold_by_what_is_shown(sight, decision, kept->criterion, recipe); !made) return made.error();
     if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
         find_shadowing_outlines(sight, decision, kept);
         shadow_of(sight).criterion.reset();
-        without = vdtree::keeping(sight.object.tree, *without, shadow_of(sight).kept);
-        if (!without) return without.error();
+        for (SharedCriterion* const criterion : {&recipe.criterion, &recipe.fold_test}) {
+            if (!*criterion) continue;
+            auto with_outlines = vdtree::keeping(sight.object.tree, **criterion, shadow_of(sight).kept);
+            if (!with_outlines) return with_outlines.error();
+            *criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*with_outlines));
+        }
     }
-    recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));
     return recipe;
 }
 

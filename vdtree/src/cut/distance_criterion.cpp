@@ -2,6 +2,8 @@
 
 #include <numbers>
 
+#include <glm/geometric.hpp>
+
 #include <unseen/vdtree/internal/contrast_classes.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/node_bits.h>
@@ -340,6 +342,36 @@ Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceC
     if (parts.lit) return invalid_argument("Criteria with lights cannot fold what a picture hides.");
     if (const auto given = give_row(parts, tree.interior_count(), DistanceCriterion::never_visible, hidden); !given)
         return given.error();
+    return ChangedCriterion::of(tree, criterion, std::move(parts));
+}
+
+Result<DistanceCriterion> costing_at_least(const VertexTree& tree, const DistanceCriterion& criterion,
+                                           const Viewpoint& viewpoint, std::span<const float> costs) {
+    const NodeId nodes = tree.interior_count();
+    if (criterion.interior_count() != nodes || costs.size() != nodes)
+        return invalid_argument("The criterion, or what nodes cost, is not of this tree.");
+    DistanceCriterion::Parts parts = criterion.parts();
+    if (parts.lit) return invalid_argument("Criteria with lights cannot have costs of a picture.");
+    if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
+    for (NodeId node = 0; node < nodes; ++node) {
+        const float radius = radius_of(tree, parts, node);
+        if (parts.lengths.size() == node) parts.lengths.push_back(radius);
+        if (parts.silhouette_lengths.size() == node) parts.silhouette_lengths.push_back(radius);
+        const Sphere& sphere =
+            parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring : tree.support_spheres()[node];
+        const double gap =
+            glm::length(glm::dvec3(sphere.centre) - viewpoint.eye) - static_cast<double>(radius) - viewpoint.eye_spread;
+        if (!(gap > 0)) continue; // costs more than anything
+        const FoldClass rows = parts.classes.empty() ? FoldClass{} : parts.classes[node];
+        const auto lengthen = [&](float& length, std::uint16_t row) {
+            const float looked_at = parts.switch_distance[row * parts.eccentricity_bins];
+            if (!(looked_at > 0) || looked_at >= DistanceCriterion::always_visible) return;
+            const double needed = static_cast<double>(costs[node]) * gap / static_cast<double>(looked_at);
+            length = std::max(length, static_cast<float>(std::min(needed, static_cast<double>(kept_length) / 2)));
+        };
+        lengthen(parts.lengths[node], rows.interior);
+        lengthen(parts.silhouette_lengths[node], rows.silhouette);
+    }
     return ChangedCriterion::of(tree, criterion, std::move(parts));
 }
 

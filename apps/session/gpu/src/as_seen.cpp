@@ -257,7 +257,12 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.purpose = Purpose::picture;
     request.shown.reset();
     request.masking.clear();
-    auto all = session.simplify(view, request);
+    // What a budget leaves may be far off the mesh, and then its picture does not tell what of the mesh is shown.
+    Request first = request;
+    const bool is_summed = request.goal.kind == Goal::Kind::budget && request.order == Order::sum &&
+                           request.fold_test.value_or(FoldTest::error) == FoldTest::error && options.folds_hidden;
+    if (is_summed) first.goal = Goal::imperceptible();
+    auto all = session.simplify(view, first);
     if (!all) return all;
     if (const char* why = why_pictures_tell_nothing(session, request, *all)) {
         for (const char* effect : {"occlusion", "layers", "masking", "shadows"})

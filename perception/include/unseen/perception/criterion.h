@@ -4,6 +4,7 @@
 #include <unseen/perception/csf.h>
 #include <unseen/perception/display.h>
 #include <unseen/vdtree/criteria.h>
+#include <unseen/vdtree/depth_picture.h>
 
 namespace unseen::vdtree {
 class LightBounds;
@@ -161,6 +162,23 @@ struct TreeAsLit {
 };
 Result<vdtree::DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, const vdtree::View& view,
                                                   const FoldTestOptions& options);
+
+// For budgets of one picture, by interior node: what folds cost by the errors that add up in it, in units of the costs of
+// error_distances(). They are at least a node's own, do not grow from a node to its children, and nodes of which nothing
+// is shown cost nothing. A budget is met best by costs that are the larger of the two, see vdtree::costing_at_least(): the
+// picture's error is then least, and nothing sticks out.
+//
+// Folding a node errs, in squared relative luminance times square pixels, by
+//     A (m^2 + b^2 v) + max(0.03, v) b^2 h l:
+// A and l are the area and the outline that are shown of it, m the mean difference of luminance, h the shift in pixels, b
+// the difference between its own luminance and what may be behind, and v, from 0 to 1, how much of it vanishes. Prices of
+// triangles follow by optimal pruning; a cost goes with their root, as errors go with the square of a distance.
+//
+// `tree`: as it is lit, with its measurement. `shown`: vdtree::find_shown(). Fails like error_distances(), and on
+// orthographic views. Cost: some 200 ns a node.
+Result<std::vector<float>> summed_costs(const vdtree::VertexTree& tree, const vdtree::ShownParts& shown,
+                                        const vdtree::View& view, const vdtree::Similarity& placement,
+                                        const FoldTestOptions& options);
 
 // The eye and the gaze in the tree's frame, like vdtree's, which has no gaze. If `window_only`, with the view's
 // frustum, outside of which everything folds.

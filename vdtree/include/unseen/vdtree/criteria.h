@@ -30,6 +30,7 @@ struct FoldClass {
 };
 
 struct LitClasses; // for lights that may move; only the library makes these
+struct Viewpoint;
 
 // Copies are cheap and share their values.
 class DistanceCriterion {
@@ -98,6 +99,12 @@ private:
 // viewpoints that show something. Fails if sizes do not fit the tree.
 Result<DistanceCriterion> keeping(const VertexTree& tree, const DistanceCriterion& criterion,
                                   std::span<const std::uint64_t> kept);
+
+// A copy of the criterion for one eye and gaze, under which nodes that cost anything at all cost no less than `costs`, by
+// interior node, which must not grow from a node to its children; aside from the gaze they fall as the criterion's own
+// do. Fails for criteria with lights, and if sizes do not fit the tree.
+Result<DistanceCriterion> costing_at_least(const VertexTree& tree, const DistanceCriterion& criterion,
+                                           const Viewpoint& viewpoint, std::span<const float> costs);
 
 // Node extent, as in VDSlib: folds if the support's sphere spans at most this many pixels at the window's centre. Unfolds
 // if the eye is inside the sphere.

@@ -49,4 +49,17 @@ Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Sim
 Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
                                          std::span<const std::uint64_t> hidden);
 
+// How much of the surface at the leaves below a node a picture shows. By interior node; a node has no less than its
+// children together.
+struct ShownParts {
+    std::vector<float> area;    // square pixels, of triangles; a third of each to each corner
+    std::vector<float> outline; // pixels, of edges between what faces the eye and what does not; a half to each end
+};
+
+// Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines.
+// `only_front`: what faces away is not drawn, for closed surfaces. The picture must show the mesh, or a cut within a pixel
+// of it. Fails if VertexTree::check() fails. Cost: some 400 ns a triangle.
+Result<ShownParts> find_shown(const VertexTree& tree, const Similarity& placement, const DepthPicture& picture,
+                              bool only_front);
+
 } // namespace unseen::vdtree

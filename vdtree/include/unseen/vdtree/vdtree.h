@@ -27,6 +27,7 @@
 #include <unseen/vdtree/depth_picture.h>
 #include <unseen/vdtree/geomorph.h>
 #include <unseen/vdtree/lighting.h>
+#include <unseen/vdtree/pruning.h>
 #include <unseen/vdtree/view.h>
 
 // Errors and callbacks.

@@ -50,6 +50,12 @@ struct Goal {
     static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
 };
 
+// What a budget makes least.
+enum class Order {
+    sum,     // the error that adds up in the picture, see perception::summed_costs(), as far as nothing sticks out
+    largest, // the largest cost of a fold
+};
+
 // What the cut is for.
 enum class Purpose {
     mesh,    // it may be looked at from anywhere
@@ -65,6 +71,9 @@ struct Request {
     double threshold = 1;    // for imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
     float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;
+    // For budgets. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`; without them,
+    // as in followers, the largest cost counts.
+    Order order = Order::sum;
     // For pictures: the depth of this very view. Whatever lies behind it folds, too. simplify_as_seen() in
     // <unseen/session_gpu/as_seen.h> draws it. Under lights only the test `error` uses it.
     std::optional<vdtree::DepthPicture> shown = {};

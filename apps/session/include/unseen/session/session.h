@@ -39,6 +39,8 @@ struct CutRecipe {
     std::shared_ptr<const vdtree::DistanceCriterion> criterion; // the same for views that differ in eye and gaze alone
     vdtree::Viewpoint viewpoint;                                // in the object's frame
     vdtree::FollowOptions options;                              // threshold, budget and time of the request
+    // What folds cost by the fold test alone, where the criterion also counts what adds up in the picture; else null.
+    std::shared_ptr<const vdtree::DistanceCriterion> fold_test = {};
 };
 
 // A scene before an observer. It caches whatever helps the next request: criteria, sensitivity tables, and what is
