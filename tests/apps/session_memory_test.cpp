@@ -45,8 +45,8 @@ int change(Question& q, int number) {
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 
-    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, order, shown, masking,
-           keeps_shadows, may_measure, reasons] = q.request;
+    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, order, shown, masking, keeps_shadows,
+           may_measure, reasons] = q.request;
     set(goal, Goal::full());
     set(goal, Goal::budget(400));
     set(goal, Goal::budget(400, true));
