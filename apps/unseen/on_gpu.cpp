@@ -9,9 +9,8 @@ namespace unseen::app {
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context) {
-    const bool is_summed = request.goal.kind == Goal::Kind::budget && request.order == session::Order::sum &&
-                           request.fold_test.value_or(FoldTest::error) == FoldTest::error &&
-                           request.purpose == session::Purpose::picture && !view.orthographic_height;
+    const bool is_summed =
+        session::goes_by_sum(request) && request.purpose == session::Purpose::picture && !view.orthographic_height;
     if (what.hiding == Hiding::spheres && !what.masks && !is_summed) return session.simplify(view, request);
     session::AsSeenOptions options;
     options.folds_hidden = what.hiding == Hiding::picture || is_summed;

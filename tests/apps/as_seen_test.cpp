@@ -71,7 +71,7 @@ TEST_F(AsSeen, FoldsWhatIsBehindAndShowsTheSame) {
     }
 }
 
-// Of luminance, over the picture.
+// The sum over the picture of squared differences of luminance.
 double squared_error(const perception::Image& a, const perception::Image& b) {
     double sum = 0;
     for (std::size_t i = 0; i < a.values.size(); ++i) sum += std::pow(a.values[i] - b.values[i], 2.0);

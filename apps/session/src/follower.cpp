@@ -70,12 +70,11 @@ public:
         Report report;
         const auto start = vdtree::Clock::now();
         const bool is_shared = prepared->shares_budget();
-        const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
+        auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
         report.adapt_ms = vdtree::ms_since(start);
         if (!stats) return stats.error();
-        std::vector<vdtree::AdjustStats> by_fold_test = *stats;
-        if (const auto judged = judge_by_fold_test(by_fold_test); !judged) return judged.error();
-        conclude(report, *prepared, by_fold_test);
+        if (const auto judged = judge_by_fold_test(*stats); !judged) return judged.error();
+        conclude(report, *prepared, *stats);
 
         const auto adapted = vdtree::Clock::now();
         if (glide_s_)

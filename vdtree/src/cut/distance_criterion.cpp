@@ -150,9 +150,11 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     return true;
 }
 
+const Sphere& sphere_of(const VertexTree& tree, const DistanceCriterion::Parts& parts, NodeId node) {
+    return parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring : tree.support_spheres()[node];
+}
 float radius_of(const VertexTree& tree, const DistanceCriterion::Parts& parts, NodeId node) {
-    return parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring.radius
-                                                             : tree.support_spheres()[node].radius;
+    return sphere_of(tree, parts, node).radius;
 }
 
 // Which nodes unfold only where the eye is nearer than their radius: what is flat.
@@ -354,13 +356,11 @@ Result<DistanceCriterion> costing_at_least(const VertexTree& tree, const Distanc
     if (parts.lit) return invalid_argument("Criteria with lights cannot have costs of a picture.");
     if (parts.silhouette_lengths.empty()) parts.silhouette_lengths = parts.lengths;
     for (NodeId node = 0; node < nodes; ++node) {
-        const float radius = radius_of(tree, parts, node);
-        if (parts.lengths.size() == node) parts.lengths.push_back(radius);
-        if (parts.silhouette_lengths.size() == node) parts.silhouette_lengths.push_back(radius);
-        const Sphere& sphere =
-            parts.spheres == DistanceCriterion::Spheres::ring ? tree.bounds()[node].ring : tree.support_spheres()[node];
-        const double gap =
-            glm::length(glm::dvec3(sphere.centre) - viewpoint.eye) - static_cast<double>(radius) - viewpoint.eye_spread;
+        const Sphere& sphere = sphere_of(tree, parts, node);
+        if (parts.lengths.size() == node) parts.lengths.push_back(sphere.radius);
+        if (parts.silhouette_lengths.size() == node) parts.silhouette_lengths.push_back(sphere.radius);
+        const double gap = glm::length(glm::dvec3(sphere.centre) - viewpoint.eye) - static_cast<double>(sphere.radius) -
+                           viewpoint.eye_spread;
         if (!(gap > 0)) continue; // costs more than anything
         const FoldClass rows = parts.classes.empty() ? FoldClass{} : parts.classes[node];
         const auto lengthen = [&](float& length, std::uint16_t row) {

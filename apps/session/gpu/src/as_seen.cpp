@@ -250,6 +250,11 @@ private:
 
 } // namespace
 
+bool goes_by_sum(const Request& request) {
+    return request.goal.kind == Goal::Kind::budget && request.order == Order::sum &&
+           request.fold_test.value_or(FoldTest::error) == FoldTest::error;
+}
+
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,
                                         Request request, const AsSeenOptions& options) {
     if (auto valid = vdtree::validate_perspective(view, "A simplification by what pictures show"); !valid)
@@ -259,9 +264,7 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.masking.clear();
     // What a budget leaves may be far off the mesh, and then its picture does not tell what of the mesh is shown.
     Request first = request;
-    const bool is_summed = request.goal.kind == Goal::Kind::budget && request.order == Order::sum &&
-                           request.fold_test.value_or(FoldTest::error) == FoldTest::error && options.folds_hidden;
-    if (is_summed) first.goal = Goal::imperceptible();
+    if (goes_by_sum(request) && options.folds_hidden) first.goal = Goal::imperceptible();
     auto all = session.simplify(view, first);
     if (!all) return all;
     if (const char* why = why_pictures_tell_nothing(session, request, *all)) {
