@@ -25,7 +25,7 @@ constexpr OptionName option_names[] = {
     {"request.goal.fill", "--fill-budget"},
     {"request.goal = full", "--full"},
     {"request.milliseconds", "--milliseconds"},
-    {"request.threshold", "--threshold"},
+    {"request.threshold", "--quality"},
     {"observer.csf", "--csf"},
     {"observer.velocity", "--velocity"},
     {"observer.person", "--observer"},

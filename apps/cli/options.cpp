@@ -236,6 +236,27 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, 
     }
 }
 
+// A name, or the cost up to which folds are made.
+static void add_quality_option(CLI::App& verb, session::Request& request) {
+    std::string names, text = "How much of a difference may be left. ";
+    for (const session::QualityFacts& facts : session::qualities()) {
+        names += (names.empty() ? "" : ", ") + std::string(facts.name);
+        text += std::string(facts.name) + ": " + std::string(facts.summary) + "; ";
+    }
+    text += "or the cost up to which folds are made, such as 2: what cannot be seen from twice the distance";
+    const auto take = [&request, names](const std::string& given) {
+        for (const session::QualityFacts& facts : session::qualities())
+            if (facts.name == given) {
+                request.goal = Goal::quality(facts.quality);
+                return;
+            }
+        const auto cost = finite_from(given);
+        if (!cost || !(*cost > 0)) refuse("--quality: must be " + names + ", or a cost above 0, not '" + given + "'");
+        request.threshold = *cost;
+    };
+    verb.add_option_function<std::string>("--quality", take, text)->type_name("NAME|COST");
+}
+
 void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, bool only_perceptual) {
     std::vector<std::pair<std::string, FoldTest>> choices;
     std::string text;
@@ -344,12 +365,10 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
         "--full", [&goal](std::int64_t) { goal.kind = Goal::Kind::full; }, "Fold nothing");
     add_triangles_option(group, o.budget, "At most N triangles, or P% of them, as inconspicuous as possible");
     group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
+    add_quality_option(group, o.request);
     add_value(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
               "The best cut that T milliseconds are enough for");
     add_value(group, "--pixels", goal.tolerance_px, positive(), "E", "Fold what is smaller than E pixels, seen or not");
-    add_value(group, "--threshold", o.request.threshold, positive(), "X",
-              "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the "
-              "distance");
     add_fold_test_option(group, o.request.fold_test);
     group.add_flag("--chroma", o.request.chroma, "Also keep changes of colour that can be seen, not only of luminance");
     add_gaze_option(group, o.gaze_px);
@@ -366,27 +385,28 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
         if (o.request.goal.tolerance_px > 0) o.request.goal.kind = Goal::Kind::pixels;
         check_request(o);
     });
-    const std::string one = "give one of them", own = "the others say themselves how much is folded";
+    const std::string one = "give one of them";
     rules.insert(
         rules.end(),
-        {{"--full", Rule::excludes, {"--imperceptible", "--triangles", "--ratio", "--pixels"}, one},
-         {"--full", Rule::excludes, {"--milliseconds", "--threshold", "--fold-test", "--chroma"}, "nothing is folded"},
+        {{"--full", Rule::excludes, {"--imperceptible", "--quality", "--triangles", "--ratio", "--pixels"}, one},
+         {"--quality", Rule::excludes, {"--imperceptible", "--triangles", "--ratio", "--pixels"}, one},
+         {"--full", Rule::excludes, {"--milliseconds", "--fold-test", "--chroma"}, "nothing is folded"},
          {"--imperceptible", Rule::excludes, {"--triangles", "--ratio", "--pixels"}, one},
          {"--triangles", Rule::excludes, {"--ratio", "--pixels"}, one},
          {"--ratio", Rule::excludes, {"--pixels"}, one},
-         {"--threshold", Rule::excludes, {"--triangles", "--ratio", "--pixels"}, own},
          {"--fill-budget", Rule::needs_one_of, {"--triangles", "--ratio"}}});
 }
 
-void add_hiding_option(CLI::App& verb, WhatOptions& o) {
+void add_hiding_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {
+    rules.push_back({"--order", Rule::needs_one_of, {"--triangles", "--ratio", "--quality"}});
     add_choice<Hiding, Hiding>(
         verb, "--visibility", o.hiding, {{"spheres", Hiding::spheres}, {"picture", Hiding::picture}},
         "What counts as hidden: what faces away or lies behind spheres inside solids (spheres), or "
         "also what lies behind anything in the picture (picture)");
     add_choice<session::Order, session::Order>(
         verb, "--order", o.request.order, {{"sum", session::Order::sum}, {"largest", session::Order::largest}},
-        "What --triangles makes least in a picture: the error that adds up in it, which goes by what the picture shows "
-        "(sum, default), or the largest cost of a fold (largest)");
+        "What --triangles and --quality make least in a picture: the error that adds up in it, which goes by what the "
+        "picture shows (sum, default), or the largest cost of a fold (largest)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include <unseen/render/renderer.h>
+#include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/number_format.h>
 
@@ -58,14 +59,18 @@ vdtree::View small_view(const vdtree::View& view, int cell_px) {
 
 class SheetMaker {
 public:
-    SheetMaker(session::Session& session, const vdtree::View& view, render::Renderer& renderer, const SheetOptions& o)
-        : session_(session), view_(view), renderer_(renderer), o_(o) {}
+    SheetMaker(session::Session& session, const vdtree::View& view, const render::Context& context,
+               render::Renderer& renderer, const SheetOptions& o)
+        : session_(session), view_(view), context_(context), renderer_(renderer), o_(o) {}
 
     // Makes the cut, draws and judges it.
     Result<void> fill(Column& column, const Image& full) {
         SheetCut& made = column.cut;
         session_.set_gaze(made.gaze);
-        auto simplified = session_.simplify(view_, made.request);
+        // Parallel views have no picture of depths.
+        auto simplified = view_.orthographic_height
+                              ? session_.simplify(view_, made.request)
+                              : session::simplify_as_seen(session_, context_, view_, made.request);
         if (!simplified) return simplified.error();
         const vdtree::Cut& cut = simplified->cuts.front();
         if (auto ok = draw(column, cut); !ok) return ok.error();
@@ -138,6 +143,7 @@ private:
 
     session::Session& session_;
     const vdtree::View& view_;
+    const render::Context& context_;
     render::Renderer& renderer_;
     const SheetOptions& o_;
 };
@@ -172,7 +178,7 @@ Result<void> fill_all(std::vector<Column>& columns, session::Session& session, c
         if (const auto ready = session.prepare(view, column.cut.request); !ready) return ready.error();
     auto renderer = render::Renderer::create(context, session.tree());
     if (!renderer) return renderer.error();
-    SheetMaker maker(session, view, *renderer, o);
+    SheetMaker maker(session, view, context, *renderer, o);
     const std::optional<session::Gaze> gaze_before = session.observer().gaze;
     Image full;
     for (Column& column : columns) {

@@ -304,7 +304,7 @@ Command fly_command(CLI::App& app, Setup& setup) {
         if (const auto complaint = complaint_about_picture_names(o.pictures); !complaint.empty()) refuse(complaint);
     });
     verb->footer("Examples:\n  unseen fly dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
-                 "  unseen fly dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
+                 "  unseen fly dragon.vdt --path flight.csv -o frames/%04d.png --quality good\n"
                  "  unseen fly dragon.vdt --path orbit:1 --gaze-mode simulated --tracker seed=7,error=0.5,latency=50\n"
                  "  unseen fly dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
                  "  unseen fly dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20k --geomorph 0.25 --fps 60\n"

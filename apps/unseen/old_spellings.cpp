@@ -1,6 +1,7 @@
 #include "old_spellings.h"
 
 #include <algorithm>
+#include <array>
 
 #include "numbered_pictures.h"
 
@@ -26,6 +27,8 @@ void rename_options(Words& words) {
                                     {"--gaze-error", "--tracker", "error="},
                                     {"--gaze-latency", "--tracker", "latency="},
                                     {"--suppression", "--tracker", "suppression", true}};
+    if (std::ranges::count(std::array{"simplify", "render", "fly", "view"}, words[0]))
+        renamed.push_back({"--threshold", "--quality", ""});
     if (words[0] == "fly" || words[0] == "view") renamed.push_back({"--seed", "--tracker", "seed="});
     for (const auto& [before, now, value, is_flag] : renamed)
         for (auto word = words.begin(); word != words.end(); ++word) {

@@ -132,13 +132,16 @@ Command render_command(CLI::App& app, Setup& setup) {
     add_verbose_option(*verb, a->is_verbose);
     std::vector<Rule> rules = render_rules();
     add_what_options(*verb, a->what, rules);
-    add_hiding_option(*verb, a->what);
+    add_hiding_option(*verb, a->what, rules);
+    CLI::Option* visibility = verb->get_option("--visibility");
+    visibility->description(visibility->get_description() + "; default: picture, in orthographic views spheres");
     add_masking_option(*verb, a->what, rules);
     add_choice<GazeSource, GazeSource>(*verb, "--gaze-mode", a->gaze.source, {{"head", GazeSource::head}},
                                        "head: no tracker; the viewer looks within 15 degrees of the middle");
     add_tracker_option(*verb, a->gaze, false);
     setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
-    verb->callback([a, samples = verb->get_option("--samples")] {
+    verb->callback([a, visibility, samples = verb->get_option("--samples")] {
+        if (visibility->empty() && !a->view.is_orthographic) a->what.hiding = Hiding::picture;
         if (a->map && !is_for_people(a->out)) refuse("--show draws pictures for people: -o must end in .png.");
         // With fewer, an outline that moves by a fiftieth of a pixel changes a whole sample of some pixel: by more than
         // can be seen.
@@ -149,7 +152,7 @@ Command render_command(CLI::App& app, Setup& setup) {
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
                  "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
                  "  unseen render part.stl -o front.png --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
-                 "  unseen render museum.glb -o museum.png --visibility picture --masking scene --json -\n"
+                 "  unseen render museum.glb -o museum.png --masking scene --json -\n"
                  "  unseen render dragon.vdt -o lit.png --lights lights.json --setup lab.json");
     return {verb, [a] { return run(*a); }, std::move(rules)};
 }

@@ -110,7 +110,7 @@ Command simplify_command(CLI::App& app, Setup& setup) {
     add_verbose_option(*verb, a->is_verbose);
     std::vector<Rule> rules;
     add_what_options(*verb, a->what, rules);
-    add_hiding_option(*verb, a->what);
+    add_hiding_option(*verb, a->what, rules);
     add_masking_option(*verb, a->what, rules);
     setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
     verb->footer(

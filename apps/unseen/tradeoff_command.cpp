@@ -31,10 +31,12 @@ std::string options_of(const session::TradeoffPoint& point) {
     case session::Goal::Kind::full: return "--full";
     case session::Goal::Kind::budget: return "--triangles " + std::to_string(request.goal.triangles);
     case session::Goal::Kind::pixels: text = "--pixels " + shortest(request.goal.tolerance_px); break;
-    case session::Goal::Kind::imperceptible: text = "--imperceptible"; break;
+    case session::Goal::Kind::imperceptible:
+        text = "--quality " + (request.threshold == 1 ? "invisible" : shortest(request.threshold));
+        break;
+    case session::Goal::Kind::quality: text = "--quality " + std::string(facts_of(request.goal.named).name); break;
     }
     if (request.fold_test) text += " --fold-test " + session::name_of(*request.fold_test);
-    if (request.threshold != 1) text += " --threshold " + shortest(request.threshold);
     if (point.is_of_view) text += " --visibility picture";
     return text;
 }

@@ -104,6 +104,21 @@ TEST_F(AsSeen, BudgetsMakeTheSumOfErrorsLeast) {
     }
 }
 
+TEST_F(AsSeen, QualitiesGoByTheSum) {
+    Session session = session_of(ball_behind_wall());
+    const vdtree::View view = view_of(session, {-0.3, 0.2, 1});
+    std::uint64_t before = session.triangle_count();
+    for (const QualityFacts& facts : qualities()) {
+        const auto made = require(simplify_as_seen(
+            session, context_, view, {.goal = Goal::quality(facts.quality), .purpose = Purpose::picture}));
+        EXPECT_LT(made->stats.triangles, before) << facts.name;
+        before = made->stats.triangles;
+        const auto effect = std::ranges::find(made->effects, "sum of errors", &Effect::name);
+        ASSERT_NE(effect, made->effects.end());
+        EXPECT_EQ(effect->on, facts.quality != Quality::invisible);
+    }
+}
+
 TEST_F(AsSeen, DepthsAreThoseOfTheFarthestSample) {
     const VertexTree tree = support::built(shapes::icosphere(5));
     vdtree::View view;

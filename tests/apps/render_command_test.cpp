@@ -117,7 +117,7 @@ TEST_F(RenderCommandTest, WhatAPictureHidesIsOfThatPictureAlone) {
 
 TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
     const Json report = succeed({"fly", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
-                                 "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"})
+                                 "--plot", "orbit.png", "-o", "frames/%03d.png", "--quality", "3", "--json", "-"})
                             .json();
     EXPECT_EQ(report["frames"], 24);
     EXPECT_EQ(effect_named(report, "back-face folding")["on"], true);
@@ -287,7 +287,7 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
                                       {"--path", "orbit:1", "-o", "same.png"},
                                       {"--path", "orbit:1", "-o", "%d%d.png"},
                                       {"--path", "orbit:1", "-o", "%s.png"},
-                                      {"--path", "orbit:1", "--threshold", "0"},
+                                      {"--path", "orbit:1", "--quality", "0"},
                                       {"--geomorph", "0.2", "-o", "a.png"},
                                       {"--path", "orbit:1", "--geomorph", "-1"},
                                       {"--path", "orbit:1", "--geomorph", "nan"},
@@ -551,7 +551,7 @@ TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
                             {"fly", "ball.vdt", "--samples", "4"},
                             {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
                             {"sheet", "ball.vdt", "-o", "out.png", "--full"},
-                            {"fly", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
+                            {"fly", "ball.vdt", "--path", "orbit:0:2", "--quality", "2", "--triangles", "20"},
                             {"fly", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
                             {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
                             {"view", "ball.vdt", "--frames", "0"},

@@ -51,6 +51,7 @@ int change(Question& q, int number) {
     set(goal, Goal::budget(400));
     set(goal, Goal::budget(400, true));
     set(goal, Goal::pixels(2));
+    set(goal, Goal::quality(session::Quality::good));
     for (const session::FoldTestFacts& facts : session::fold_tests()) set(fold_test, facts.test);
     set(chroma, true);
     set(milliseconds, 1e6);

@@ -29,6 +29,7 @@ TEST_F(TradeoffCommandTest, EachPointIsWhatItsOptionsMake) {
     for (const Json& point : points) {
         Words words = {"render", "ball.vdt", "--size", "200x160", "-o", "x.png", "--json", "-"};
         for (const std::string& word : words_of(point["options"])) words.push_back(word);
+        if (point["holds_for"] == "all views") words.insert(words.end(), {"--visibility", "spheres"});
         const Json cut = succeed(words).json();
         EXPECT_EQ(cut["triangles"], point["triangles"]) << point;
         EXPECT_GT(point["draw_ms"], 0) << point;
@@ -57,7 +58,7 @@ TEST_F(TradeoffCommandTest, TheFrontHasNothingBetter) {
         EXPECT_NE(point["name"], "luebke-hallen") << "which is unsafe";
         for (const Json& other : report["points"]) {
             const std::string options = other["options"];
-            if (options == "--imperceptible" || options == "--imperceptible --fold-test luebke-hallen-safe")
+            if (options == "--quality invisible" || options == "--quality invisible --fold-test luebke-hallen-safe")
                 EXPECT_LE(point["triangles"], other["triangles"]) << options;
         }
     }
@@ -77,16 +78,37 @@ TEST_F(TradeoffCommandTest, WhatDoesNotFitIsLeftOutAndSaid) {
                 HasSubstr("recommended, as the safe way with the fewest triangles that shows nothing: --"));
 }
 
-TEST_F(TradeoffCommandTest, ThresholdsAreOfImperceptibleCuts) {
+TEST_F(TradeoffCommandTest, QualitiesLeaveMoreOrLess) {
+    for (const auto& [verb, out] : {std::pair("simplify", "x.ply"), {"render", "x.png"}}) {
+        const auto report = [&](const std::string& quality) {
+            return run({verb, "ball.vdt", "-o", out, "--fill", "0.2", "--quality", quality, "--json", "-"}).json();
+        };
+        const Json invisible = report("invisible"), lossless = report("lossless"), good = report("good"),
+                   draft = report("draft");
+        EXPECT_LE(invisible["max_fold_cost"], 1);
+        EXPECT_GT(draft["max_fold_cost"], 1);
+        EXPECT_LE(lossless["triangles"], invisible["triangles"]);
+        EXPECT_LE(good["triangles"], lossless["triangles"]);
+        EXPECT_LE(draft["triangles"], good["triangles"]);
+        EXPECT_LT(draft["triangles"], invisible["triangles"]) << verb;
+    }
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", "best"}).err,
+                HasSubstr("--quality: must be invisible, lossless, good, draft, or a cost above 0, not 'best'"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", "good", "--triangles", "9"}).err,
+                HasSubstr("--quality"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", "good", "--fold-test", "extent"}).err,
+                HasSubstr("cannot tell what is imperceptible"));
+}
+
+TEST_F(TradeoffCommandTest, CostsAreOfImperceptibleCuts) {
     const auto kept = [&](const char* threshold) {
-        return run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", threshold, "--json", "-"})
-            .json()["triangles"];
+        return run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", threshold, "--json", "-"}).json()["triangles"];
     };
     EXPECT_LE(kept("4"), kept("1"));
     EXPECT_LE(kept("1"), kept("0.25"));
-    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "2", "--full"}).err,
-                HasSubstr("--threshold acts on the goal imperceptible alone"));
-    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--threshold", "0"}).err, HasSubstr("--threshold"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", "2", "--full"}).err,
+                HasSubstr("--quality acts on the goal imperceptible alone"));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "x.ply", "--quality", "0"}).err, HasSubstr("--quality"));
 }
 
 } // namespace tradeoff_command_test

@@ -36,7 +36,7 @@ inline constexpr const char* may_cast = "what is not seen may cast shadows that 
 // Why what a scene masks does not count for an object; null where it may.
 const char* why_unmasked(const Sight& sight);
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
-// Why a budget goes by the largest cost and not by the sum of errors; null where it goes by the sum.
+// Why a budget or a quality goes by the largest cost and not by the sum of errors; null where it goes by the sum.
 const char* why_not_summed(const Sight& sight, const Decision& decision);
 
 // What the cut itself says about effects.

@@ -40,7 +40,8 @@ vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
 
 vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
     vdtree::FollowOptions options;
-    options.threshold = static_cast<float>(request.threshold);
+    options.threshold = static_cast<float>(request.goal.kind == Goal::Kind::quality ? facts_of(request.goal.named).cost
+                                                                                    : request.threshold);
     options.milliseconds = request.milliseconds;
     options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {
@@ -111,7 +112,8 @@ bool folds_unseen(const Sight& sight, const Decision& decision) {
 }
 
 const char* why_not_summed(const Sight& sight, const Decision& decision) {
-    if (decision.request.goal.kind != Goal::Kind::budget) return "the goal is no budget";
+    const Goal::Kind kind = decision.request.goal.kind;
+    if (kind != Goal::Kind::budget && kind != Goal::Kind::quality) return "what nobody sees does not add up";
     if (decision.request.order != Order::sum) return "it is not asked for";
     if (decision.test != FoldTest::error) return "only the fold test error measures what adds up";
     if (!folds_unseen(sight, decision)) return "what a picture shows of each part is not known";
@@ -153,6 +155,8 @@ Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision, const
     if (!costs) return costs.error();
     auto summed = vdtree::costing_at_least(tree, *without, recipe.viewpoint, *costs);
     if (!summed) return summed.error();
+    if (decision.request.goal.kind == Goal::Kind::quality)
+        recipe.options.threshold = static_cast<float>(facts_of(decision.request.goal.named).summed_cost);
     recipe.fold_test = std::exchange(recipe.criterion, share(std::move(summed)));
     return {};
 }

@@ -1,5 +1,6 @@
 #include <unseen/session/request.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include <unseen/vdtree/internal/errors.h>
@@ -22,14 +23,26 @@ Result<void> validate_goal(const Request& r) {
         return invalid_field(
             "{request.goal.pixels} needs {request.fold_test = }extent or displacement: {} knows no pixels.",
             {name_of(test)});
-    if (r.goal.kind == Kind::imperceptible && !is_perceptual(test))
+    if ((r.goal.kind == Kind::imperceptible || r.goal.kind == Kind::quality) && !is_perceptual(test))
         return invalid_field("{request.fold_test = }{} cannot tell what is imperceptible: ask for "
                              "{request.goal.triangles} or {request.goal.pixels}.",
                              {name_of(test)});
     return {};
 }
 
+constexpr QualityFacts all_qualities[] = {
+    {Quality::invisible, "invisible", "nobody sees a difference, by the model (default)", 1, 1},
+    {Quality::lossless, "lossless", "hardly anybody does who compares", 3, 6},
+    {Quality::good, "good", "small differences, if one looks for them", 4, 9},
+    {Quality::draft, "draft", "plain differences that do not disturb", 9, 17},
+};
+
 } // namespace
+
+std::span<const QualityFacts> qualities() noexcept { return all_qualities; }
+const QualityFacts& facts_of(Quality quality) noexcept {
+    return *std::ranges::find(all_qualities, quality, &QualityFacts::quality);
+}
 
 Result<void> validate(const Request& r) {
     if (r.shown && r.purpose != Purpose::picture)
@@ -40,7 +53,7 @@ Result<void> validate(const Request& r) {
     // Where none is asked for, one that knows colours is taken.
     const bool knows_chroma =
         !r.fold_test || *r.fold_test == FoldTest::luebke_hallen || *r.fold_test == FoldTest::luebke_hallen_safe;
-    const bool may_count = r.goal.kind == Goal::Kind::imperceptible || r.goal.kind == Goal::Kind::budget;
+    const bool may_count = r.goal.kind != Goal::Kind::full && r.goal.kind != Goal::Kind::pixels;
     if (r.chroma && !(knows_chroma && may_count))
         return invalid_field("{request.chroma} needs {request.fold_test = }luebke-hallen or luebke-hallen-safe, and a "
                              "goal that folds by "

@@ -251,8 +251,8 @@ private:
 } // namespace
 
 bool goes_by_sum(const Request& request) {
-    return request.goal.kind == Goal::Kind::budget && request.order == Order::sum &&
-           request.fold_test.value_or(FoldTest::error) == FoldTest::error;
+    return (request.goal.kind == Goal::Kind::budget || request.goal.kind == Goal::Kind::quality) &&
+           request.order == Order::sum && request.fold_test.value_or(FoldTest::error) == FoldTest::error;
 }
 
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,

@@ -34,6 +34,10 @@ std::vector<TradeoffPoint> usual_points(const Session& session) {
     for (const double threshold : {2.0, 0.5})
         add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
     all.push_back({{}, "imperceptible, by this picture", all[1].request, true});
+    for (const QualityFacts& facts : qualities().subspan(1)) {
+        const Request request = {.goal = Goal::quality(facts.quality), .purpose = Purpose::picture, .reasons = false};
+        all.push_back({{}, std::string(facts.name) + ", by this picture", request, true});
+    }
     add("luebke-hallen-safe", imperceptible, FoldTest::luebke_hallen_safe);
     for (const double pixels : {1.0, 0.5, 2.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
     add("luebke-hallen", imperceptible, FoldTest::luebke_hallen);
@@ -43,8 +47,6 @@ std::vector<TradeoffPoint> usual_points(const Session& session) {
         const double triangles = std::clamp(share * static_cast<double>(session.triangle_count()), 1.0, 4e9);
         add("budget of " + shortest(100 * share) + "%", Goal::budget(static_cast<vdtree::Index>(triangles)));
     }
-    for (const double threshold : {1.5, 3.0, 4.0})
-        add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
     for (const double pixels : {4.0, 8.0}) add(shortest(pixels) + " px, extent", Goal::pixels(pixels));
     return all;
 }

@@ -31,14 +31,29 @@ const FoldTestFacts& facts_of(FoldTest test) noexcept;
 bool is_perceptual(FoldTest test) noexcept;
 std::string name_of(FoldTest test);
 
+// How much of a difference may be left, by name. Costs are fitted with ColorVideoVDP, for what one looks at; see
+// docs/evidence.md, "Qualities".
+enum class Quality { invisible, lossless, good, draft };
+
+struct QualityFacts {
+    Quality quality = Quality::invisible;
+    std::string_view name = {};    // "lossless"
+    std::string_view summary = {}; // "what few notice who look for it"
+    // Folds up to this cost are made: by the fold test alone, and where errors also add up in a picture.
+    double cost = 1, summed_cost = 1;
+};
+std::span<const QualityFacts> qualities() noexcept; // all, the best first
+const QualityFacts& facts_of(Quality quality) noexcept;
+
 // How far to fold.
 struct Goal {
-    enum class Kind { imperceptible, full, budget, pixels };
+    enum class Kind { imperceptible, full, budget, pixels, quality };
 
     Kind kind = Kind::imperceptible;
-    vdtree::Index triangles = 0; // for budgets: at most this many in all objects together; 1 or more
-    bool fill = false;           // for budgets: use all of them, even where no difference can be seen
-    double tolerance_px = 0;     // for pixels: above 0 and finite
+    Quality named = Quality::invisible; // for qualities
+    vdtree::Index triangles = 0;        // for budgets: at most this many in all objects together; 1 or more
+    bool fill = false;                  // for budgets: use all of them, even where no difference can be seen
+    double tolerance_px = 0;            // for pixels: above 0 and finite
 
     static Goal imperceptible() { return {}; }          // fold whatever nobody can see
     static Goal full() { return {.kind = Kind::full}; } // fold nothing
@@ -46,11 +61,16 @@ struct Goal {
     static Goal budget(vdtree::Index triangles, bool fill = false) {
         return {.kind = Kind::budget, .triangles = triangles, .fill = fill};
     }
+    // The fewest triangles that look so. Invisible: the same as imperceptible().
+    static Goal quality(Quality quality) {
+        if (quality == Quality::invisible) return imperceptible();
+        return {.kind = Kind::quality, .named = quality};
+    }
     // Fold everything smaller, visible or not.
     static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
 };
 
-// What a budget makes least.
+// What a budget, or a quality, makes least.
 enum class Order {
     sum,     // the error that adds up in the picture, see perception::summed_costs(), as far as nothing sticks out
     largest, // the largest cost of a fold
@@ -71,7 +91,7 @@ struct Request {
     double threshold = 1;    // for imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
     float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;
-    // For budgets. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`; without them,
+    // For budgets and qualities. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`; without them,
     // as in followers, the largest cost counts.
     Order order = Order::sum;
     // For pictures: the depth of this very view. Whatever lies behind it folds, too. simplify_as_seen() in
