@@ -50,6 +50,7 @@ constexpr OptionName option_names[] = {
     {"session::measured()", "unseen build"},
     {"session::measured_under_lights()", "unseen build --lit-fold-errors"},
     {"session::TreeCache", "unseen cache"},
+    {"lod.cost", "--quality"},
     {"lod.directions", "--directions"},
     {"lod.samples", "--samples"},
     {"lod.fov_y_degrees", "--fov"},

@@ -237,7 +237,7 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, 
 }
 
 // A name, or the cost up to which folds are made.
-static void add_quality_option(CLI::App& verb, session::Request& request) {
+void add_quality_option(CLI::App& verb, session::Request& request) {
     std::string names, text = "How much of a difference may be left. ";
     for (const session::QualityFacts& facts : session::qualities()) {
         names += (names.empty() ? "" : ", ") + std::string(facts.name);

@@ -119,6 +119,8 @@ void add_model_option(CLI::App& verb, std::string& model, bool takes_scenes = tr
 // The group WHAT. `rules`: what excludes what, for check_rules().
 void add_what_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 void add_hiding_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
+// A quality by name, or the cost up to which folds are made: session::fold_cost().
+void add_quality_option(CLI::App& verb, session::Request& request);
 void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse, std::vector<Rule>& rules);

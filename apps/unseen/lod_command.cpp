@@ -23,6 +23,7 @@ struct LodArguments {
     DisplayOptions& display;
     std::string model = {}, out = {}, json = {}, csv = {}, sheet = {};
     bool is_separate = false;
+    session::Request quality = {}; // what --quality says
     session::LodOptions options = {};
     meshio::GltfOptions gltf = {};
 };
@@ -106,7 +107,8 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
                "sphere takes there, for a vertical field of " +
                rounded(lod.fov_y_degrees, 3) + " degrees over " + std::to_string(lod.width_px) + "x" +
                std::to_string(lod.height_px) + " pixels. V: the largest difference from " +
-               std::to_string(lod.directions) + " sides at that distance, in thresholds; from 1 on it is seen.");
+               std::to_string(lod.directions) + " sides at that distance, in thresholds; from 1 on it is seen" +
+               (lod.cost > 1 ? ", which --quality allows." : "."));
     for (const session::LodObject& object : lod.objects)
         if (object.same_as == object.object)
             for (const std::string& note : object.notes) print_note((is_one ? "" : object.name + ": ") + note);
@@ -143,6 +145,7 @@ Json to_json(const session::Lod& lod, const session::Session& session, const mes
             {"fov_y_degrees", lod.fov_y_degrees},
             {"directions", lod.directions},
             {"samples", lod.samples},
+            {"cost", lod.cost},
             {"looks", lod.looks},
             {"objects", std::move(objects)},
             {"geometry_bytes", written.bytes},
@@ -163,6 +166,7 @@ Result<std::vector<std::string>> write_separately(const LodArguments& a, const s
 Result<session::Lod> make_levels(LodArguments& a, session::Session& session, const render::Context& context) {
     if (session.scene().objects.empty())
         return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
+    a.options.cost = session::fold_cost(a.quality);
     ProgressBar bar("judging levels");
     a.options.progress = std::ref(bar);
     return session::make_levels(session, context, a.options);
@@ -226,6 +230,7 @@ Command lod_command(CLI::App& app, Setup& setup) {
             "Triangles of the last level, in percent of the full mesh's (default: 1)")
         ->type_name("PERCENT")
         ->check(within(1e-4, 50));
+    add_quality_option(*verb, a->quality);
     add_value(*verb, "--directions", a->options.directions, whole(1, 1000), "N",
               "From how many sides each level is judged (default: 12)");
     add_samples_option(*verb, a->options.samples, "64");
@@ -242,10 +247,12 @@ Command lod_command(CLI::App& app, Setup& setup) {
     setup.act_in(*verb, Setup::model | Setup::scenes);
     verb->footer(
         "The levels are evenly spaced in visibility. Each begins at the distance from which the fold test says that\n"
-        "nobody sees it; there two judges look at it from random directions, and if either sees a difference, the\n"
-        "distance grows. A model has one chain of levels; in a scene each node has its own.\n\n"
+        "nobody sees it (or with --quality, not more than that many thresholds of it); there two judges look at it\n"
+        "from random directions, and if either sees more, the distance grows. A model has one chain of levels; in a "
+        "scene each node has its own.\n\n"
         "Examples:\n  unseen lod statue.glb -o statue_lods.glb --separate --csv statue.csv\n"
         "  unseen lod bunny.ply -o bunny.glb --levels 4 --quantize --meshopt\n"
+        "  unseen lod bunny.ply -o bunny.glb --quality good\n"
         "  unseen lod museum.glb -o museum_lods.glb --display tv.json --fov 60 --json -");
     return {verb, [a] { return run(*a); }};
 }

@@ -67,6 +67,22 @@ TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {
     EXPECT_GT(seen_near, 0u); // the distances are worth something, and the judges are not blind
 }
 
+TEST_F(LodTest, LowerQualitiesBeginNearer) {
+    Session session = bumpy();
+    LodOptions options{.chain = {.levels = 3}, .directions = 3, .samples = 16};
+    const auto unseen = require(make_levels(session, context(), options));
+    options.cost = fold_cost({.goal = Goal::quality(Quality::draft)});
+    const auto draft = require(make_levels(session, context(), options));
+    const LodLevel &far = unseen->objects[0].levels.back(), &near = draft->objects[0].levels.back();
+    EXPECT_EQ(near.triangles, far.triangles);
+    const double radius = draft->objects[0].sphere.radius;
+    EXPECT_LT(near.distance - radius, 0.5 * (far.distance - radius));
+    double largest = 0;
+    for (const LodCheck& check : near.checks) largest = std::max({largest, check.v, check.second_v});
+    EXPECT_GT(largest, 1) << "what is nearer is seen";
+    EXPECT_LE(largest, lod_most * options.cost);
+}
+
 TEST_F(LodTest, TheSameSeedLooksFromTheSameSides) {
     Session session = bumpy();
     const LodOptions options{.chain = {.levels = 2}, .directions = 2, .samples = 4};
@@ -104,6 +120,7 @@ TEST_F(LodTest, OptionsOutOfRangeAreErrors) {
     Session session = bumpy();
     EXPECT_THAT(make_levels(session, context(), {.directions = 0}).error().message, HasSubstr("lod.directions"));
     EXPECT_THAT(make_levels(session, context(), {.samples = 257}).error().message, HasSubstr("lod.samples"));
+    EXPECT_THAT(make_levels(session, context(), {.cost = 0}).error().message, HasSubstr("lod.cost"));
     EXPECT_THAT(make_levels(session, context(), {.fov_y_degrees = std::nan("")}).error().message,
                 HasSubstr("lod.fov_y_degrees"));
     const auto stopped = make_levels(session, context(), {.progress = [](double, const char*) { return false; }});

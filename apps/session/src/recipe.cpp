@@ -40,8 +40,7 @@ vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
 
 vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
     vdtree::FollowOptions options;
-    options.threshold = static_cast<float>(request.goal.kind == Goal::Kind::quality ? facts_of(request.goal.named).cost
-                                                                                    : request.threshold);
+    options.threshold = static_cast<float>(fold_cost(request));
     options.milliseconds = request.milliseconds;
     options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {

@@ -44,6 +44,10 @@ const QualityFacts& facts_of(Quality quality) noexcept {
     return *std::ranges::find(all_qualities, quality, &QualityFacts::quality);
 }
 
+double fold_cost(const Request& r) noexcept {
+    return r.goal.kind == Goal::Kind::quality ? facts_of(r.goal.named).cost : r.threshold;
+}
+
 Result<void> validate(const Request& r) {
     if (r.shown && r.purpose != Purpose::picture)
         return invalid_field("{request.shown} is of pictures: set {request.purpose} = picture.");

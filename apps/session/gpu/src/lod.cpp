@@ -45,6 +45,8 @@ Result<void> check(const LodOptions& options, const perception::Display& display
     if (options.samples < 1 || options.samples > most_lod_samples)
         return invalid_field("{lod.samples} must be 1 to {}, not {}.",
                              {std::to_string(most_lod_samples), std::to_string(options.samples)});
+    if (!(options.cost > 0 && std::isfinite(options.cost)))
+        return invalid_field("{lod.cost} must be above 0 and finite.");
     if (options.fov_y_degrees && !(*options.fov_y_degrees > 0 && *options.fov_y_degrees < 180))
         return invalid_field("{lod.fov_y_degrees} must lie between 0 and 180.");
     constexpr int least_px = 4 * margin_px;
@@ -124,7 +126,7 @@ private:
     std::vector<LodLevel> candidates(LodObject& made) const {
         std::vector<LodLevel> open;
         for (int level = 1; level < made.chain.size(); ++level) {
-            const double promised = made.chain.unseen_from(level) * scale_ + made.sphere.radius;
+            const double promised = made.chain.unseen_from(level) / options_.cost * scale_ + made.sphere.radius;
             if (!std::isfinite(promised)) {
                 made.notes.push_back("a level of " + std::to_string(made.chain.triangles(level)) +
                                      " triangles is seen from everywhere, and was left out.");
@@ -174,13 +176,14 @@ private:
             const auto verdict = look_from(made, direction, level.distance, cuts);
             if (!verdict) return verdict.error();
             level.checks.push_back({*verdict, direction});
-            if (!is_unseen(*verdict)) return true;
+            if (!passes(*verdict)) return true;
         }
         return false;
     }
 
-    static bool is_unseen(const PictureVerdict& verdict) {
-        return verdict.shows_nothing() && std::max(verdict.v, verdict.second_v) <= lod_most;
+    bool passes(const PictureVerdict& verdict) const {
+        if (options_.cost <= 1 && !verdict.shows_nothing()) return false;
+        return std::max(verdict.v, verdict.second_v) <= lod_most * std::max(options_.cost, 1.0);
     }
 
     // With few samples where these show nothing.
@@ -195,7 +198,7 @@ private:
             if (!judged) return judged.error();
             verdict = *judged;
             ++lod_.looks;
-            if (is_unseen(verdict)) break;
+            if (passes(verdict)) break;
         }
         return verdict;
     }
@@ -249,6 +252,7 @@ Result<Lod> make_levels(Session& session, const render::Context& context, const 
     lod.width_px = display.width_px, lod.height_px = display.height_px;
     lod.fov_y_degrees = options.fov_y_degrees.value_or(perception::physical_field(display, display.height_px).value());
     lod.directions = options.directions, lod.samples = options.samples;
+    lod.cost = options.cost;
     if (auto ready = session.prepare(session.default_view(), {.reasons = false}); !ready) return ready.error();
     const std::size_t count = session.scene().objects.size();
     // Under lights the same object looks different elsewhere.

@@ -109,6 +109,9 @@ struct Request {
     bool reasons = true;
 };
 
+// The fold cost up to which a request's quality or threshold folds, where nothing adds up.
+double fold_cost(const Request& request) noexcept;
+
 // Checks that the fields are in their ranges and go together, whatever the scene. The error names the field.
 Result<void> validate(const Request& request);
 

@@ -15,6 +15,8 @@ inline constexpr int usual_lod_directions = 12;
 struct LodOptions {
     LevelChainOptions chain = {.levels = 5}; // with the full mesh
     int directions = usual_lod_directions;   // that each level is looked at from, 1 to 1000
+    // Levels begin where they are seen at up to this many thresholds, see fold_cost(); above 0. 1: not at all.
+    double cost = 1;
     // Samples a pixel of the judged pictures, 1 to 256. What shows with fewer is judged again with all of them.
     int samples = 64;
     std::uint64_t seed = 1; // of the directions
@@ -60,12 +62,13 @@ struct Lod {
     double fov_y_degrees = 0;       // that coverages and distances are for, with the display's pixels
     int width_px = 0, height_px = 0;
     int directions = 0, samples = 0;
+    double cost = 1;         // LodOptions::cost
     std::uint64_t looks = 0; // pairs of pictures that were judged
 };
 
 // The levels of each object, alone before the scene's background and under its lights. LevelChain proposes them: evenly
 // spaced in visibility, the same from all sides. Both judges then compare each level with the full mesh at its
-// distance, from random directions off the axes. If either judge finds more than lod_most, the distance grows by a
+// distance, from random directions off the axes. If either judge finds more than lod_most times the cost, the distance grows by a
 // fifth and the level is judged from new directions; so the reported checks never influenced the distance. At every
 // distance the whole object fits on the display.
 //
