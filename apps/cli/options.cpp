@@ -48,6 +48,10 @@ bool is_given(const CLI::App& verb, const std::string& words) {
 
 } // namespace
 
+[[noreturn]] static void refuse_both(const std::string& option, const std::string& other, const std::string& why) {
+    refuse(option + " and " + other + " exclude each other" + why);
+}
+
 void check_rules(const CLI::App& verb, std::span<const Rule> rules) {
     const auto given = [&](const std::string& option) { return is_given(verb, option); };
     for (const Rule& rule : rules) {
@@ -58,7 +62,7 @@ void check_rules(const CLI::App& verb, std::span<const Rule> rules) {
             continue;
         }
         for (const std::string& other : rule.others)
-            if (given(other)) refuse(rule.option + " and " + other + " exclude each other" + why);
+            if (given(other)) refuse_both(rule.option, other, why);
     }
 }
 

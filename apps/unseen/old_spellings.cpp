@@ -20,6 +20,8 @@ Words::iterator find(Words& words, const std::string& option) {
 struct Renamed {
     std::string before, now, value;
     bool is_flag = false;
+
+    std::string joined() const { return now + "=" + value; }
 };
 
 void rename_options(Words& words) {
@@ -30,11 +32,11 @@ void rename_options(Words& words) {
     if (std::ranges::count(std::array{"simplify", "render", "fly", "view"}, words[0]))
         renamed.push_back({"--threshold", "--quality", ""});
     if (words[0] == "fly" || words[0] == "view") renamed.push_back({"--seed", "--tracker", "seed="});
-    for (const auto& [before, now, value, is_flag] : renamed)
+    for (const Renamed& r : renamed)
         for (auto word = words.begin(); word != words.end(); ++word) {
-            if (word->starts_with(before + "=")) word->replace(0, before.size() + 1, now + "=" + value);
-            else if (*word == before && is_flag) *word = now + "=" + value;
-            else if (*word == before && word + 1 != words.end()) *word = now, (word + 1)->insert(0, value);
+            if (word->starts_with(r.before + "=")) word->replace(0, r.before.size() + 1, r.joined());
+            else if (*word == r.before && r.is_flag) *word = r.joined();
+            else if (*word == r.before && word + 1 != words.end()) *word = r.now, (word + 1)->insert(0, r.value);
         }
 }
 
