@@ -38,7 +38,7 @@ enum class Quality { invisible, lossless, good, draft };
 struct QualityFacts {
     Quality quality = Quality::invisible;
     std::string_view name = {};    // "lossless"
-    std::string_view summary = {}; // "what few notice who look for it"
+    std::string_view summary = {}; // "hardly anybody does who compares"
     // Folds up to this cost are made: by the fold test alone, and where errors also add up in a picture.
     double cost = 1, summed_cost = 1;
 };
@@ -91,8 +91,8 @@ struct Request {
     double threshold = 1;    // for imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
     float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;
-    // For budgets and qualities. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`; without them,
-    // as in followers, the largest cost counts.
+    // For budgets and qualities. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`;
+    // without them, as in followers, the largest cost counts.
     Order order = Order::sum;
     // For pictures: the depth of this very view. Whatever lies behind it folds, too. simplify_as_seen() in
     // <unseen/session_gpu/as_seen.h> draws it. Under lights only the test `error` uses it.

@@ -68,9 +68,9 @@ struct Lod {
 
 // The levels of each object, alone before the scene's background and under its lights. LevelChain proposes them: evenly
 // spaced in visibility, the same from all sides. Both judges then compare each level with the full mesh at its
-// distance, from random directions off the axes. If either judge finds more than lod_most times the cost, the distance grows by a
-// fifth and the level is judged from new directions; so the reported checks never influenced the distance. At every
-// distance the whole object fits on the display.
+// distance, from random directions off the axes. If either judge finds more than lod_most times the cost, the distance
+// grows by a fifth and the level is judged from new directions; so the reported checks never influenced the distance.
+// At every distance the whole object fits on the display.
 //
 // A level is left out if one with fewer triangles begins at the same distance, up to lod_step, or if it is visible from
 // everywhere; notes say so. Objects of the same tree and size share their checks if the scene has no lights.

@@ -46,9 +46,10 @@ struct Tradeoff {
 double largest_shift(const Session& session, std::span<const vdtree::Cut> cuts);
 
 // Measures the most informative points first: the full model, the default test at several thresholds, qualities, the
-// other tests, budgets. Recommended is the point with the fewest triangles whose fold test is safe, which holds for moving views and
-// shows nothing to either judge; if there is none, the full model. Fails as Session::simplify() and drawing do; a fold
-// test that does not know the scene is left out. Cost: a simplification and some hundred drawings a point.
+// other tests, budgets. Recommended is the point with the fewest triangles whose fold test is safe, which holds for
+// moving views and shows nothing to either judge; if there is none, the full model. Fails as Session::simplify() and
+// drawing do; a fold test that does not know the scene is left out. Cost: a simplification and some hundred drawings a
+// point.
 Result<Tradeoff> measure_tradeoff(Session& session, const render::Context& context, const vdtree::View& view,
                                   const TradeoffOptions& options = {});
 
