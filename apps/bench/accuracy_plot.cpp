@@ -7,6 +7,7 @@
 #include "accuracy.h"
 #include "benches.h"
 #include "drawing.h"
+#include "log_scale.h"
 #include "plot_style.h"
 #include "terminal.h"
 
@@ -16,35 +17,6 @@ namespace {
 constexpr double plot_width = 760, plot_height = 360, title_height = 18, text_height = 10; // pixels
 constexpr double margin_left = 70, margin_right = 20, margin_top = 16, margin_bottom = 46; // around the axes
 constexpr glm::vec3 grid{0.87f}, blue{0.2f, 0.4f, 0.8f}, red{0.8f, 0.2f, 0}, grey{0.67f};
-
-// A logarithmic axis with room for 0 at its beginning.
-struct PlotScale {
-    double least = 1, most = 10, from = 0, to = 1; // values above 0, and pixels
-    bool has_zero = false;
-
-    PlotScale(const std::vector<double>& values, double from_, double to_) : from(from_), to(to_) {
-        std::vector<double> positive;
-        std::ranges::copy_if(values, std::back_inserter(positive), [](double v) { return v > 0; });
-        has_zero = positive.size() < values.size();
-        if (positive.empty()) return;
-        least = std::pow(10, std::floor(std::log10(std::ranges::min(positive)) * 2) / 2);
-        most = std::pow(10, std::ceil(std::log10(std::ranges::max(positive)) * 2) / 2);
-        if (!(most > least)) most = 10 * least;
-    }
-    double at(double value) const {
-        constexpr double of_zero = 0.08; // share of the axis
-        const double begin = has_zero ? from + of_zero * (to - from) : from;
-        if (!(value > 0)) return from + (has_zero ? of_zero / 4 * (to - from) : 0);
-        return begin + (to - begin) * std::log(value / least) / std::log(most / least);
-    }
-    std::vector<double> ticks() const {
-        std::vector<double> all;
-        for (double decade = std::pow(10, std::ceil(std::log10(least) - 1e-9)); decade <= most * (1 + 1e-9);
-             decade *= 10)
-            all.push_back(decade);
-        return all;
-    }
-};
 
 struct PlotBox {
     glm::dvec2 low, high;
@@ -95,7 +67,7 @@ void draw_plot(Drawing& drawing, glm::dvec2 corner, const std::string& title, co
     const double right = plot_width - margin_right, bottom = plot_height - margin_bottom;
     std::vector<double> costs, errors;
     for (const AccuracyPoint& p : points) costs.push_back(p.cost()), errors.push_back(p.error());
-    const PlotScale x(costs, margin_left, right), y(errors, bottom, margin_top);
+    const LogScale x(costs, margin_left, right), y(errors, bottom, margin_top);
     constexpr double tick_gap = 5;
     const auto text = [&](glm::dvec2 at, const std::string& words, Align align) {
         drawing.text(origin + at, words, plot_ink, text_height, align);

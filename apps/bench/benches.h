@@ -31,7 +31,7 @@ BenchReport bench_engine(const EngineOptions& options);
 
 // What fold tests save, and whether anything of it can be seen; against what was promised. Inputs: the meshes and the
 // others; if there are no meshes, installed ones.
-inline constexpr std::array perception_groups = {"savings", "aside", "random", "far", "hard", "tolerance"};
+inline constexpr std::array perception_groups = {"savings", "aside", "random", "far", "hard", "tolerance", "checked"};
 struct PerceptionOptions : BenchOptions {
     std::vector<std::string> meshes = {}; // of all groups
     std::vector<std::string> others = {}; // in the random views and far away, too
@@ -50,6 +50,14 @@ BenchReport bench_libraries(const BenchOptions& options);
 // which engines switch: what people would see, from the sides that the levels were looked at from. Inputs: meshes or
 // trees; if empty corner_models.
 BenchReport bench_lod(const BenchOptions& options);
+
+// What pictures of budgets show beside meshoptimizer's simplification of as many triangles, by SSIM, PSNR and both judges, in
+// three views; and how many times fewer of ours show as little. Inputs: meshes or trees; if empty corner_models.
+struct QualityOptions : BenchOptions { // quick: the first view alone
+    std::string plot = {}, sheet = {}; // of the first view: curves; pictures beside each other
+    int window_px = 512;
+};
+BenchReport bench_quality(const QualityOptions& options);
 
 // Varies one factor of the fold model at a time. Counts the triangles that the test by errors keeps in all views of a
 // tuning set, and what the first judge sees of that. The tuning set has no mesh of the evidence.

@@ -5,6 +5,19 @@
 #include "bench_tools.h"
 
 namespace unseen::app {
+namespace {
+
+session::Session session_like(const session::Session& own, const vdtree::Mesh& simple) {
+    session::Scene scene;
+    scene.objects.push_back(session::Object{tree_like(own.tree(), simple), own.scene().objects[0].placement});
+    scene.background = own.scene().background;
+    return require(session::Session::create(std::move(scene), own.observer()));
+}
+
+} // namespace
+
+DrawnPeer::DrawnPeer(const render::Context& context, const session::Session& own, const vdtree::Mesh& simple)
+    : session(session_like(own, simple)), renderer(require(session::SceneRenderer::create(context, session))) {}
 
 session::PictureVerdict CarefulJudge::judge(session::SceneRenderer& renderer, std::span<const vdtree::Cut> cuts) {
     session::PictureVerdict verdict;

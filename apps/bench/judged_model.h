@@ -38,6 +38,14 @@ private:
     std::map<int, session::PictureJudge> judges_; // by samples
 };
 
+// Another simplification of a session's only object, drawn like it.
+struct DrawnPeer {
+    DrawnPeer(const render::Context& context, const session::Session& own, const vdtree::Mesh& simple);
+
+    session::Session session;
+    session::SceneRenderer renderer;
+};
+
 // What was seen of a cut, by both judges of the default observer.
 struct Seen {
     vdtree::Index triangles = 0;

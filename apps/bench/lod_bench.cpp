@@ -26,23 +26,6 @@ struct LodSeen {
     }
 };
 
-// The peer's mesh, drawn like the model itself.
-struct LodPeer {
-    LodPeer(const render::Context& context, const session::Session& own, const vdtree::Mesh& simple)
-        : session(like(own, simple)), renderer(require(session::SceneRenderer::create(context, session))) {}
-
-    session::Session session;
-    session::SceneRenderer renderer;
-
-private:
-    static session::Session like(const session::Session& own, const vdtree::Mesh& simple) {
-        session::Scene scene;
-        scene.objects.push_back(session::Object{tree_like(own.tree(), simple), own.scene().objects[0].placement});
-        scene.background = own.scene().background;
-        return require(session::Session::create(std::move(scene), own.observer()));
-    }
-};
-
 // One model's levels, and meshoptimizer's of as many triangles.
 void add_model(const render::Context& context, const std::string& model, BenchTable& table) {
     ViewOptions view;
@@ -62,8 +45,8 @@ void add_model(const render::Context& context, const std::string& model, BenchTa
         vdtree::Mesh simple;
         if (has_meshoptimizer())
             simple = level == 0 ? full : simplified_by_meshoptimizer(full, object.levels[level].triangles, true);
-        std::unique_ptr<LodPeer> peer;
-        if (!simple.triangles.empty()) peer = std::make_unique<LodPeer>(context, session, simple);
+        std::unique_ptr<DrawnPeer> peer;
+        if (!simple.triangles.empty()) peer = std::make_unique<DrawnPeer>(context, session, simple);
         std::vector<vdtree::Cut> cuts;
         cuts.push_back(object.cut(level));
         constexpr std::uint64_t other_directions = 77'000'000'000; // that making the levels had nothing to do with

@@ -15,6 +15,7 @@ BenchReport no_pictures() {
 
 BenchReport bench_perception(const PerceptionOptions&) { return no_pictures(); }
 BenchReport bench_lod(const BenchOptions&) { return no_pictures(); }
+BenchReport bench_quality(const QualityOptions&) { return no_pictures(); }
 BenchReport bench_fit(const FitOptions&) { return no_pictures(); }
 BenchReport bench_scenes(const ScenesOptions&) { return no_pictures(); }
 BenchReport bench_selection(const SelectionOptions&) { return no_pictures(); }

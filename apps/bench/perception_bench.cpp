@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include <hard_mesh.h>
+#include <unseen/session_gpu/checked.h>
 
 #include "bench_tools.h"
 #include "benches.h"
@@ -98,7 +99,8 @@ public:
         const std::pair<const char*, void (PerceptionBench::*)()> steps[] = {
             {"savings", &PerceptionBench::savings},     {"aside", &PerceptionBench::aside},
             {"random", &PerceptionBench::random_views}, {"far", &PerceptionBench::far_away},
-            {"hard", &PerceptionBench::hard},           {"tolerance", &PerceptionBench::tolerance}};
+            {"hard", &PerceptionBench::hard},           {"tolerance", &PerceptionBench::tolerance},
+            {"checked", &PerceptionBench::checked}};
         for (const auto& [group, measure] : steps) {
             group_ = group;
             if (is_wanted(group)) (this->*measure)();
@@ -548,6 +550,49 @@ private:
                                  " px. No one tolerance does for both. The perceptual threshold is 1 everywhere"});
         }
         for (const FoldTest test : tests) add_line({.fold_test = test}, "threshold 1", "everywhere");
+        report_.tables.push_back(std::move(details));
+    }
+
+    // ---- cells checked by pictures, in views that had no part in it
+
+    void checked() {
+        constexpr double cell_degrees = 5;
+        const int views = options_.quick ? 5 : 50;
+        BenchTable details{
+            "One simplification for a cell of 5 degrees around a view, 80% of the height: by the model as a "
+            "mesh, and checked by pictures; what both judges see in " +
+                std::to_string(views) + " other views of the cell",
+            {{"mesh"}, {"looked at"}, {"model"}, {"checked"}, {"of it"}, {"visible"}, {"largest V"}, {"s"}}};
+        std::size_t done = 0;
+        for (const auto& model : models_) {
+            if (model->triangles() > huge_mesh) continue;
+            for (const double gaze : gazes) {
+                progress(done++, models_.size() * std::size(gazes));
+                const ToldLook how = look({0.3, 0.2, 1}, 0.8, gaze);
+                model->look(how);
+                session::Session& session = model->session(promised);
+                session.set_gaze(how.gaze_px ? std::optional(session::Gaze{*how.gaze_px}) : std::nullopt);
+                const auto bounded = require(session.simplify(model->view(), {.reasons = false}));
+                const auto made = require(session::simplify_checked(
+                    session, context_, model->view(), {.reasons = false}, {.cell_degrees = cell_degrees}));
+                const auto renderer = std::make_shared<session::SceneRenderer>(
+                    require(session::SceneRenderer::create(context_, session)));
+                std::uint64_t visible = 0;
+                double v = 0;
+                constexpr std::uint64_t other_views = 77'000'000'000; // that checking had nothing to do with
+                for (const vdtree::View& view :
+                     session::views_in_cell(model->view(), cell_degrees, views, other_views)) {
+                    const auto seen = CarefulJudge(renderer, session, view).judge(*renderer, made.cuts);
+                    visible += std::max(seen.visible_pixels, seen.second_visible_pixels);
+                    v = std::max({v, seen.v, seen.second_v});
+                }
+                details.rows.push_back({model->name(), gaze_name(gaze), thousands(bounded.stats.triangles),
+                                        thousands(made.stats.triangles),
+                                        percent(static_cast<double>(made.stats.triangles) / bounded.stats.triangles, 3),
+                                        count(static_cast<double>(visible)), number(v, 2),
+                                        number(made.check->seconds, 2)});
+            }
+        }
         report_.tables.push_back(std::move(details));
     }
 

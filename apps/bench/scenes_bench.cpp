@@ -51,7 +51,7 @@ public:
     }
     Row as_seen(const std::string& method, const session::AsSeenOptions& how, double threshold = 1) {
         const auto start = BenchClock::now();
-        const session::Request request{.threshold = threshold, .purpose = session::Purpose::picture};
+        const session::Request request{.goal = Goal::up_to(threshold), .purpose = session::Purpose::picture};
         const auto made = require(session::simplify_as_seen(session, context_, view, request, how));
         Row row = judge(method, made.cuts, seconds_since(start));
         row.passes = made.passes;

@@ -29,6 +29,34 @@ std::vector<std::pair<const session::Effect*, std::size_t>> merged(std::span<con
     return all;
 }
 
+Json to_json(const session::CheckFacts& c) {
+    return {{"cost", c.cost},
+            {"most_v", c.most_v},
+            {"cell_degrees", c.cell_degrees},
+            {"fitted_views", c.fitted_views},
+            {"verified_views", c.verified_views},
+            {"v", c.v},
+            {"second_v", c.second_v},
+            {"looks", c.looks},
+            {"rounds", c.rounds},
+            {"seconds", c.seconds},
+            {"settled", c.is_settled}};
+}
+
+// "by both judges, in 8 other views (V .83 and .87)".
+std::string checked_text(const session::CheckFacts& c) {
+    if (c.verified_views == 0)
+        return c.cost > 0 ? "by both judges in " + std::to_string(c.fitted_views) +
+                                " views by which it was found, not verified in others"
+                          : "whatever is folded shows: this is the full model";
+    std::string text = c.most_v <= 1 ? "neither judge sees a difference"
+                                     : "both judges see no more than " + rounded(c.most_v, 3) + " thresholds";
+    text += " in " + std::to_string(c.verified_views) + " views that had no part in it (V " + rounded(c.v, 2) +
+            " and " + rounded(c.second_v, 2) + ")";
+    if (c.cell_degrees > 0) text += " within " + rounded(c.cell_degrees, 3) + " degrees of this one";
+    return text + (c.is_settled ? "" : "; fewer triangles might do as well");
+}
+
 } // namespace
 
 Json to_json(const session::Report& s, double draw_ms) {
@@ -45,6 +73,7 @@ Json to_json(const session::Report& s, double draw_ms) {
                  {"max_fold_cost", number_or_null(cost)},
                  {"effects", to_json(s.effects)}};
     if (!s.passes.empty()) json["passes"] = passes_to_json(s.passes);
+    if (s.check) json["check"] = to_json(*s.check);
     return json;
 }
 
@@ -117,15 +146,17 @@ std::string seen_from_text(const session::Report& s, const perception::Display& 
 
 std::string visibility_text(const session::Report& s, const session::Observer& observer, const DisplayOptions& display,
                             const std::string& where) {
-    std::string text = seen_from_text(s, observer.display);
-    if (is_whole(s) || std::isnan(s.imperceptible_from_m)) return text;
+    std::string text = s.check ? checked_text(*s.check) : seen_from_text(s, observer.display);
+    if (is_whole(s) || (!s.check && std::isnan(s.imperceptible_from_m))) return text;
 
     const bool is_default_display =
         display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
     const session::FoldTest test = s.fold_tests.front();
-    text += ": by the model (fold test " + session::name_of(test) +
-            (session::facts_of(test).is_safe ? "" : ", which misses some changes") + "), which can be wrong, for " +
-            describe(observer) + ", " + where + ", on " +
+    if (s.check) text += ": by pictures";
+    else
+        text += ": by the model (fold test " + session::name_of(test) +
+                (session::facts_of(test).is_safe ? "" : ", which misses some changes") + "), which can be wrong";
+    text += ", for " + describe(observer) + (s.check ? "" : ", " + where) + ", on " +
             (is_default_display ? "the default display" : "this display") + ", ";
     if (!observer.gaze) return text + "wherever they look";
     const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };

@@ -256,7 +256,7 @@ void add_quality_option(CLI::App& verb, session::Request& request) {
             }
         const auto cost = finite_from(given);
         if (!cost || !(*cost > 0)) refuse("--quality: must be " + names + ", or a cost above 0, not '" + given + "'");
-        request.threshold = *cost;
+        request.goal = Goal::up_to(*cost);
     };
     verb.add_option_function<std::string>("--quality", take, text)->type_name("NAME|COST");
 }
@@ -422,6 +422,29 @@ void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules
                      {"--full", "--pixels", "--fold-test luebke-hallen", "--fold-test luebke-hallen-safe",
                       "--fold-test extent", "--fold-test displacement"},
                      "only --fold-test error knows what masks"});
+}
+
+void add_check_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {
+    verb.add_flag(
+        "--checked", o.is_checked,
+        "As few triangles as pictures show nothing of, or with --quality no more than that: two judges look at "
+        "some ten of them, and at views that had no part in it");
+    add_value(verb, "--check-cell", o.check_cell, within(0, 10), "DEGREES",
+              "With --checked: the eye may go so far around what it looks at, any way (default: 0, this view alone)");
+    add_value(verb, "--check-seconds", o.check_seconds, positive(), "T",
+              "With --checked: after T seconds the best cut so far is taken (default: 120)");
+    for (const char* option : {"--check-cell", "--check-seconds"})
+        rules.push_back({option, Rule::needs_one_of, {"--checked"}});
+    rules.push_back({"--checked",
+                     Rule::excludes,
+                     {"--full", "--triangles", "--ratio", "--pixels", "--milliseconds"},
+                     "it finds the number of triangles itself"});
+    rules.push_back({"--checked",
+                     Rule::excludes,
+                     {"--fold-test extent", "--fold-test displacement"},
+                     "they do not order folds by what is seen of them"});
+    rules.push_back({"--checked", Rule::excludes, {"--masking scene"}, "the judges see by themselves what masks"});
+    rules.push_back({"--checked", Rule::excludes, {"--orthographic", "--visibility spheres"}, "it goes by pictures"});
 }
 
 } // namespace unseen::app

@@ -104,7 +104,10 @@ struct WhatOptions {
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> velocity_deg_s; // of everything, on the retina
     Hiding hiding = Hiding::spheres;
-    bool masks = false; // the scene masks what folds change
+    bool masks = false;      // the scene masks what folds change
+    bool is_checked = false; // by pictures; with
+    double check_cell = 0;   // degrees
+    double check_seconds = 120;
     perception::DegreesPerSecond velocity() const { return perception::DegreesPerSecond(velocity_deg_s.value_or(0)); }
 };
 
@@ -119,9 +122,10 @@ void add_model_option(CLI::App& verb, std::string& model, bool takes_scenes = tr
 // The group WHAT. `rules`: what excludes what, for check_rules().
 void add_what_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 void add_hiding_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
-// A quality by name, or the cost up to which folds are made: session::fold_cost().
+// A quality by name, or the cost up to which folds are made: session::Goal::cost.
 void add_quality_option(CLI::App& verb, session::Request& request);
 void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
+void add_check_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse, std::vector<Rule>& rules);
 // How well the gaze is known. `moves`: so that it may be late, too.

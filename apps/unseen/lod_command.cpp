@@ -166,7 +166,7 @@ Result<std::vector<std::string>> write_separately(const LodArguments& a, const s
 Result<session::Lod> make_levels(LodArguments& a, session::Session& session, const render::Context& context) {
     if (session.scene().objects.empty())
         return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
-    a.options.cost = session::fold_cost(a.quality);
+    a.options.cost = a.quality.goal.cost;
     ProgressBar bar("judging levels");
     a.options.progress = std::ref(bar);
     return session::make_levels(session, context, a.options);

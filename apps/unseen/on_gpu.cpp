@@ -1,24 +1,50 @@
 #include "on_gpu.h"
 
+#include <optional>
+
 #include <unseen/render/context.h>
 #include <unseen/session_gpu/as_seen.h>
+#include <unseen/session_gpu/checked.h>
 #include <unseen/session_gpu/gpu_judge.h>
 
+#include "interruption.h"
+#include "progress_bar.h"
+
 namespace unseen::app {
+
+namespace {
+
+Result<session::Simplification> checked(const WhatOptions& what, session::Session& session, const vdtree::View& view,
+                                        const session::Request& request, const render::Context& context) {
+    const Interruptible until_interrupted;
+    ProgressBar bar("checking");
+    session::CheckOptions options{.cell_degrees = what.check_cell, .seconds = what.check_seconds};
+    options.progress = [&](double share, const char* stage) {
+        return bar(share, stage) && !until_interrupted.is_interrupted();
+    };
+    return session::simplify_checked(session, context, view, request, options);
+}
+
+} // namespace
 
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context) {
     const bool is_summed =
         session::goes_by_sum(request) && request.purpose == session::Purpose::picture && !view.orthographic_height;
-    if (what.hiding == Hiding::spheres && !what.masks && !is_summed) return session.simplify(view, request);
+    if (what.hiding == Hiding::spheres && !what.masks && !is_summed && !what.is_checked)
+        return session.simplify(view, request);
+    std::optional<render::Context> own;
+    if (!context) {
+        auto made = render::Context::headless();
+        if (!made) return made.error();
+        context = &own.emplace(std::move(*made));
+    }
+    if (what.is_checked) return checked(what, session, view, request, *context);
     session::AsSeenOptions options;
     options.folds_hidden = what.hiding == Hiding::picture || is_summed;
     options.masking = what.masks ? session::Masking::scene : session::Masking::none;
-    if (context) return session::simplify_as_seen(session, *context, view, request, options);
-    const auto own = render::Context::headless();
-    if (!own) return own.error();
-    return session::simplify_as_seen(session, *own, view, request, options);
+    return session::simplify_as_seen(session, *context, view, request, options);
 }
 
 Result<Verdict> compare_on_gpu(const perception::Image& reference, const perception::Image& test,

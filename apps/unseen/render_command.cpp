@@ -136,6 +136,7 @@ Command render_command(CLI::App& app, Setup& setup) {
     CLI::Option* visibility = verb->get_option("--visibility");
     visibility->description(visibility->get_description() + "; default: picture, in orthographic views spheres");
     add_masking_option(*verb, a->what, rules);
+    add_check_options(*verb, a->what, rules);
     add_choice<GazeSource, GazeSource>(*verb, "--gaze-mode", a->gaze.source, {{"head", GazeSource::head}},
                                        "head: no tracker; the viewer looks within 15 degrees of the middle");
     add_tracker_option(*verb, a->gaze, false);

@@ -60,7 +60,7 @@ Result<session::StudyCondition> condition_named(const std::string& text, std::ui
     const auto number = finite_from(value);
     const bool is_positive = number && *number > 0;
     if (kind == "threshold" && is_positive) {
-        condition.request.threshold = *number;
+        condition.request.goal = Goal::up_to(*number);
         return condition;
     }
     if (kind == "pixels" && is_positive) {

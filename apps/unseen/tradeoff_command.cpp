@@ -31,10 +31,10 @@ std::string options_of(const session::TradeoffPoint& point) {
     case session::Goal::Kind::full: return "--full";
     case session::Goal::Kind::budget: return "--triangles " + std::to_string(request.goal.triangles);
     case session::Goal::Kind::pixels: text = "--pixels " + shortest(request.goal.tolerance_px); break;
-    case session::Goal::Kind::imperceptible:
-        text = "--quality " + (request.threshold == 1 ? "invisible" : shortest(request.threshold));
+    case session::Goal::Kind::quality:
+        const session::QualityFacts* const named = session::named_quality(request.goal);
+        text = "--quality " + (named ? std::string(named->name) : shortest(request.goal.cost));
         break;
-    case session::Goal::Kind::quality: text = "--quality " + std::string(facts_of(request.goal.named).name); break;
     }
     if (request.fold_test) text += " --fold-test " + session::name_of(*request.fold_test);
     if (point.is_of_view) text += " --visibility picture";

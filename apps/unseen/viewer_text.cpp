@@ -43,9 +43,9 @@ std::string viewer_mode(const ViewerState& state) {
     case session::Goal::Kind::full: return "whole";
     case session::Goal::Kind::budget: return "budget of " + grouped(state.goal.triangles);
     case session::Goal::Kind::pixels: return "up to " + rounded(state.goal.tolerance_px, 3) + " pixels";
-    case session::Goal::Kind::quality: return std::string(facts_of(state.goal.named).name);
-    case session::Goal::Kind::imperceptible: break;
+    case session::Goal::Kind::quality: break;
     }
+    if (state.goal.summed_cost > 0) return std::string(session::named_quality(state.goal)->name);
     return state.gaze ? "gaze-directed" : "imperceptible";
 }
 

@@ -44,12 +44,13 @@ TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {
     EXPECT_EQ(object.levels[0].triangles, session.tree().triangle_count());
     EXPECT_EQ(object.levels[0].distance, 0);
     std::uint64_t seen_near = 0;
+    double nearest = 1; // share of what the fold test promises
     for (std::size_t i = 1; i < object.levels.size(); ++i) {
         const LodLevel& level = object.levels[i];
         EXPECT_LT(level.triangles, object.levels[i - 1].triangles);
         EXPECT_EQ(level.triangles, object.cut(i).triangle_count());
         EXPECT_GE(level.distance, lod_step * object.levels[i - 1].distance);
-        EXPECT_GE(level.distance, level.promised_distance * (1 - 1e-12)); // grown by whole factors
+        nearest = std::min(nearest, level.distance / level.promised_distance);
         EXPECT_LT(level.coverage, object.levels[i - 1].coverage);
         EXPECT_GT(level.pixel_error, 0);
         EXPECT_EQ(level.checks.size(), 12u);
@@ -64,6 +65,7 @@ TEST_F(LodTest, NobodySeesALevelFromItsDistanceAndSomebodyFromNearBy) {
             seen_near += seen(context(), session, *lod, i, near, direction);
         }
     }
+    EXPECT_LT(nearest, 0.9);
     EXPECT_GT(seen_near, 0u); // the distances are worth something, and the judges are not blind
 }
 
@@ -71,7 +73,7 @@ TEST_F(LodTest, LowerQualitiesBeginNearer) {
     Session session = bumpy();
     LodOptions options{.chain = {.levels = 3}, .directions = 3, .samples = 16};
     const auto unseen = require(make_levels(session, context(), options));
-    options.cost = fold_cost({.goal = Goal::quality(Quality::draft)});
+    options.cost = Goal::quality(Quality::draft).cost;
     const auto draft = require(make_levels(session, context(), options));
     const LodLevel &far = unseen->objects[0].levels.back(), &near = draft->objects[0].levels.back();
     EXPECT_EQ(near.triangles, far.triangles);

@@ -85,7 +85,8 @@ TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
     };
     for (const Words& request : requests) {
         SCOPED_TRACE(::testing::PrintToString(request));
-        const double still = render(request, "still.png")["triangles"];
+        // Flights do not fold what a picture hides.
+        const double still = render(joined(request, {"--visibility", "spheres"}), "still.png")["triangles"];
         Words flight =
             joined({"fly", "ball.vdt", "--path", "orbit:0:1", "--no-draw", "--csv", "flight.csv", "--size", "200x160"},
                    request);
@@ -707,6 +708,25 @@ TEST_F(RenderCommandTest, AnswersInThreeLines) {
                                         "wrote o.png \\([0-9.]+ kB\\)\n"));
     const Outcome verbose = run({"render", "ball.vdt", "-o", "o.png", "--size", "96x80", "--verbose"});
     for (const std::string text : {"drawn in", "effects\n", "drawn by "}) EXPECT_THAT(verbose.out, HasSubstr(text));
+}
+
+TEST_F(RenderCommandTest, PicturesCheckHowFewDo) {
+    const double bounded = render({}, "bounded.png")["triangles"];
+    const Words checked = {"render", "ball.vdt", "-o", "o.png", "--size", "96x80", "--checked"};
+    const Json report = succeed(joined(checked, {"--json", "-"})).json();
+    EXPECT_LE(report["triangles"], bounded);
+    const Json& check = report["check"];
+    EXPECT_LT(std::max(check["v"].get<double>(), check["second_v"].get<double>()), 1);
+    EXPECT_EQ(check["verified_views"], 3);
+    EXPECT_EQ(check["settled"], true);
+    EXPECT_THAT(succeed(checked).out,
+                ::testing::ContainsRegex("neither judge sees a difference in 3 views that had no part in it \\(V "));
+    EXPECT_THAT(succeed(joined(checked, {"--quality", "draft"})).out, HasSubstr("no more than 9 thresholds"));
+    const auto refused = [&](Words more) { return run(joined(checked, more)).err; };
+    EXPECT_THAT(refused({"--triangles", "20"}), HasSubstr("it finds the number of triangles itself"));
+    EXPECT_THAT(refused({"--pixels", "2"}), HasSubstr("it finds the number of triangles itself"));
+    EXPECT_THAT(refused({"--check-cell", "11"}), HasSubstr("--check-cell"));
+    EXPECT_THAT(run({"render", "ball.vdt", "-o", "o.png", "--check-cell", "2"}).err, HasSubstr("--checked"));
 }
 
 TEST_F(RenderCommandTest, FlightsDrawWhatIsKept) {

@@ -45,7 +45,7 @@ int change(Question& q, int number) {
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 
-    auto& [goal, fold_test, chroma, milliseconds, threshold, hysteresis, purpose, order, shown, masking, keeps_shadows,
+    auto& [goal, fold_test, chroma, milliseconds, hysteresis, purpose, order, shown, masking, keeps_shadows,
            may_measure, reasons] = q.request;
     set(goal, Goal::full());
     set(goal, Goal::budget(400));
@@ -55,7 +55,7 @@ int change(Question& q, int number) {
     for (const session::FoldTestFacts& facts : session::fold_tests()) set(fold_test, facts.test);
     set(chroma, true);
     set(milliseconds, 1e6);
-    set(threshold, 3.0);
+    set(goal, Goal::up_to(3));
     set(hysteresis, 2.0f);
     set(purpose, session::Purpose::picture);
     set(order, session::Order::largest);
@@ -82,7 +82,7 @@ session::Request with_pictures(const Question& q, const Session& session) {
     const auto pixels = static_cast<std::size_t>(q.view.width) * static_cast<std::size_t>(q.view.height);
     if (q.is_shown) { // a wall through the middle
         const auto shown = vdtree::DepthPicture::create(q.view, std::vector<float>(pixels, 4));
-        if (shown) request.shown = *shown;
+        if (shown) request.shown = {*shown};
     }
     if (q.is_masked) {
         perception::MaskingPicture::Elevations e{32, (q.view.width + 31) / 32, (q.view.height + 31) / 32, {}, {}};

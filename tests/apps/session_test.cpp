@@ -48,8 +48,8 @@ TEST(Request, NamesTheFieldThatIsWrong) {
     EXPECT_THAT(complaint_about({.fold_test = FoldTest::extent}), HasSubstr("request.fold_test = extent"));
     EXPECT_THAT(complaint_about({.fold_test = FoldTest::error, .chroma = true}), HasSubstr("request.chroma"));
     EXPECT_THAT(complaint_about({.milliseconds = nan}), HasSubstr("request.milliseconds"));
-    EXPECT_THAT(complaint_about({.threshold = nan}), HasSubstr("request.threshold"));
-    EXPECT_THAT(complaint_about({.goal = Goal::budget(5), .threshold = 2}), HasSubstr("request.threshold"));
+    EXPECT_THAT(complaint_about({.goal = Goal::up_to(nan)}), HasSubstr("request.goal.cost"));
+    EXPECT_THAT(complaint_about({.goal = {.summed_cost = -1}}), HasSubstr("request.goal.cost"));
     EXPECT_THAT(complaint_about({.hysteresis = 3}), HasSubstr("request.hysteresis"));
 }
 

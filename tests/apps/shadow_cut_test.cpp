@@ -273,7 +273,7 @@ TEST_P(ShadowCut, FromScratchDependsOnNoViewBefore) {
         ASSERT_TRUE(follower.follow(vdtree::orbited(view, degrees), request));
         EXPECT_EQ(triangles_of(*used), first) << degrees;
     }
-    request.threshold = 0.5;
+    request.goal = session::Goal::up_to(0.5);
     ASSERT_TRUE(used->simplify(view, request));
     ASSERT_TRUE(unused->simplify(view, request));
     EXPECT_EQ(triangles_of(*used), triangles_of(*unused));

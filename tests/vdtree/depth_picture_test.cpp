@@ -2,6 +2,8 @@
 #include <unseen/vdtree/depth_picture.h>
 #include <unseen/vdtree/internal/footprint.h>
 
+#include <set>
+
 #include <unseen/vdtree/cut.h>
 
 #include "built.h"
@@ -117,8 +119,8 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     std::vector<float> depth(64 * 64, infinity);
     for (std::size_t i = 0; i < depth.size(); ++i)
         if (i % 64 < 32) depth[i] = 3;
-    const auto hidden = require(find_hidden(tree, {}, *DepthPicture::create(view, depth)));
-    const auto criterion = require(folding_hidden(tree, extent, *hidden));
+    const auto shown = require(find_shown(tree, {}, *DepthPicture::create(view, depth), false));
+    const auto criterion = require(folding_hidden(tree, extent, shown->hidden));
     EXPECT_TRUE(criterion->is_monotone());
     Cut half(tree);
     ASSERT_TRUE(half.follow(*criterion, viewpoint));
@@ -127,6 +129,54 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const NodeId place = tree.place_of_leaf(leaf);
         if (tree.position(place).x + tree.origin().x > 0.05) ASSERT_TRUE(half.is_active(place)) << leaf;
+    }
+}
+
+// Rough balls behind plates with holes, from several sides.
+TEST(DepthPicture, WhatFoldsStaysHidden) {
+    const Mesh ball = shapes::bumpy_sphere(4, 0.05);
+    const VertexTree tree = support::built(shapes::together(ball, shapes::placed(ball, 0.5, {0.9, 0.1, 0.8})));
+    std::mt19937_64 random(5);
+    for (int trial = 0; trial < 6; ++trial) {
+        View view;
+        view.eye = 7.0 * shapes::random_direction(random);
+        view.fov_y_degrees = 25;
+        view.width = 90, view.height = 80;
+        const std::vector<float> depth = blocks(view, random);
+        const DepthPicture picture = *DepthPicture::create(view, depth);
+        const auto shown = require(find_shown(tree, {}, picture, false));
+        // Nothing but what is hidden folds.
+        const DistanceCriterion never = *extent_criterion(tree, view, 1e-9);
+        const auto criterion = require(folding_hidden(tree, never, shown->hidden));
+        Cut cut(tree);
+        ASSERT_TRUE(cut.follow(*criterion, {.eye = view.eye - tree.origin()}));
+        EXPECT_LT(cut.triangle_count(), tree.triangle_count()) << trial;
+        const Mesh mesh = extract_mesh(cut);
+        const Projector project(view);
+        std::set<std::array<double, 9>> original;
+        const auto key = [](const Mesh& of, const Triangle& t) {
+            std::array<double, 9> all{};
+            for (std::size_t k = 0; k < 3; ++k)
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    all[3 * k + axis] = of.positions[t[k]][static_cast<glm::length_t>(axis)];
+            return all;
+        };
+        Cut whole(tree);
+        whole.unfold_all();
+        const Mesh full = extract_mesh(whole);
+        for (const Triangle& t : full.triangles) original.insert(key(full, t));
+        int others = 0;
+        for (const Triangle& t : mesh.triangles) {
+            if (original.contains(key(mesh, t))) continue;
+            ++others;
+            for (int i = 0; i < 30; ++i) {
+                const double u = shapes::random_between(random, 0, 1), v = shapes::random_between(random, 0, 1 - u);
+                const glm::dvec3 point = (1 - u - v) * glm::dvec3(mesh.positions[t[0]]) +
+                                         u * glm::dvec3(mesh.positions[t[1]]) + v * glm::dvec3(mesh.positions[t[2]]);
+                ASSERT_TRUE(is_hidden(view, depth, point)) << trial;
+            }
+        }
+        EXPECT_GT(others, 0) << trial;
     }
 }
 

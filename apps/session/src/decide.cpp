@@ -79,7 +79,7 @@ Result<void> check_knowledge(Sight& sight, FoldTest test, bool chroma, bool show
 } // namespace
 
 Result<Decision> decide(Sight& sight, const Request& request, std::size_t object) {
-    if (request.shown && request.shown->view() != sight.view)
+    if (request.purpose == Purpose::picture && !request.shown.empty() && request.shown[0].view() != sight.view)
         return invalid_field("{request.shown} is of another view.");
     if (!request.masking.empty() && object >= request.masking.size())
         return invalid_field("{request.masking} has fewer pictures than the scene has objects.");
@@ -93,7 +93,7 @@ Result<Decision> decide(Sight& sight, const Request& request, std::size_t object
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
-    if (const auto known = check_knowledge(sight, choice.test, request.chroma, request.shown.has_value()); !known)
+    if (const auto known = check_knowledge(sight, choice.test, request.chroma, !request.shown.empty()); !known)
         return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure && !(sight.lighting && has_lit_errors(sight)))

@@ -37,7 +37,7 @@ struct Reason {
 };
 
 // An effect that needs something says `otherwise` without it.
-enum class Needs { nothing, folds, perception, picture };
+enum class Needs { nothing, folds, perception, picture, pictures };
 struct EffectRow {
     const char* name;
     Needs needs;
@@ -201,10 +201,10 @@ Reason imperceptible_distance(const Cutting& c) {
     if (!c.is_perceptual()) return {false, "costs of the fold test " + c.test() + " are no distances"};
     if (c.facts && std::isinf(c.facts->imperceptible_from_m))
         return {false, "a fold around the eye or across its plane stays visible from everywhere"};
-    if (c.decision.request.goal.kind != Goal::Kind::imperceptible)
+    if (c.decision.request.goal.kind != Goal::Kind::quality)
         return {true, "the display's distance times the largest fold cost"};
     return {true,
-            "the display's distance times " + rounded(c.decision.request.threshold, 4) + ", above which no fold costs"};
+            "the display's distance times " + rounded(c.decision.request.goal.cost, 4) + ", above which no fold costs"};
 }
 
 Reason back_face_folding(const Cutting& c) {
@@ -217,7 +217,7 @@ Reason back_face_folding(const Cutting& c) {
 
 Reason hidden_folding(const Cutting& c) {
     if (folds_unseen(c.sight, c.decision))
-        return {true, c.but_shadows("what lies behind what this view shows is folded, by a picture of its depths")};
+        return {true, c.but_shadows("what lies behind what the view shows is folded, by pictures of its depths")};
     if (may_cast_anything(c.sight, c.decision)) return {false, may_cast};
     if (!folds_hidden(c.sight, c.decision))
         return {false, c.is_perceptual() ? "nothing solid is looked at from outside"
@@ -278,8 +278,8 @@ constexpr EffectRow effect_rows[] = {
 // The full model has none of these.
 constexpr EffectRow rows_of_folds[] = {
     {"back-face folding", Needs::picture, from_elsewhere, back_face_folding},
-    {"hidden folding", Needs::picture, from_elsewhere, hidden_folding},
-    {"sum of errors", Needs::picture, "what adds up is seen in a picture alone", summed},
+    {"hidden folding", Needs::pictures, from_elsewhere, hidden_folding},
+    {"sum of errors", Needs::pictures, "what adds up is seen in a picture alone", summed},
     {"masking", Needs::nothing, "", masking},
     {"time limit", Needs::nothing, "", time_limit},
 };
@@ -293,6 +293,7 @@ std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, con
         const bool has_it = row.needs == Needs::folds        ? !c.is_full()
                             : row.needs == Needs::perception ? c.is_perceptual()
                             : row.needs == Needs::picture    ? !c.is_for_mesh()
+                            : row.needs == Needs::pictures   ? !c.is_for_mesh() || !c.decision.request.shown.empty()
                                                              : true;
         Reason reason = has_it ? row.reason(c) : Reason{false, row.otherwise};
         effects.push_back({.name = row.name, .on = reason.on, .why = std::move(reason.why), .object = sight.number});

@@ -73,6 +73,15 @@ struct KeptCriterion {
     std::shared_ptr<const perception::ShadowEdges> edges; // null where no light casts shadows
 };
 
+// The last ones that go by pictures, for a view of an object at its place.
+struct ShownCriteria {
+    std::shared_ptr<const KeptCriterion> of = {};
+    std::vector<vdtree::DepthPicture> pictures = {};
+    vdtree::View view = {};
+    bool culls = false;                                                           // what faces away
+    std::shared_ptr<const vdtree::DistanceCriterion> fold_test = {}, summed = {}; // the second where it was asked for
+};
+
 Key key_of(const Sight& sight, const Decision& decision);
 
 // The gaze is where the key says: one criterion does for all gazes up to there.

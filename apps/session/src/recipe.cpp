@@ -5,8 +5,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/vdtree/internal/node_bits.h>
-
 #include "shadow_outlines.h"
 
 namespace unseen::session {
@@ -40,7 +38,7 @@ vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
 
 vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
     vdtree::FollowOptions options;
-    options.threshold = static_cast<float>(fold_cost(request));
+    options.threshold = static_cast<float>(request.goal.cost);
     options.milliseconds = request.milliseconds;
     options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {
@@ -107,13 +105,13 @@ bool folds_hidden(const Sight& sight, const Decision& decision) {
 }
 
 bool folds_unseen(const Sight& sight, const Decision& decision) {
-    return decision.request.shown && is_perceptual(decision) && !is_translucent(sight);
+    return !decision.request.shown.empty() && is_perceptual(decision) && !is_translucent(sight);
 }
 
 const char* why_not_summed(const Sight& sight, const Decision& decision) {
-    const Goal::Kind kind = decision.request.goal.kind;
-    if (kind != Goal::Kind::budget && kind != Goal::Kind::quality) return "what nobody sees does not add up";
     if (decision.request.order != Order::sum) return "it is not asked for";
+    if (!goes_by_sum(decision.request) && decision.request.goal.kind == Goal::Kind::quality)
+        return "what nobody sees does not add up";
     if (decision.test != FoldTest::error) return "only the fold test error measures what adds up";
     if (!folds_unseen(sight, decision)) return "what a picture shows of each part is not known";
     return nullptr;
@@ -123,26 +121,33 @@ namespace {
 
 using SharedCriterion = std::shared_ptr<const vdtree::DistanceCriterion>;
 
-// The criterion that folds what the view hides, and for budgets by the sum one that also counts what adds up.
-Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision, const vdtree::DistanceCriterion& own,
-                                   CutRecipe& recipe) {
+SharedCriterion share(vdtree::DistanceCriterion made) {
+    return std::make_shared<const vdtree::DistanceCriterion>(std::move(made));
+}
+
+// What all pictures together show of an object.
+Result<vdtree::ShownParts> find_shown(const Sight& sight, const Decision& decision, bool only_front) {
+    std::optional<vdtree::ShownParts> all;
+    for (const vdtree::DepthPicture& picture : decision.request.shown) {
+        auto shown = vdtree::find_shown(sight.object.tree, sight.object.placement, picture, only_front);
+        if (!shown) return shown.error();
+        if (all) all->add(*shown);
+        else all = std::move(*shown);
+    }
+    return std::move(*all);
+}
+
+// The criterion that folds what is hidden, and by the sum one that also counts what adds up.
+Result<ShownCriteria> make_shown_criteria(Sight& sight, const Decision& decision, const vdtree::DistanceCriterion& own,
+                                          const CutRecipe& recipe) {
     const vdtree::VertexTree& tree = sight.object.tree;
-    const auto share = [](auto made) { return std::make_shared<const vdtree::DistanceCriterion>(std::move(*made)); };
-    const auto hidden = vdtree::find_hidden(tree, sight.object.placement, *decision.request.shown);
-    if (!hidden) return hidden.error();
-    auto without_hidden = vdtree::folding_hidden(tree, own, *hidden);
-    if (!without_hidden) return without_hidden.error();
-    recipe.criterion = share(std::move(without_hidden));
-    if (why_not_summed(sight, decision)) return {};
-    const auto shown =
-        vdtree::find_shown(tree, sight.object.placement, *decision.request.shown, recipe.options.cull_back_faces);
+    const auto shown = find_shown(sight, decision, recipe.options.cull_back_faces);
     if (!shown) return shown.error();
-    // Nothing of it is shown before it folds. That something would be afterwards, only what hides it for sure excludes.
-    std::vector<std::uint64_t> not_shown = *hidden;
-    for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node)
-        if (shown->area[node] == 0 && shown->outline[node] == 0) vdtree::set_bit(not_shown, node);
-    auto without = vdtree::folding_hidden(tree, own, not_shown);
+    auto without = vdtree::folding_hidden(tree, own, shown->hidden);
     if (!without) return without.error();
+    ShownCriteria made;
+    made.fold_test = share(std::move(*without));
+    if (why_not_summed(sight, decision)) return made;
     std::optional<vdtree::VertexTree> lit;
     if (sight.lighting) {
         auto under = sight.cache.lit_folds->under(tree, *sight.lighting);
@@ -152,11 +157,32 @@ Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision, const
     const auto costs = perception::summed_costs(lit ? *lit : tree, *shown, sight.view, sight.object.placement,
                                                 test_options(sight, decision.request));
     if (!costs) return costs.error();
-    auto summed = vdtree::costing_at_least(tree, *without, recipe.viewpoint, *costs);
+    auto summed = vdtree::costing_at_least(tree, *made.fold_test, recipe.viewpoint, *costs);
     if (!summed) return summed.error();
+    made.summed = share(std::move(*summed));
+    return made;
+}
+
+// What pictures show takes as long to find as many cuts: kept for the next one that asks for other costs.
+Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision,
+                                   const std::shared_ptr<const KeptCriterion>& own, CutRecipe& recipe) {
+    std::shared_ptr<const ShownCriteria>& last = sight.shown_criteria;
+    const bool is_summed = !why_not_summed(sight, decision);
+    const bool is_known = last && last->of == own && last->pictures == decision.request.shown &&
+                          last->view == sight.view && last->culls == recipe.options.cull_back_faces &&
+                          (last->summed || !is_summed);
+    if (!is_known) {
+        auto made = make_shown_criteria(sight, decision, own->criterion, recipe);
+        if (!made) return made.error();
+        made->of = own, made->pictures = decision.request.shown, made->view = sight.view;
+        made->culls = recipe.options.cull_back_faces;
+        last = std::make_shared<const ShownCriteria>(std::move(*made));
+    }
+    recipe.criterion = last->fold_test;
+    if (!is_summed) return {};
     if (decision.request.goal.kind == Goal::Kind::quality)
-        recipe.options.threshold = static_cast<float>(facts_of(decision.request.goal.named).summed_cost);
-    recipe.fold_test = std::exchange(recipe.criterion, share(std::move(summed)));
+        recipe.options.threshold = static_cast<float>(decision.request.goal.summed_cost);
+    recipe.fold_test = std::exchange(recipe.criterion, last->summed);
     return {};
 }
 
@@ -184,7 +210,7 @@ Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
         recipe.criterion = std::move(*with_outlines);
         return recipe;
     }
-    if (const auto made = fold_by_what_is_shown(sight, decision, kept->criterion, recipe); !made) return made.error();
+    if (const auto made = fold_by_what_is_shown(sight, decision, kept, recipe); !made) return made.error();
     if (kept->edges && decision.request.keeps_shadows) { // what is hidden may cast shadows that are not
         find_shadowing_outlines(sight, decision, kept);
         shadow_of(sight).criterion.reset();

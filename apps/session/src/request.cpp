@@ -17,13 +17,15 @@ Result<void> validate_goal(const Request& r) {
         return invalid_field("{request.goal.triangles} must be 1 or more.");
     if (r.goal.fill && r.goal.kind != Kind::budget)
         return invalid_field("{request.goal.fill} needs {request.goal.triangles}.");
+    if (!is_positive(r.goal.cost) || !(r.goal.summed_cost >= 0 && std::isfinite(r.goal.summed_cost)))
+        return invalid_field("{request.goal.cost} must be above 0 and finite.");
     if (r.goal.kind == Kind::pixels && !is_positive(r.goal.tolerance_px))
         return invalid_field("{request.goal.pixels} must be above 0 and finite.");
     if (r.goal.kind == Kind::pixels && is_perceptual(test))
         return invalid_field(
             "{request.goal.pixels} needs {request.fold_test = }extent or displacement: {} knows no pixels.",
             {name_of(test)});
-    if ((r.goal.kind == Kind::imperceptible || r.goal.kind == Kind::quality) && !is_perceptual(test))
+    if (r.goal.kind == Kind::quality && !is_perceptual(test))
         return invalid_field("{request.fold_test = }{} cannot tell what is imperceptible: ask for "
                              "{request.goal.triangles} or {request.goal.pixels}.",
                              {name_of(test)});
@@ -44,13 +46,23 @@ const QualityFacts& facts_of(Quality quality) noexcept {
     return *std::ranges::find(all_qualities, quality, &QualityFacts::quality);
 }
 
-double fold_cost(const Request& r) noexcept {
-    return r.goal.kind == Goal::Kind::quality ? facts_of(r.goal.named).cost : r.threshold;
+const QualityFacts* named_quality(const Goal& goal) noexcept {
+    if (goal.kind != Goal::Kind::quality) return nullptr;
+    for (const QualityFacts& facts : all_qualities) {
+        const Goal named = Goal::quality(facts.quality);
+        if (goal.cost == named.cost && goal.summed_cost == named.summed_cost) return &facts;
+    }
+    return nullptr;
+}
+
+bool goes_by_sum(const Request& r) noexcept {
+    return (r.goal.kind == Goal::Kind::budget || (r.goal.kind == Goal::Kind::quality && r.goal.summed_cost > 0)) &&
+           r.order == Order::sum && r.fold_test.value_or(FoldTest::error) == FoldTest::error;
 }
 
 Result<void> validate(const Request& r) {
-    if (r.shown && r.purpose != Purpose::picture)
-        return invalid_field("{request.shown} is of pictures: set {request.purpose} = picture.");
+    if (r.shown.size() > 1 && r.purpose == Purpose::picture)
+        return invalid_field("{request.shown} is of several views: set {request.purpose} = mesh.");
     if (!r.masking.empty() && r.purpose != Purpose::picture)
         return invalid_field("{request.masking} is of pictures: set {request.purpose} = picture.");
     if (const auto goal = validate_goal(r); !goal) return goal;
@@ -66,10 +78,6 @@ Result<void> validate(const Request& r) {
         return invalid_field("{request.milliseconds} must be 0 or more, and finite.");
     if (r.milliseconds && r.goal.kind == Goal::Kind::full)
         return invalid_field("{request.milliseconds} has no meaning for the full model.");
-    if (!is_positive(r.threshold)) return invalid_field("{request.threshold} must be above 0 and finite.");
-    if (r.threshold != 1 && r.goal.kind != Goal::Kind::imperceptible)
-        return invalid_field("{request.threshold} acts on the goal imperceptible alone: leave it out, other goals say "
-                             "how much is folded.");
     if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid_field("{request.hysteresis} must be from 1 to 2.");
     return {};
 }

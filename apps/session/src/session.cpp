@@ -131,8 +131,8 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
-      still_lights_(scene.objects.size() + scene.backdrop.size()),
-      lit_criteria_(scene.objects.size()), scene_shadows_{scene, caches} {
+      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
+      shown_criteria_(scene.objects.size()), scene_shadows_{scene, caches} {
     share_caches();
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;
@@ -273,8 +273,9 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view, Shadow
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], i, *caches[i], lit_criteria_[i], scene_shadows_, memory, observer, view,
-                          scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
+        sights.push_back({scene.objects[i], i, *caches[i], lit_criteria_[i], shown_criteria_[i], scene_shadows_, memory,
+                          observer, view, scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_,
+                          background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
     if (const auto looked = look_at_backdrop(view); !looked) return looked.error();
@@ -300,6 +301,7 @@ Result<void> Session::State::measure(std::size_t object) {
         scene.objects[i].tree = with_errors->share();
         caches[i].reset();
         lit_criteria_[i].reset();
+        shown_criteria_[i].reset();
         ++tree_count[i];
     }
     share_caches();

@@ -55,6 +55,7 @@ private:
     std::shared_ptr<const perception::CsfTable> widened_of_;
     std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
     std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
+    std::vector<std::shared_ptr<const ShownCriteria>> shown_criteria_;  // by object
     SceneShadows scene_shadows_;
     bool is_crowded_ = false;
     std::vector<vdtree::Plane> window_;                   // of the last look

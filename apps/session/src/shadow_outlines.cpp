@@ -171,7 +171,7 @@ bool find_shadowing_outlines(Sight& sight, const Decision& decision, const std::
     const vdtree::DistanceCriterion::Parts& parts = base->criterion.parts();
     const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
     const auto still = is_measured ? sight.lighting : nullptr;
-    const double threshold = decision.request.threshold;
+    const double threshold = decision.request.goal.cost;
     ShadowState& state = shadow_of(sight);
     const bool is_new = state.of != base || state.lighting != still || state.threshold != threshold;
     if (is_new) {

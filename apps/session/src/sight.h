@@ -9,6 +9,7 @@
 namespace unseen::session {
 
 struct KeptCriterion; // see fold_test.h
+struct ShownCriteria; // likewise
 
 // What is derived from an object's tree, made when it is first asked for. Dropped when the tree is replaced.
 struct ObjectCache {
@@ -67,7 +68,8 @@ struct Sight {
     const Object& object;
     std::size_t number; // of the object
     ObjectCache& cache;
-    std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
+    std::shared_ptr<const KeptCriterion>& lit_criterion;  // the object's own, where lights that stand still light it
+    std::shared_ptr<const ShownCriteria>& shown_criteria; // the object's own, by what pictures show
     SceneShadows& scene_shadows;
     ShadowMemory& memory;
     const Observer& observer;

@@ -6,7 +6,6 @@
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/footprint.h>
-#include <unseen/vdtree/internal/node_bits.h>
 #include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
@@ -118,20 +117,6 @@ bool DepthPicture::hides(const Footprint& of) const noexcept {
     const float shown =
         farthest(std::max(left, 0), std::max(top, 0), std::min(right, width - 1), std::min(bottom, height - 1));
     return static_cast<double>(shown) < of.nearest * (1 - depth_rounding);
-}
-
-Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
-                                               const DepthPicture& picture) {
-    const auto footprints = find_footprints(tree, placement, picture.view());
-    if (!footprints) return footprints.error();
-    const NodeId interior = tree.interior_count();
-    std::vector<std::uint64_t> hidden(words_for(interior), 0);
-    constexpr std::size_t grain = 64;
-    parallel_loop_over(tbb::blocked_range<std::size_t>(0, hidden.size(), grain), [&](const auto& range) {
-        for (std::size_t node = 64 * range.begin(); node < std::min<std::size_t>(64 * range.end(), interior); ++node)
-            if (picture.hides((*footprints)[node])) set_bit(hidden, node);
-    });
-    return hidden;
 }
 
 } // namespace unseen::vdtree

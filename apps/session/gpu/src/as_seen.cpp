@@ -12,23 +12,14 @@
 #include <unseen/session_gpu/scene_renderer.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
+#include "shown_depths.h"
+
 namespace unseen::session {
 namespace {
 
 // Where thresholds rise in a smaller share of all cells and bands than this, a fold test by them keeps about as many
 // triangles, and is not made.
 constexpr float least_masked_share = 0.02f;
-
-// Why pictures tell nothing about the folds of a simplification; null where they do.
-const char* why_pictures_tell_nothing(const Session& session, const Request& request, const Simplification& made) {
-    if (request.goal.kind == Goal::Kind::full) return "nothing is folded in the full model";
-    if (made.fold_tests.empty()) return "there is no object";
-    if (!is_perceptual(made.fold_tests.front())) return "the fold test counts pixels, seen or not";
-    if (session.scene().lights &&
-        std::ranges::any_of(made.fold_tests, [](FoldTest test) { return test != FoldTest::error; }))
-        return "under lights only the fold test error goes by pictures";
-    return nullptr;
-}
 
 const char* why_nothing_masks(const Session& session, const Simplification& made, const AsSeenOptions& options) {
     if (options.masking == Masking::none) return "it is not asked for";
@@ -204,14 +195,14 @@ private:
             return {};
         }
         const auto start = vdtree::Clock::now();
-        const auto depths = render::farthest_depth(context_, scene.items, view_, options_.samples);
-        if (!depths) return depths.error();
-        auto shown = vdtree::DepthPicture::create(view_, *depths);
+        auto shown = draw_depths(context_, scene, view_, options_.samples);
         if (!shown) return shown.error();
-        request.shown = std::move(*shown);
+        request.shown.push_back(std::move(*shown));
         constexpr std::uint64_t depth_bytes = 4;
-        effects_.push_back({"occlusion", true, "what lies behind what the view shows is folded", options_.samples, 0,
-                            depth_bytes * depths->size(), vdtree::ms_since(start)});
+        effects_.push_back(
+            {"occlusion", true, "what lies behind what the view shows is folded", options_.samples, 0,
+             depth_bytes * static_cast<std::uint64_t>(view_.width) * static_cast<std::uint64_t>(view_.height),
+             vdtree::ms_since(start)});
         return {};
     }
 
@@ -250,9 +241,21 @@ private:
 
 } // namespace
 
-bool goes_by_sum(const Request& request) {
-    return (request.goal.kind == Goal::Kind::budget || request.goal.kind == Goal::Kind::quality) &&
-           request.order == Order::sum && request.fold_test.value_or(FoldTest::error) == FoldTest::error;
+const char* why_pictures_tell_nothing(const Session& session, const Request& request, const Simplification& made) {
+    if (request.goal.kind == Goal::Kind::full) return "nothing is folded in the full model";
+    if (made.fold_tests.empty()) return "there is no object";
+    if (!is_perceptual(made.fold_tests.front())) return "the fold test counts pixels, seen or not";
+    if (session.scene().lights &&
+        std::ranges::any_of(made.fold_tests, [](FoldTest test) { return test != FoldTest::error; }))
+        return "under lights only the fold test error goes by pictures";
+    return nullptr;
+}
+
+Result<vdtree::DepthPicture> draw_depths(const render::Context& context, const SceneItems& scene,
+                                         const vdtree::View& view, int samples) {
+    const auto depths = render::farthest_depth(context, scene.items, view, samples);
+    if (!depths) return depths.error();
+    return vdtree::DepthPicture::create(view, *depths);
 }
 
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,
@@ -260,7 +263,7 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     if (auto valid = vdtree::validate_perspective(view, "A simplification by what pictures show"); !valid)
         return valid.error();
     request.purpose = Purpose::picture;
-    request.shown.reset();
+    request.shown.clear();
     request.masking.clear();
     // What a budget leaves may be far off the mesh, and then its picture does not tell what of the mesh is shown.
     Request first = request;
@@ -275,7 +278,7 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     Pictures pictures(session, context, view, options);
     if (options.folds_hidden || options.masking != Masking::none)
         if (const auto drawn = pictures.draw(*all, request); !drawn) return drawn.error();
-    if (request.shown || !request.masking.empty()) {
+    if (!request.shown.empty() || !request.masking.empty()) {
         all = session.simplify(view, request);
         if (!all) return all;
     }

@@ -15,9 +15,11 @@ namespace unseen::session {
 namespace {
 
 constexpr int most_directions = 1000, most_lod_samples = 256;
-constexpr int quick_samples = 16; // tell nothing from nothing most of the time
-constexpr int most_growths = 25;  // a hundred times as far: what shows there has another cause
-constexpr int margin_px = 32;     // around the outline: what the judges look at beside a pixel
+constexpr int quick_samples = 16;     // tell nothing from nothing most of the time
+constexpr int most_growths = 25;      // a hundred times as far: what shows there has another cause
+constexpr double lod_approach = 1.44; // two growths at a time
+constexpr int approach_directions = 4;
+constexpr int margin_px = 32; // around the outline: what the judges look at beside a pixel
 
 double focal_px(const Lod& lod) { return lod.height_px / 2.0 / std::tan(lod.fov_y_degrees * std::numbers::pi / 360); }
 
@@ -155,6 +157,7 @@ private:
     Result<bool> settle(const LodObject& made, LodLevel& level) {
         std::vector<vdtree::Cut> cuts;
         cuts.push_back(made.chain.cut(level.chain_level));
+        if (auto near = approach(made, level, cuts); !near) return near.error();
         for (int growth = 0; growth <= most_growths; ++growth) {
             const auto shows = look(made, level, cuts, growth);
             if (!shows) return shows.error();
@@ -164,15 +167,37 @@ private:
         return false;
     }
 
+    // Brings the level as near as nothing shows from a few sides: the fold test promises for the worst of all.
+    Result<void> approach(const LodObject& made, LodLevel& level, const std::vector<vdtree::Cut>& cuts) {
+        const double nearest = nearest_distance(lod_, made.sphere.radius);
+        for (int step = 0; level.distance > nearest; ++step) {
+            const double nearer = std::max(level.distance / lod_approach, nearest);
+            for (const glm::dvec3& direction : lod_directions(approach_directions, seed_of(level, -1 - step))) {
+                if (auto told = tell(0); !told) return told;
+                const auto verdict = look_from(made, direction, nearer, cuts);
+                if (!verdict) return verdict.error();
+                if (!passes(*verdict)) return {};
+            }
+            level.distance = nearer;
+        }
+        return {};
+    }
+
+    // Other sides for each level and each distance: none that was decided by is reported.
+    std::uint64_t seed_of(const LodLevel& level, int growth) const {
+        return options_.seed * 1'000'003 + static_cast<std::uint64_t>(level.chain_level) * 1009 +
+               static_cast<std::uint64_t>(growth + most_growths);
+    }
+    Result<void> tell(double share_of_level) {
+        if (!goes_on_ || goes_on_(first_share_ + step_ * share_of_level)) return {};
+        return Error{ErrorCode::cancelled, "Making levels of detail was stopped."};
+    }
+
     Result<bool> look(const LodObject& made, LodLevel& level, const std::vector<vdtree::Cut>& cuts, int growth) {
         level.checks.clear();
-        // Other sides for each level and each distance: none that was decided by is reported.
-        const std::uint64_t seed = options_.seed * 1'000'003 + static_cast<std::uint64_t>(level.chain_level) * 1009 +
-                                   static_cast<std::uint64_t>(growth);
-        for (const glm::dvec3& direction : lod_directions(options_.directions, seed)) {
+        for (const glm::dvec3& direction : lod_directions(options_.directions, seed_of(level, growth))) {
             const double share = static_cast<double>(level.checks.size()) / options_.directions;
-            if (goes_on_ && !goes_on_(first_share_ + step_ * share))
-                return Error{ErrorCode::cancelled, "Making levels of detail was stopped."};
+            if (auto told = tell(share); !told) return told.error();
             const auto verdict = look_from(made, direction, level.distance, cuts);
             if (!verdict) return verdict.error();
             level.checks.push_back({*verdict, direction});

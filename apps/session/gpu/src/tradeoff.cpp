@@ -22,17 +22,14 @@ Timing timing(std::vector<double> ms) {
 // Points that are not measured yet, the most telling ones first.
 std::vector<TradeoffPoint> usual_points(const Session& session) {
     std::vector<TradeoffPoint> all;
-    const auto add = [&](std::string name, Goal goal, std::optional<FoldTest> test = {}, double threshold = 1) {
+    const auto add = [&](std::string name, Goal goal, std::optional<FoldTest> test = {}) {
         all.push_back(
-            {{},
-             std::move(name),
-             {.goal = goal, .fold_test = test, .threshold = threshold, .purpose = Purpose::picture, .reasons = false}});
+            {{}, std::move(name), {.goal = goal, .fold_test = test, .purpose = Purpose::picture, .reasons = false}});
     };
     const Goal imperceptible = Goal::imperceptible();
     add("full", Goal::full());
     add("imperceptible", imperceptible);
-    for (const double threshold : {2.0, 0.5})
-        add("imperceptible, threshold " + shortest(threshold), imperceptible, {}, threshold);
+    for (const double cost : {2.0, 0.5}) add("imperceptible, threshold " + shortest(cost), Goal::up_to(cost));
     all.push_back({{}, "imperceptible, by this picture", all[1].request, true});
     for (const QualityFacts& facts : qualities().subspan(1)) {
         const Request request = {.goal = Goal::quality(facts.quality), .purpose = Purpose::picture, .reasons = false};
@@ -149,7 +146,7 @@ void recommend(std::vector<TradeoffPoint>& points) {
         // A claim about all views like this one, not the luck of one.
         const FoldTest test = point.request.fold_test.value_or(FoldTest::error);
         const bool is_a_claim = is_perceptual(test) && facts_of(test).is_safe &&
-                                point.request.goal.kind == Goal::Kind::imperceptible && point.request.threshold <= 1;
+                                point.request.goal.kind == Goal::Kind::quality && point.request.goal.cost <= 1;
         if (!point.is_of_view && shows_nothing && is_a_claim && point.triangles < best->triangles) best = &point;
     }
     best->is_recommended = true;

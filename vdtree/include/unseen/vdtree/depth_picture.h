@@ -20,6 +20,9 @@ public:
 
     const View& view() const noexcept { return levels_->view; }
 
+    // Of the same picture: a copy.
+    friend bool operator==(const DepthPicture& a, const DepthPicture& b) noexcept { return a.levels_ == b.levels_; }
+
     // Whether the footprint is hidden: all its pixels, and one pixel around, show something nearer. Outside the window
     // everything is hidden. A footprint that contains a visible one is visible.
     bool hides(const Footprint& footprint) const noexcept;
@@ -39,26 +42,28 @@ private:
     std::shared_ptr<const Levels> levels_;
 };
 
-// The interior nodes that the picture hides, before and after their folds, with all below them; one bit a node, lowest
-// first. Fails if VertexTree::check() fails. Cost: some 50 ns a triangle, and 40 bytes a node meanwhile.
-Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
-                                               const DepthPicture& picture);
-
 // The criterion with these nodes folding at no cost. Valid for views that see no more of the tree than the picture's. Fails
 // for criteria with lights (invalid_argument). Cost: some nanoseconds and 4 bytes a node.
 Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
                                          std::span<const std::uint64_t> hidden);
 
-// How much of the surface at the leaves below a node a picture shows. By interior node; a node has no less than its
-// children together.
+// What pictures show of the surface at the leaves below a node. By interior node; a node has no less than its children
+// together.
 struct ShownParts {
     std::vector<float> area;    // square pixels, of triangles; a third of each to each corner
-    std::vector<float> outline; // pixels, of edges between what faces the eye and what does not; a half to each end
+    std::vector<float> outline; // pixels, of edges between what faces the eye and what does not; half to each end
+    std::vector<std::uint64_t>
+        hidden; // one bit a node, lowest first: all that it and what is below change stays hidden
+
+    // The most of either; hidden is what both hide. Precondition: both are of one tree.
+    void add(const ShownParts& other);
 };
 
-// Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines.
+// Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines. A node is hidden
+// if no point of any triangle that touches it is shown, before anything folds and after all that is hidden has folded;
+// points lie nearer to each other than the pixels that are looked at around each.
 // `only_front`: what faces away is not drawn, for closed surfaces. The picture must show the mesh, or a cut within a pixel
-// of it. Fails if VertexTree::check() fails. Cost: some 400 ns a triangle.
+// of it. Fails if VertexTree::check() fails. Cost: some 1 us a triangle, in parallel.
 Result<ShownParts> find_shown(const VertexTree& tree, const Similarity& placement, const DepthPicture& picture,
                               bool only_front);
 

@@ -47,16 +47,20 @@ const QualityFacts& facts_of(Quality quality) noexcept;
 
 // How far to fold.
 struct Goal {
-    enum class Kind { imperceptible, full, budget, pixels, quality };
+    enum class Kind { quality, full, budget, pixels };
 
-    Kind kind = Kind::imperceptible;
-    Quality named = Quality::invisible; // for qualities
-    vdtree::Index triangles = 0;        // for budgets: at most this many in all objects together; 1 or more
-    bool fill = false;                  // for budgets: use all of them, even where no difference can be seen
-    double tolerance_px = 0;            // for pixels: above 0 and finite
+    Kind kind = Kind::quality;
+    // For qualities: folds up to this cost are made: above 0 and finite. Where errors also add up in a picture, up to the
+    // second one; 0: nothing adds up.
+    double cost = 1, summed_cost = 0;
+    vdtree::Index triangles = 0; // for budgets: at most this many in all objects together; 1 or more
+    bool fill = false;           // for budgets: use all of them, even where no difference can be seen
+    double tolerance_px = 0;     // for pixels: above 0 and finite
 
     static Goal imperceptible() { return {}; }          // fold whatever nobody can see
     static Goal full() { return {.kind = Kind::full}; } // fold nothing
+    // Fold what cannot be seen from this many times the distance.
+    static Goal up_to(double cost) { return {.cost = cost}; }
     // The least conspicuous cut with this many triangles.
     static Goal budget(vdtree::Index triangles, bool fill = false) {
         return {.kind = Kind::budget, .triangles = triangles, .fill = fill};
@@ -64,7 +68,7 @@ struct Goal {
     // The fewest triangles that look so. Invisible: the same as imperceptible().
     static Goal quality(Quality quality) {
         if (quality == Quality::invisible) return imperceptible();
-        return {.kind = Kind::quality, .named = quality};
+        return {.cost = facts_of(quality).cost, .summed_cost = facts_of(quality).summed_cost};
     }
     // Fold everything smaller, visible or not.
     static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
@@ -88,15 +92,15 @@ struct Request {
     std::optional<FoldTest> fold_test = {};  // default: one that suits the scene and the goal, see Plan
     bool chroma = false;                     // changes of colour count, too, not only those of luminance
     std::optional<double> milliseconds = {}; // time limit: the best cut found in it; 0 or more
-    double threshold = 1;    // for imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
     float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;
     // For budgets and qualities. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`;
     // without them, as in followers, the largest cost counts.
     Order order = Order::sum;
-    // For pictures: the depth of this very view. Whatever lies behind it folds, too. simplify_as_seen() in
-    // <unseen/session_gpu/as_seen.h> draws it. Under lights only the test `error` uses it.
-    std::optional<vdtree::DepthPicture> shown = {};
+    // Depths of the views that the cut is looked at from: whatever lies behind all of them folds. For pictures one, of this
+    // very view; for meshes any. simplify_as_seen() in <unseen/session_gpu/as_seen.h> draws it. Under lights only the test
+    // `error` uses it.
+    std::vector<vdtree::DepthPicture> shown = {};
     // For pictures: how much the scene masks each object in this very view; by object, or empty. Used by the test
     // `error`, if the gaze is known exactly and nothing moves over the retina.
     std::vector<perception::MaskingPicture> masking = {};
@@ -109,8 +113,10 @@ struct Request {
     bool reasons = true;
 };
 
-// The fold cost up to which a request's quality or threshold folds, where nothing adds up.
-double fold_cost(const Request& request) noexcept;
+// The name of a goal's quality; null for other goals and other costs.
+const QualityFacts* named_quality(const Goal& goal) noexcept;
+// Whether a request is for a budget or a quality that goes by the sum of errors, if pictures show what there is.
+bool goes_by_sum(const Request& request) noexcept;
 
 // Checks that the fields are in their ranges and go together, whatever the scene. The error names the field.
 Result<void> validate(const Request& request);

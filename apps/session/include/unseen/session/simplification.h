@@ -28,6 +28,20 @@ struct Plan {
     std::vector<Effect> effects = {};
 };
 
+// What pictures say of a simplification, see simplify_checked() in <unseen/session_gpu/checked.h>.
+struct CheckFacts {
+    double cost = 0;            // up to which folds were made
+    double most_v = 1;          // thresholds: what is allowed, by either judge
+    double cell_degrees = 0;    // how far the eye may go around what it looks at
+    int fitted_views = 0;       // by which the cost was found
+    int verified_views = 0;     // that had no part in it; 0: there was no time for them
+    double v = 0, second_v = 0; // the largest difference in these, by both judges, in thresholds
+    int looks = 0;              // pictures judged
+    int rounds = 1;             // of verifying: others failed, and the cost was lowered
+    double seconds = 0;         // wall-clock time
+    bool is_settled = true;     // false: the time was over, or it was stopped, before the fewest triangles were found
+};
+
 // For all objects together.
 struct Report {
     vdtree::Index source_triangles = 0;
@@ -39,6 +53,7 @@ struct Report {
     std::vector<FoldTest> fold_tests = {}; // by object
     std::vector<Effect> effects = {};
     std::vector<Effect> passes = {}; // of simplify_as_seen() in <unseen/session_gpu/as_seen.h>
+    std::optional<CheckFacts> check = {};
     // With geomorphs:
     std::optional<vdtree::Index> drawn_triangles = {}; // with those that wait to be folded
     std::size_t gliding = 0;                           // vertices on their way

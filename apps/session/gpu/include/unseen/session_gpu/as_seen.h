@@ -19,9 +19,6 @@ struct AsSeenOptions {
     int layers = 5;   // of depth, 1 to 16; objects are masked by other layers than their own
 };
 
-// Whether a request is for a budget or a quality that goes by the sum of errors, which takes a picture.
-bool goes_by_sum(const Request& request);
-
 // A simplification for a picture of this very view. First the session's own simplification is drawn, to see what it
 // shows. `request.purpose` counts as picture.
 //

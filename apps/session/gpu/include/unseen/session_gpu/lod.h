@@ -15,7 +15,7 @@ inline constexpr int usual_lod_directions = 12;
 struct LodOptions {
     LevelChainOptions chain = {.levels = 5}; // with the full mesh
     int directions = usual_lod_directions;   // that each level is looked at from, 1 to 1000
-    // Levels begin where they are seen at up to this many thresholds, see fold_cost(); above 0. 1: not at all.
+    // Levels begin where they are seen at up to this many thresholds, see Goal::cost; above 0. 1: not at all.
     double cost = 1;
     // Samples a pixel of the judged pictures, 1 to 256. What shows with fewer is judged again with all of them.
     int samples = 64;
@@ -68,8 +68,9 @@ struct Lod {
 
 // The levels of each object, alone before the scene's background and under its lights. LevelChain proposes them: evenly
 // spaced in visibility, the same from all sides. Both judges then compare each level with the full mesh at its
-// distance, from random directions off the axes. If either judge finds more than lod_most times the cost, the distance
-// grows by a fifth and the level is judged from new directions; so the reported checks never influenced the distance.
+// distance, from random directions off the axes: first nearer and nearer from a few, as long as neither finds more than
+// lod_most times the cost, then from all. If either does there, the distance grows by a fifth and the level is judged from
+// new directions; so the reported checks never influenced the distance.
 // At every distance the whole object fits on the display.
 //
 // A level is left out if one with fewer triangles begins at the same distance, up to lod_step, or if it is visible from
