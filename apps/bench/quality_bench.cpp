@@ -59,6 +59,7 @@ public:
                           static_cast<double>(peer.session.triangle_count()));
     }
 
+    std::uint64_t all_triangles() const { return session_.triangle_count(); }
     const perception::Image& full() const { return full_; }
     const perception::Image& shown() const { return shown_; } // what was judged last
 
@@ -121,7 +122,7 @@ void draw_curves(const Curves& curves, const std::string& what, double Differenc
     }
     for (const double tick : y.ticks()) {
         drawing.line({low.x, y.at(tick)}, {high.x, y.at(tick)}, grid);
-        drawing.text({low.x - 5, y.at(tick) - text_px / 2}, shortest(tick), plot_ink, text_px, Align::right);
+        drawing.text({low.x - 5, y.at(tick) - text_px / 2}, rounded(tick, 2), plot_ink, text_px, Align::right);
     }
     const std::pair<const std::vector<Difference>*, glm::vec3> both[] = {{&curves.ours, own}, {&curves.peer, other}};
     for (const auto& [curve, colour] : both) {
@@ -236,7 +237,7 @@ private:
             sheet_[to].pictures.push_back(picture);
             sheet_[to].verdict += (sheet_[to].verdict.empty() ? "" : "; ") + words;
         };
-        if (column == 1) add(judge.full(), 0, "all triangles");
+        if (column == 1) add(judge.full(), 0, grouped(judge.all_triangles()));
         add(judge.shown(), column, grouped(static_cast<std::uint64_t>(triangles)));
     }
 

@@ -51,9 +51,10 @@ std::string checked_text(const session::CheckFacts& c) {
                           : "whatever is folded shows: this is the full model";
     std::string text = c.most_v <= 1 ? "neither judge sees a difference"
                                      : "both judges see no more than " + rounded(c.most_v, 3) + " thresholds";
-    text += " in " + std::to_string(c.verified_views) + " views that had no part in it (V " + rounded(c.v, 2) +
-            " and " + rounded(c.second_v, 2) + ")";
-    if (c.cell_degrees > 0) text += " within " + rounded(c.cell_degrees, 3) + " degrees of this one";
+    text += " in " + std::to_string(c.verified_views) +
+            (c.cell_degrees > 0 ? " other views within " + rounded(c.cell_degrees, 3) + " degrees of this one"
+                                : " other pictures of this view, shifted by parts of a pixel") +
+            " (V " + rounded(c.v, 2) + " and " + rounded(c.second_v, 2) + ")";
     return text + (c.is_settled ? "" : "; fewer triangles might do as well");
 }
 

@@ -241,22 +241,22 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse, 
 }
 
 // A name, or the cost up to which folds are made.
-void add_quality_option(CLI::App& verb, session::Request& request) {
+void add_quality_option(CLI::App& verb, Goal& goal) {
     std::string names, text = "How much of a difference may be left. ";
     for (const session::QualityFacts& facts : session::qualities()) {
         names += (names.empty() ? "" : ", ") + std::string(facts.name);
         text += std::string(facts.name) + ": " + std::string(facts.summary) + "; ";
     }
     text += "or the cost up to which folds are made, such as 2: what cannot be seen from twice the distance";
-    const auto take = [&request, names](const std::string& given) {
+    const auto take = [&goal, names](const std::string& given) {
         for (const session::QualityFacts& facts : session::qualities())
             if (facts.name == given) {
-                request.goal = Goal::quality(facts.quality);
+                goal = Goal::quality(facts.quality);
                 return;
             }
         const auto cost = finite_from(given);
         if (!cost || !(*cost > 0)) refuse("--quality: must be " + names + ", or a cost above 0, not '" + given + "'");
-        request.goal = Goal::up_to(*cost);
+        goal = Goal::up_to(*cost);
     };
     verb.add_option_function<std::string>("--quality", take, text)->type_name("NAME|COST");
 }
@@ -369,7 +369,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
         "--full", [&goal](std::int64_t) { goal.kind = Goal::Kind::full; }, "Fold nothing");
     add_triangles_option(group, o.budget, "At most N triangles, or P% of them, as inconspicuous as possible");
     group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
-    add_quality_option(group, o.request);
+    add_quality_option(group, o.request.goal);
     add_value(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
               "The best cut that T milliseconds are enough for");
     add_value(group, "--pixels", goal.tolerance_px, positive(), "E", "Fold what is smaller than E pixels, seen or not");

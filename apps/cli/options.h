@@ -123,7 +123,7 @@ void add_model_option(CLI::App& verb, std::string& model, bool takes_scenes = tr
 void add_what_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 void add_hiding_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // A quality by name, or the cost up to which folds are made: session::Goal::cost.
-void add_quality_option(CLI::App& verb, session::Request& request);
+void add_quality_option(CLI::App& verb, Goal& goal);
 void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 void add_check_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 
 #include <unseen/session_gpu/lod.h>
 
@@ -23,7 +24,7 @@ struct LodArguments {
     DisplayOptions& display;
     std::string model = {}, out = {}, json = {}, csv = {}, sheet = {};
     bool is_separate = false;
-    session::Request quality = {}; // what --quality says
+    session::Goal quality = {}; // what --quality says
     session::LodOptions options = {};
     meshio::GltfOptions gltf = {};
 };
@@ -50,7 +51,12 @@ Worst worst_of(const session::LodLevel& level) {
     return worst;
 }
 
-Json level_json(const session::LodLevel& level) {
+// Of the bounding sphere's outline where the level begins, pixels.
+double height_px(const session::Lod& lod, const session::LodLevel& level) {
+    return 2 * std::sqrt(level.coverage * lod.width_px * lod.height_px / std::numbers::pi);
+}
+
+Json level_json(const session::Lod& lod, const session::LodLevel& level) {
     Json checks = Json::array();
     for (const session::LodCheck& check : level.checks)
         checks.push_back({{"direction", {check.direction.x, check.direction.y, check.direction.z}},
@@ -62,6 +68,7 @@ Json level_json(const session::LodLevel& level) {
             {"distance_m", level.distance},
             {"promised_distance_m", level.promised_distance},
             {"coverage", level.coverage},
+            {"height_px", height_px(lod, level)},
             {"error_m", level.shift},
             {"pixel_error", level.pixel_error},
             {"checks", std::move(checks)}};
@@ -86,7 +93,7 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
     const bool is_one = lod.objects.size() == 1;
     constexpr std::size_t most_printed = 20; // objects: more are in the JSON
     std::vector<std::vector<std::string>> rows = {
-        {"", "level", "triangles", "of all", "from, m", "coverage", "error, px", "largest V", "second judge"}};
+        {"", "level", "triangles", "of all", "from, m", "height, px", "error, px", "largest V", "second judge"}};
     for (std::size_t k = 0; k < std::min(lod.objects.size(), most_printed); ++k) {
         const session::LodObject& object = lod.objects[k];
         for (std::size_t i = 0; i < object.levels.size(); ++i) {
@@ -95,7 +102,7 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
             const double share = 100.0 * level.triangles / std::max<vdtree::Index>(object.levels[0].triangles, 1);
             rows.push_back({i == 0 && !is_one ? object.name : "", std::to_string(i), grouped(level.triangles),
                             rounded(share, 3) + "%", i == 0 ? "-" : rounded(level.distance, 4),
-                            i == 0 ? "-" : rounded(100 * level.coverage, 3) + "%",
+                            i == 0 ? "-" : rounded(height_px(lod, level), 3),
                             i == 0 ? "-" : rounded(level.pixel_error, 2), i == 0 ? "-" : rounded(worst.v, 2),
                             i == 0 ? "-" : rounded(worst.second_v, 2)});
         }
@@ -103,8 +110,8 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
     print_table(rows);
     if (lod.objects.size() > most_printed)
         print_line("... and " + std::to_string(lod.objects.size() - most_printed) + " more objects: see --json.");
-    print_line("from: the eye's distance to the middle of the object, and the share of the display that its bounding "
-               "sphere takes there, for a vertical field of " +
+    print_line("from: the eye's distance to the middle of the object, and the height of its bounding "
+               "sphere there, for a vertical field of " +
                rounded(lod.fov_y_degrees, 3) + " degrees over " + std::to_string(lod.width_px) + "x" +
                std::to_string(lod.height_px) + " pixels. V: the largest difference from " +
                std::to_string(lod.directions) + " sides at that distance, in thresholds; from 1 on it is seen" +
@@ -122,7 +129,7 @@ Json to_json(const session::Lod& lod, const session::Session& session, const mes
     Json objects = Json::array();
     for (const session::LodObject& object : lod.objects) {
         Json levels = Json::array();
-        for (const session::LodLevel& level : object.levels) levels.push_back(level_json(level));
+        for (const session::LodLevel& level : object.levels) levels.push_back(level_json(lod, level));
         const glm::dvec3 c = object.sphere.centre;
         objects.push_back({{"name", object.name},
                            {"centre_m", {c.x, c.y, c.z}},
@@ -166,7 +173,7 @@ Result<std::vector<std::string>> write_separately(const LodArguments& a, const s
 Result<session::Lod> make_levels(LodArguments& a, session::Session& session, const render::Context& context) {
     if (session.scene().objects.empty())
         return Error{ErrorCode::invalid_argument, "'" + a.model + "' has no objects: all of it is background."};
-    a.options.cost = a.quality.goal.cost;
+    a.options.cost = a.quality.cost;
     ProgressBar bar("judging levels");
     a.options.progress = std::ref(bar);
     return session::make_levels(session, context, a.options);
