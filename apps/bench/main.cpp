@@ -227,6 +227,18 @@ void add_accuracy_options(CLI::App& verb, AccuracyOptions& o) {
     });
 }
 
+void add_budget_options(CLI::App& verb, QualityOptions& o) {
+    verb.add_option("MODEL", o.inputs, "Meshes or trees (default: models with seams or hard edges, made and installed)")
+        ->type_name("TREE.vdt|MESH");
+    add_value(verb, "--plot", o.plot, ending_in({".png"}), "PLOT.png",
+              "SSIM and V against triangles, in the first view");
+    add_value(verb, "--sheet", o.sheet, ending_in({".png"}), "SHEET.png",
+              "A twentieth of the triangles in the first view: full, ours, meshoptimizer's");
+    add_window_option(verb, o.window_px, "Its side (default: 512)");
+    verb.add_flag("--quick", o.quick, "The first view alone");
+    verb.callback([&o] { o.outputs = {o.plot, o.sheet}; });
+}
+
 std::vector<Command> verbs(CLI::App& app) {
     return {
         bench_verb(app, "engine", "Cuts, budgets, memory and building, against what is promised",
@@ -251,19 +263,7 @@ std::vector<Command> verbs(CLI::App& app) {
         bench_verb(app, "quality", "What pictures of budgets show, beside meshoptimizer's with as many triangles",
                    "Examples:\n  unseen-bench quality bunny.ply part.stl --plot quality.png\n"
                    "  unseen-bench quality --quick --json quality.json",
-                   bench_quality,
-                   [](CLI::App& verb, QualityOptions& o) {
-                       verb.add_option("MODEL", o.inputs,
-                                       "Meshes or trees (default: models with seams or hard edges, made and installed)")
-                           ->type_name("TREE.vdt|MESH");
-                       add_value(verb, "--plot", o.plot, ending_in({".png"}), "PLOT.png",
-                                 "SSIM and V against triangles, in the first view");
-                       add_value(verb, "--sheet", o.sheet, ending_in({".png"}), "SHEET.png",
-                                 "A twentieth of the triangles in the first view: full, ours, meshoptimizer's");
-                       add_window_option(verb, o.window_px, "Its side (default: 512)");
-                       verb.add_flag("--quick", o.quick, "The first view alone");
-                       verb.callback([&o] { o.outputs = {o.plot, o.sheet}; });
-                   }),
+                   bench_quality, add_budget_options),
         bench_verb(app, "fit",
                    "What other values of the fold model's factors keep and show, on meshes that are no evidence",
                    "Examples:\n  unseen-bench fit --quick --factor contact_reach\n  unseen-bench fit --json fit.json",

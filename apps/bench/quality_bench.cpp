@@ -43,8 +43,7 @@ class ViewJudge {
 public:
     ViewJudge(const render::Context& context, session::Session& session, const vdtree::View& view)
         : context_(context), session_(session), view_(view),
-          judge_(require(session::PictureJudge::create(context, session, view, samples_to_judge))),
-          full_(codes(judge_.renderer(), session::whole_cuts(session))) {}
+          judge_(require(session::PictureJudge::create(context, session, view, samples_to_judge))) {}
 
     Difference of_budget(double share) {
         const auto triangles = static_cast<vdtree::Index>(share * static_cast<double>(session_.triangle_count()));
@@ -60,21 +59,17 @@ public:
     }
 
     std::uint64_t all_triangles() const { return session_.triangle_count(); }
-    const perception::Image& full() const { return full_; }
+    const perception::Image& full() const { return judge_.full_codes(); }
     const perception::Image& shown() const { return shown_; } // what was judged last
 
 private:
-    perception::Image codes(session::SceneRenderer& renderer, std::span<const vdtree::Cut> cuts) {
-        return session::code_image(require(renderer.draw(session::drawn_cuts(cuts), view_, judge_.drawing())),
-                                   session_.observer().display);
-    }
     Difference difference(session::SceneRenderer& renderer, std::span<const vdtree::Cut> cuts, double triangles) {
         const auto frame = require(renderer.draw(session::drawn_cuts(cuts), view_, judge_.drawing()));
         const auto verdict = require(judge_.judge(frame));
         shown_ = session::code_image(frame, session_.observer().display);
         double sum = 0;
         for (std::size_t i = 0; i < shown_.values.size(); ++i)
-            sum += std::pow(static_cast<double>(shown_.values[i]) - static_cast<double>(full_.values[i]), 2);
+            sum += std::pow(static_cast<double>(shown_.values[i]) - static_cast<double>(full().values[i]), 2);
         return {triangles, std::max(verdict.v, verdict.second_v), 1 - verdict.ssim,
                 -10 * std::log10(sum / static_cast<double>(shown_.values.size()))};
     }
@@ -83,7 +78,7 @@ private:
     session::Session& session_;
     vdtree::View view_;
     session::PictureJudge judge_;
-    perception::Image full_, shown_; // code values
+    perception::Image shown_; // code values
 };
 
 // How many triangles ours needs to differ as little, by straight lines between logarithms; `ours`: by falling triangles.

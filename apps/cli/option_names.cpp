@@ -28,7 +28,6 @@ constexpr OptionName option_names[] = {
     {"request.goal.cost", "--quality"},
     {"check.cell_degrees", "--check-cell"},
     {"check.seconds", "--check-seconds"},
-    {"check.samples", "--samples"},
     {"check", "--checked"},
     {"observer.csf", "--csf"},
     {"observer.velocity", "--velocity"},

@@ -253,10 +253,11 @@ Command lod_command(CLI::App& app, Setup& setup) {
     add_json_option(*verb, a->json);
     setup.act_in(*verb, Setup::model | Setup::scenes);
     verb->footer(
-        "The levels are evenly spaced in visibility. Each begins at the distance from which the fold test says that\n"
-        "nobody sees it (or with --quality, not more than that many thresholds of it); there two judges look at it\n"
-        "from random directions, and if either sees more, the distance grows. A model has one chain of levels; in a "
-        "scene each node has its own.\n\n"
+        "The levels are evenly spaced in visibility. The fold test says from where nobody sees a level, or with\n"
+        "--quality, no more than that many thresholds of it. Two judges look at it from random directions, nearer and\n"
+        "nearer, until either sees more; where one does in the last test, the distance grows. A model has one chain "
+        "of\n"
+        "levels; in a scene each node has its own.\n\n"
         "Examples:\n  unseen lod statue.glb -o statue_lods.glb --separate --csv statue.csv\n"
         "  unseen lod bunny.ply -o bunny.glb --levels 4 --quantize --meshopt\n"
         "  unseen lod bunny.ply -o bunny.glb --quality good\n"

@@ -45,7 +45,8 @@ std::string viewer_mode(const ViewerState& state) {
     case session::Goal::Kind::pixels: return "up to " + rounded(state.goal.tolerance_px, 3) + " pixels";
     case session::Goal::Kind::quality: break;
     }
-    if (state.goal.summed_cost > 0) return std::string(session::named_quality(state.goal)->name);
+    const session::QualityFacts* const named = session::named_quality(state.goal);
+    if (named && named->quality != session::Quality::invisible) return std::string(named->name);
     return state.gaze ? "gaze-directed" : "imperceptible";
 }
 

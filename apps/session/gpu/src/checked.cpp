@@ -21,7 +21,7 @@ namespace {
 constexpr double largest_cell = 10, ring_degrees = 5; // views stand on rings so far apart, eight more on each
 constexpr int most_check_samples = 256;
 constexpr int depth_samples = 16;
-// Of the difference that is allowed, what is sought in the first views: other views show up to a quarter more.
+// The first views may show this share of what is allowed. The rest is a margin: other views show up to a quarter more.
 constexpr double aimed_share = 0.8;
 // Cuts are sought until the cost is known within this factor, which is one or two per cent of the triangles.
 constexpr double cost_step = 1.08;

@@ -20,7 +20,7 @@ public:
 
     const View& view() const noexcept { return levels_->view; }
 
-    // Of the same picture: a copy.
+    // Copies of one picture are equal; pictures that were made apart are not.
     friend bool operator==(const DepthPicture& a, const DepthPicture& b) noexcept { return a.levels_ == b.levels_; }
 
     // Whether the footprint is hidden: all its pixels, and one pixel around, show something nearer. Outside the window
@@ -52,16 +52,16 @@ Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceC
 struct ShownParts {
     std::vector<float> area;    // square pixels, of triangles; a third of each to each corner
     std::vector<float> outline; // pixels, of edges between what faces the eye and what does not; half to each end
-    std::vector<std::uint64_t>
-        hidden; // one bit a node, lowest first: all that it and what is below change stays hidden
+    // One bit a node, the lowest first: all that the node and what is below it change stays hidden.
+    std::vector<std::uint64_t> hidden;
 
     // The most of either; hidden is what both hide. Precondition: both are of one tree.
     void add(const ShownParts& other);
 };
 
 // Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines. A node is hidden
-// if no point of any triangle that touches it is shown, before anything folds and after all that is hidden has folded;
-// points lie nearer to each other than the pixels that are looked at around each.
+// if the picture shows no point of any triangle that touches it. This must hold before anything folds, and after all
+// hidden nodes have folded. Points of large triangles are as close as the pixels that are looked at around each.
 // `only_front`: what faces away is not drawn, for closed surfaces. The picture must show the mesh, or a cut within a pixel
 // of it. Fails if VertexTree::check() fails. Cost: some 1 us a triangle, in parallel.
 Result<ShownParts> find_shown(const VertexTree& tree, const Similarity& placement, const DepthPicture& picture,

@@ -30,8 +30,7 @@ struct CheckOptions {
 // one as picture.
 //
 // Cost: for each view a picture of the full model, and some ten pictures and judgements; some 60 bytes a pixel and view
-// meanwhile. Fails for other goals than qualities, for orthographic views, if the cell's eye comes into an object, and where
-// Session::simplify() and drawing do; with `cancelled` if it is stopped before anything has passed.
+// meanwhile. Fails for other goals than qualities, for orthographic views, and where Session::simplify() and drawing do; with `cancelled` if it is stopped before anything has passed.
 Result<Simplification> simplify_checked(Session& session, const render::Context& context, const vdtree::View& view,
                                         Request request, const CheckOptions& options = {});
 
