@@ -46,7 +46,10 @@ void write_plainly(std::string_view text) {
     }
 }
 
+// The first thread that finds it out says so and ends the program; the others, the watching one as well, wait for that.
 [[noreturn]] void end_for_changed(const char* file) {
+    static std::atomic_flag is_said = ATOMIC_FLAG_INIT;
+    while (is_said.test_and_set()) ::pause();
     write_plainly("unseen: '");
     write_plainly(file);
     write_plainly("' was cut short or changed while it was read: write it anew, under another name, and rename it.");

@@ -1,6 +1,9 @@
 // What ends a program while it works.
 #include "interruption.h"
 
+#include <thread>
+#include <vector>
+
 #include <unseen/vdtree/builder.h>
 #include <unseen/vdtree/internal/atomic_file.h>
 #include <unseen/vdtree/tree_io.h>
@@ -13,16 +16,20 @@ namespace interruption_test {
 
 using namespace unseen;
 
-// Pages of a tree that is read in place, after another program has cut its file.
+// Pages of a tree that several threads read in place, after another program has cut its file: one message all the same.
 void read_what_was_cut(const std::filesystem::path& file, const std::filesystem::path& output) {
     const auto tree = vdtree::map_tree(file);
     auto out = vdtree::AtomicFile::create(output);
     if (!tree || !out) std::exit(7);
     app::clean_up_on_signals();
     std::filesystem::resize_file(file, 0);
-    float sum = 0;
-    for (const glm::vec3& p : tree->positions()) sum += p.x;
-    std::exit(sum == sum ? 8 : 9);
+    std::vector<std::jthread> readers;
+    for (int i = 0; i < 4; ++i)
+        readers.emplace_back([&tree] {
+            float sum = 0;
+            for (const glm::vec3& p : tree->positions()) sum += p.x;
+            std::exit(sum == sum ? 8 : 9);
+        });
 }
 
 TEST(LostPagesDeathTest, AreSaidAndLeaveNothingBehind) {
