@@ -179,7 +179,7 @@ TEST(LitCutRings, HoldWhatLightsMakeOfEveryTriangleOfEveryCut) {
 
 // A chain as deep as there are vertices: it takes no longer than another tree, and its bounds hold.
 TEST(CutRings, OfADeepTreeAreQuicklyBounded) {
-    const Mesh mesh = shapes::with_attributes(shapes::grid(120));
+    const Mesh mesh = shapes::with_attributes(shapes::grid(60));
     const auto chain = [](const ClusterInput& input) -> Result<Clustering> {
         const Index vertices = static_cast<Index>(input.mesh.positions.size());
         Clustering clustering;

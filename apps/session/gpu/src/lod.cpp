@@ -1,6 +1,7 @@
 #include <unseen/session_gpu/lod.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <random>
@@ -17,7 +18,7 @@ namespace {
 constexpr int most_directions = 1000, most_lod_samples = 256;
 constexpr int quick_samples = 16;     // tell nothing from nothing most of the time
 constexpr int most_growths = 25;      // a hundred times as far: what shows there has another cause
-constexpr double lod_approach = 1.44; // two growths at a time
+constexpr std::array lod_approaches = {1.44, 1.2, 1.1}; // times nearer, one after the other
 constexpr int approach_directions = 4;
 constexpr int margin_px = 32; // around the outline: what the judges look at beside a pixel
 
@@ -170,16 +171,19 @@ private:
     // Brings the level as near as nothing shows from a few sides: the fold test promises for the worst of all.
     Result<void> approach(const LodObject& made, LodLevel& level, const std::vector<vdtree::Cut>& cuts) {
         const double nearest = nearest_distance(lod_, made.sphere.radius);
-        for (int step = 0; level.distance > nearest; ++step) {
-            const double nearer = std::max(level.distance / lod_approach, nearest);
-            for (const glm::dvec3& direction : lod_directions(approach_directions, seed_of(level, -1 - step))) {
-                if (auto told = tell(0); !told) return told;
-                const auto verdict = look_from(made, direction, nearer, cuts);
-                if (!verdict) return verdict.error();
-                if (!passes(*verdict)) return {};
+        int step = 0;
+        for (const double approach : lod_approaches)
+            for (bool is_unseen = true; is_unseen && level.distance > nearest; ++step) {
+                const double nearer = std::max(level.distance / approach, nearest);
+                for (const glm::dvec3& direction : lod_directions(approach_directions, seed_of(level, -1 - step))) {
+                    if (auto told = tell(0); !told) return told;
+                    const auto verdict = look_from(made, direction, nearer, cuts);
+                    if (!verdict) return verdict.error();
+                    is_unseen = passes(*verdict);
+                    if (!is_unseen) break;
+                }
+                if (is_unseen) level.distance = nearer;
             }
-            level.distance = nearer;
-        }
         return {};
     }
 
