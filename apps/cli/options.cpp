@@ -409,8 +409,9 @@ void add_hiding_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules)
         "also what lies behind anything in the picture (picture)");
     add_choice<session::Order, session::Order>(
         verb, "--order", o.request.order, {{"sum", session::Order::sum}, {"largest", session::Order::largest}},
-        "What --triangles and --quality make least in a picture: the error that adds up in it, which goes by what the "
-        "picture shows (sum, default), or the largest cost of a fold (largest)");
+        "What --triangles makes least, and in a picture --quality: the error that adds up in the picture, and for "
+        "meshes in "
+        "pictures from all sides (sum, default), or the largest cost of a fold (largest)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {

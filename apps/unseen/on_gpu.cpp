@@ -9,6 +9,7 @@
 
 #include "interruption.h"
 #include "progress_bar.h"
+#include "terminal.h"
 
 namespace unseen::app {
 
@@ -32,15 +33,22 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
                                             const render::Context* context) {
     const bool is_summed =
         session::goes_by_sum(request) && request.purpose == session::Purpose::picture && !view.orthographic_height;
-    if (what.hiding == Hiding::spheres && !what.masks && !is_summed && !what.is_checked)
-        return session.simplify(view, request);
+    const bool is_by_picture = what.hiding == Hiding::picture || what.masks || is_summed || what.is_checked;
+    const bool is_by_sides = !is_by_picture && session::goes_by_sum(request) && !request.milliseconds &&
+                             request.goal.kind == session::Goal::Kind::budget;
+    if (!is_by_picture && !is_by_sides) return session.simplify(view, request);
     std::optional<render::Context> own;
     if (!context) {
         auto made = render::Context::headless();
+        if (!made && is_by_sides) {
+            print_note("The budget goes by the largest cost and not by the sum of errors. " + made.error().message);
+            return session.simplify(view, request);
+        }
         if (!made) return made.error();
         context = &own.emplace(std::move(*made));
     }
     if (what.is_checked) return checked(what, session, view, request, *context);
+    if (is_by_sides) return session::simplify_from_all_sides(session, *context, view, request);
     session::AsSeenOptions options;
     options.folds_hidden = what.hiding == Hiding::picture || is_summed;
     options.masking = what.masks ? session::Masking::scene : session::Masking::none;

@@ -104,6 +104,48 @@ TEST_F(AsSeen, BudgetsMakeTheSumOfErrorsLeast) {
     }
 }
 
+// A bumpy ball in another with an opening: what that hides counts for little, but does not fold for nothing, as somebody may
+// look in.
+TEST_F(AsSeen, BudgetsOfMeshesAddUpFromAllSides) {
+    Mesh outer = shapes::placed(shapes::bumpy_sphere(5, 0.01), 2, glm::dvec3(0));
+    std::erase_if(outer.triangles, [&](const vdtree::Triangle& t) { return outer.positions[t[0]].z > 1.9; });
+    Session session = session_of(shapes::together(shapes::bumpy_sphere(5, 0.01), outer));
+    vdtree::Cut whole(session.tree());
+    whole.unfold_all();
+    const vdtree::Index budget = session.tree().triangle_count() / 10;
+    const vdtree::View view = view_of(session, {-0.3, 0.2, 1});
+    const auto simplified = [&](Order order) {
+        return require(
+            simplify_from_all_sides(session, context_, view, {.goal = Goal::budget(budget), .order = order}));
+    };
+    const auto sum = simplified(Order::sum), largest = simplified(Order::largest);
+    EXPECT_LE(sum->stats.triangles, budget);
+    const auto effect_of = [](const Simplification& made, const char* name) {
+        return std::ranges::find(made.effects, name, &Effect::name)->on;
+    };
+    EXPECT_TRUE(effect_of(*sum, "sum of errors"));
+    EXPECT_FALSE(effect_of(*largest, "sum of errors"));
+    EXPECT_FALSE(effect_of(*sum, "hidden folding"));
+    double of_sum = 0, of_largest = 0;
+    for (const glm::dvec3 direction : {glm::dvec3(0.2, 0.1, 1), {1, 0.4, -0.5}, {-0.7, 1.1, -0.4}, {0.3, -1, 0.2}}) {
+        const vdtree::View seen = view_of(session, direction);
+        const perception::Image full = picture_of(context_, session, whole, seen);
+        of_sum += squared_error(picture_of(context_, session, sum->cuts[0], seen), full);
+        of_largest += squared_error(picture_of(context_, session, largest->cuts[0], seen), full);
+    }
+    EXPECT_LT(of_sum, 0.9 * of_largest);
+    // The inner ball is there.
+    const Mesh kept = sum->mesh();
+    const auto of_ball =
+        std::ranges::count_if(kept.positions, [](const glm::dvec3& p) { return glm::length(p) < 1.1; });
+    EXPECT_GT(of_ball, 20);
+    // From inside, pictures of the outside tell nothing.
+    vdtree::View inside = view;
+    inside.eye = {0, 0, 1.1}, inside.target = {0, 0, 0};
+    EXPECT_FALSE(effect_of(*require(simplify_from_all_sides(session, context_, inside, {.goal = Goal::budget(budget)})),
+                           "sum of errors"));
+}
+
 TEST_F(AsSeen, QualitiesGoByTheSum) {
     Session session = session_of(ball_behind_wall());
     const vdtree::View view = view_of(session, {-0.3, 0.2, 1});

@@ -218,6 +218,7 @@ Reason back_face_folding(const Cutting& c) {
 Reason hidden_folding(const Cutting& c) {
     if (folds_unseen(c.sight, c.decision))
         return {true, c.but_shadows("what lies behind what the view shows is folded, by pictures of its depths")};
+    if (c.is_for_mesh()) return {false, from_elsewhere};
     if (may_cast_anything(c.sight, c.decision)) return {false, may_cast};
     if (!folds_hidden(c.sight, c.decision))
         return {false, c.is_perceptual() ? "nothing solid is looked at from outside"
@@ -230,7 +231,10 @@ Reason hidden_folding(const Cutting& c) {
 
 Reason summed(const Cutting& c) {
     if (const char* why = why_not_summed(c.sight, c.decision)) return {false, why};
-    return {true, "what folds change in the picture adds up to the least, as far as nothing sticks out"};
+    return {true,
+            std::string("what folds change in ") +
+                (c.is_for_mesh() ? std::to_string(c.decision.request.shown.size()) + " pictures" : "the picture") +
+                " adds up to the least, as far as nothing sticks out"};
 }
 
 Reason masking(const Cutting& c) {

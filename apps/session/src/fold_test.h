@@ -35,6 +35,7 @@ bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid
 inline constexpr const char* may_cast = "what is not seen may cast shadows that are";
 // Why what a scene masks does not count for an object; null where it may.
 const char* why_unmasked(const Sight& sight);
+bool knows_shown(const Sight& sight, const Decision& decision);  // how much of each part pictures show
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 // Why a budget or a quality goes by the largest cost and not by the sum of errors; null where it goes by the sum.
 const char* why_not_summed(const Sight& sight, const Decision& decision);
@@ -78,7 +79,7 @@ struct ShownCriteria {
     std::shared_ptr<const KeptCriterion> of = {};
     std::vector<vdtree::DepthPicture> pictures = {};
     vdtree::View view = {};
-    bool culls = false;                                                           // what faces away
+    bool culls = false, folds_hidden = false;                                     // what faces away; what none shows
     std::shared_ptr<const vdtree::DistanceCriterion> fold_test = {}, summed = {}; // the second where it was asked for
 };
 

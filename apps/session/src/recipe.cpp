@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/vdtree/internal/node_bits.h>
+
 #include "shadow_outlines.h"
 
 namespace unseen::session {
@@ -104,8 +106,15 @@ bool folds_hidden(const Sight& sight, const Decision& decision) {
            !may_cast_anything(sight, decision) && culls_back_faces(sight);
 }
 
-bool folds_unseen(const Sight& sight, const Decision& decision) {
+bool knows_shown(const Sight& sight, const Decision& decision) {
     return !decision.request.shown.empty() && is_perceptual(decision) && !is_translucent(sight);
+}
+
+// The pictures of a mesh with a budget only tell how much each side shows.
+bool folds_unseen(const Sight& sight, const Decision& decision) {
+    const Request& request = decision.request;
+    return knows_shown(sight, decision) &&
+           !(request.purpose == Purpose::mesh && request.goal.kind == Goal::Kind::budget);
 }
 
 const char* why_not_summed(const Sight& sight, const Decision& decision) {
@@ -113,7 +122,7 @@ const char* why_not_summed(const Sight& sight, const Decision& decision) {
     if (!goes_by_sum(decision.request) && decision.request.goal.kind == Goal::Kind::quality)
         return "what nobody sees does not add up";
     if (decision.test != FoldTest::error) return "only the fold test error measures what adds up";
-    if (!folds_unseen(sight, decision)) return "what a picture shows of each part is not known";
+    if (!knows_shown(sight, decision)) return "what a picture shows of each part is not known";
     return nullptr;
 }
 
@@ -125,16 +134,27 @@ SharedCriterion share(vdtree::DistanceCriterion made) {
     return std::make_shared<const vdtree::DistanceCriterion>(std::move(made));
 }
 
-// What all pictures together show of an object.
+// Pixels of a view that a world unit of the object takes, about.
+double pixels_of(const Sight& sight, const vdtree::View& view) {
+    const WorldSphere sphere = world_sphere(sight.object);
+    return vdtree::pixels_per_radian(view) / std::max(glm::length(view.eye - sphere.centre), sphere.radius);
+}
+
+// What all pictures show of an object in the mean, in pixels of the request's view.
 Result<vdtree::ShownParts> find_shown(const Sight& sight, const Decision& decision, bool only_front) {
-    std::optional<vdtree::ShownParts> all;
-    for (const vdtree::DepthPicture& picture : decision.request.shown) {
-        auto shown = vdtree::find_shown(sight.object.tree, sight.object.placement, picture, only_front);
-        if (!shown) return shown.error();
-        if (all) all->add(*shown);
-        else all = std::move(*shown);
+    const auto& pictures = decision.request.shown;
+    const vdtree::NodeId nodes = sight.object.tree.interior_count();
+    vdtree::ShownParts all{std::vector<float>(nodes), std::vector<float>(nodes),
+                           std::vector<std::uint64_t>(vdtree::words_for(nodes), ~std::uint64_t{0})};
+    for (const vdtree::DepthPicture& picture : pictures) {
+        const auto shown = vdtree::find_shown(sight.object.tree, sight.object.placement, picture, only_front);
+        if (!shown) return shown;
+        const double ratio =
+            picture.view() == sight.view ? 1 : pixels_of(sight, sight.view) / pixels_of(sight, picture.view());
+        const auto count = static_cast<double>(pictures.size());
+        all.add(*shown, static_cast<float>(ratio * ratio / count), static_cast<float>(ratio / count));
     }
-    return std::move(*all);
+    return all;
 }
 
 // The criterion that folds what is hidden, and by the sum one that also counts what adds up.
@@ -143,10 +163,15 @@ Result<ShownCriteria> make_shown_criteria(Sight& sight, const Decision& decision
     const vdtree::VertexTree& tree = sight.object.tree;
     const auto shown = find_shown(sight, decision, recipe.options.cull_back_faces);
     if (!shown) return shown.error();
-    auto without = vdtree::folding_hidden(tree, own, shown->hidden);
-    if (!without) return without.error();
     ShownCriteria made;
-    made.fold_test = share(std::move(*without));
+    made.folds_hidden = folds_unseen(sight, decision);
+    if (made.folds_hidden) {
+        auto without = vdtree::folding_hidden(tree, own, shown->hidden);
+        if (!without) return without.error();
+        made.fold_test = share(std::move(*without));
+    } else {
+        made.fold_test = share(own);
+    }
     if (why_not_summed(sight, decision)) return made;
     std::optional<vdtree::VertexTree> lit;
     if (sight.lighting) {
@@ -170,7 +195,7 @@ Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision,
     const bool is_summed = !why_not_summed(sight, decision);
     const bool is_known = last && last->of == own && last->pictures == decision.request.shown &&
                           last->view == sight.view && last->culls == recipe.options.cull_back_faces &&
-                          (last->summed || !is_summed);
+                          last->folds_hidden == folds_unseen(sight, decision) && (last->summed || !is_summed);
     if (!is_known) {
         auto made = make_shown_criteria(sight, decision, own->criterion, recipe);
         if (!made) return made.error();
@@ -203,7 +228,7 @@ Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
     }
     const auto& kept = decision.masking ? masked : last;
     CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
-    if (!folds_unseen(sight, decision)) {
+    if (!knows_shown(sight, decision)) {
         if (!kept->edges || !decision.request.keeps_shadows) return recipe;
         auto with_outlines = keep_outlines(sight, decision, kept);
         if (!with_outlines) return with_outlines.error();

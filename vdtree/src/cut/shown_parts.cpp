@@ -202,10 +202,9 @@ private:
 
 } // namespace
 
-void ShownParts::add(const ShownParts& other) {
-    const auto larger = [](float a, float b) { return std::max(a, b); };
-    std::ranges::transform(area, other.area, area.begin(), larger);
-    std::ranges::transform(outline, other.outline, outline.begin(), larger);
+void ShownParts::add(const ShownParts& other, float areas, float outlines) {
+    std::ranges::transform(area, other.area, area.begin(), [&](float a, float b) { return a + areas * b; });
+    std::ranges::transform(outline, other.outline, outline.begin(), [&](float a, float b) { return a + outlines * b; });
     std::ranges::transform(hidden, other.hidden, hidden.begin(), std::bit_and());
 }
 

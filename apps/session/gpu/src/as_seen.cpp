@@ -2,6 +2,10 @@
 #include <unseen/session_gpu/as_seen.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <glm/geometric.hpp>
 
 #include <unseen/perception/internal/judge_tables.h>
 #include <unseen/perception/internal/motion.h>
@@ -16,6 +20,17 @@
 
 namespace unseen::session {
 namespace {
+
+// Pictures from all around: fine enough for what nodes of a tenth of a per cent of the area show.
+constexpr int sides = 14, side_px = 768, side_samples = 4;
+constexpr double side_fill = 0.9;
+
+// On a spiral from pole to pole, evenly.
+glm::dvec3 direction_of(int side) {
+    const double turn = std::numbers::pi * (3 - std::sqrt(5)) * side, z = 1 - (2 * side + 1.0) / sides;
+    const double across = std::sqrt(1 - z * z);
+    return {across * std::cos(turn), z, across * std::sin(turn)};
+}
 
 // Where thresholds rise in a smaller share of all cells and bands than this, a fold test by them keeps about as many
 // triangles, and is not made.
@@ -284,6 +299,30 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     }
     all->passes = pictures.take_effects();
     return all;
+}
+
+Result<Simplification> simplify_from_all_sides(Session& session, const render::Context& context,
+                                               const vdtree::View& view, Request request) {
+    request.purpose = Purpose::mesh;
+    request.shown.clear();
+    const WorldSphere all = session.bounding_sphere();
+    const bool is_outside = !view.orthographic_height && glm::length(view.eye - all.centre) > all.radius;
+    const bool has_budget = request.goal.kind == Goal::Kind::budget;
+    if (!has_budget || !goes_by_sum(request) || !is_outside) return session.simplify(view, request);
+    if (auto prepared = session.prepare(view, request); !prepared) return prepared.error();
+    auto renderer = SceneRenderer::create(context, session);
+    if (!renderer) return renderer.error();
+    vdtree::View window;
+    window.width = window.height = side_px;
+    for (int side = 0; side < sides; ++side) {
+        const vdtree::View seen = session.frame(direction_of(side), side_fill, window);
+        const auto scene = renderer->items(drawn_cuts(whole_cuts(session)), seen);
+        if (!scene) return scene.error();
+        auto shown = draw_depths(context, *scene, seen, side_samples);
+        if (!shown) return shown.error();
+        request.shown.push_back(std::move(*shown));
+    }
+    return session.simplify(view, request);
 }
 
 } // namespace unseen::session

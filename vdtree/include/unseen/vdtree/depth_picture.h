@@ -55,8 +55,8 @@ struct ShownParts {
     // One bit a node, the lowest first: all that the node and what is below it change stays hidden.
     std::vector<std::uint64_t> hidden;
 
-    // The most of either; hidden is what both hide. Precondition: both are of one tree.
-    void add(const ShownParts& other);
+    // Adds what another picture shows, as many times as much; hidden is what both hide. Precondition: both are of one tree.
+    void add(const ShownParts& other, float areas, float outlines);
 };
 
 // Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines. A node is hidden

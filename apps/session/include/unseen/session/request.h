@@ -97,9 +97,10 @@ struct Request {
     // For budgets and qualities. The sum needs `shown`, of the mesh or a cut within a pixel of it, and the test `error`;
     // without them, as in followers, the largest cost counts.
     Order order = Order::sum;
-    // Depths of the views that the cut is looked at from: whatever lies behind all of them folds. For pictures one, of this
-    // very view; for meshes any. simplify_as_seen() in <unseen/session_gpu/as_seen.h> draws it. Under lights only the test
-    // `error` uses it.
+    // Depths of the views that the cut is looked at from: whatever lies behind all of them folds, and for the sum what they
+    // show of each part counts in the mean. For pictures one, of this very view; for meshes any, and with a budget nothing
+    // folds for being hidden, so that the mesh may be looked at from elsewhere. <unseen/session_gpu/as_seen.h> draws them.
+    // Under lights only the test `error` uses them.
     std::vector<vdtree::DepthPicture> shown = {};
     // For pictures: how much the scene masks each object in this very view; by object, or empty. Used by the test
     // `error`, if the gaze is known exactly and nothing moves over the retina.
