@@ -1,9 +1,7 @@
 // unseen lod: levels of detail with the distances from which nobody sees them, for engines.
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
-#include <numbers>
 
 #include <unseen/session_gpu/lod.h>
 
@@ -51,11 +49,6 @@ Worst worst_of(const session::LodLevel& level) {
     return worst;
 }
 
-// Of the bounding sphere's outline where the level begins, pixels.
-double height_px(const session::Lod& lod, const session::LodLevel& level) {
-    return 2 * std::sqrt(level.coverage * lod.width_px * lod.height_px / std::numbers::pi);
-}
-
 Json level_json(const session::Lod& lod, const session::LodLevel& level) {
     Json checks = Json::array();
     for (const session::LodCheck& check : level.checks)
@@ -68,7 +61,7 @@ Json level_json(const session::Lod& lod, const session::LodLevel& level) {
             {"distance_m", level.distance},
             {"promised_distance_m", level.promised_distance},
             {"coverage", level.coverage},
-            {"height_px", height_px(lod, level)},
+            {"height_px", session::height_px(lod, level)},
             {"error_m", level.shift},
             {"pixel_error", level.pixel_error},
             {"checks", std::move(checks)}};
@@ -102,7 +95,7 @@ void print(const session::Lod& lod, const meshio::LevelsWritten& written) {
             const double share = 100.0 * level.triangles / std::max<vdtree::Index>(object.levels[0].triangles, 1);
             rows.push_back({i == 0 && !is_one ? object.name : "", std::to_string(i), grouped(level.triangles),
                             rounded(share, 3) + "%", i == 0 ? "-" : rounded(level.distance, 4),
-                            i == 0 ? "-" : rounded(height_px(lod, level), 3),
+                            i == 0 ? "-" : rounded(session::height_px(lod, level), 3),
                             i == 0 ? "-" : rounded(level.pixel_error, 2), i == 0 ? "-" : rounded(worst.v, 2),
                             i == 0 ? "-" : rounded(worst.second_v, 2)});
         }

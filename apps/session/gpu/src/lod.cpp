@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <numbers>
 #include <random>
 
 #include <glm/geometric.hpp>
@@ -243,6 +244,10 @@ private:
 };
 
 } // namespace
+
+double height_px(const Lod& lod, const LodLevel& level) {
+    return 2 * std::sqrt(level.coverage * lod.width_px * lod.height_px / std::numbers::pi);
+}
 
 vdtree::View lod_view(const Lod& lod, const WorldSphere& sphere, glm::dvec3 direction, double distance) {
     const double outline = outline_px(lod, sphere.radius, distance);

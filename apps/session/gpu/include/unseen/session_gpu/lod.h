@@ -66,6 +66,9 @@ struct Lod {
     std::uint64_t looks = 0; // pairs of pictures that were judged
 };
 
+// Of the bounding sphere's outline where the level begins, pixels.
+double height_px(const Lod& lod, const LodLevel& level);
+
 // The levels of each object, alone before the scene's background and under its lights. LevelChain proposes them: evenly
 // spaced in visibility, the same from all sides. Both judges then compare each level with the full mesh at its
 // distance, from random directions off the axes: first nearer and nearer from a few, as long as neither finds more than
