@@ -312,11 +312,12 @@ Result<Simplification> simplify_from_all_sides(Session& session, const render::C
     if (auto prepared = session.prepare(view, request); !prepared) return prepared.error();
     auto renderer = SceneRenderer::create(context, session);
     if (!renderer) return renderer.error();
+    const std::vector<vdtree::Cut> whole = whole_cuts(session);
     vdtree::View window;
     window.width = window.height = side_px;
     for (int side = 0; side < sides; ++side) {
         const vdtree::View seen = session.frame(direction_of(side), side_fill, window);
-        const auto scene = renderer->items(drawn_cuts(whole_cuts(session)), seen);
+        const auto scene = renderer->items(drawn_cuts(whole), seen);
         if (!scene) return scene.error();
         auto shown = draw_depths(context, *scene, seen, side_samples);
         if (!shown) return shown.error();
