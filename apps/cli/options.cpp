@@ -410,8 +410,7 @@ void add_hiding_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules)
     add_choice<session::Order, session::Order>(
         verb, "--order", o.request.order, {{"sum", session::Order::sum}, {"largest", session::Order::largest}},
         "What --triangles makes least, and in a picture --quality: the error that adds up in the picture, and for "
-        "meshes in "
-        "pictures from all sides (sum, default), or the largest cost of a fold (largest)");
+        "meshes in pictures from all sides (sum, default), or the largest cost of a fold (largest)");
 }
 
 void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {

@@ -15,7 +15,8 @@ class Context;
 namespace unseen::app {
 
 // By session::simplify_checked() or simplify_as_seen() if the options ask for pictures, budgets of meshes by
-// simplify_from_all_sides(), by default in a context of its own. Else by the session's own simplification. A check that the user interrupts ends with the last cut that passed.
+// simplify_from_all_sides(), by default in a context of its own. Else by the session's own simplification. A check that the
+// user interrupts ends with the last cut that passed.
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context = nullptr);

@@ -35,8 +35,8 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
 // A budget of meshes that are looked at from all around: errors add up by what 14 pictures show of each part, drawn from
 // directions evenly around the scene. `request.purpose` counts as mesh. What no picture shows is held by the fold test alone.
 //
-// The session's own simplification for other requests than budgets by the sum, for orthographic views, and for eyes inside of the scene's
-// sphere. Cost: 14 drawings, and as many searches for what they show, of a microsecond a triangle. Fails where
+// The session's own simplification for other requests than budgets by the sum, for orthographic views, and for eyes inside
+// of the scene's sphere. Cost: 14 drawings, and as many searches for what they show, of a microsecond a triangle. Fails where
 // Session::simplify() and drawing do.
 Result<Simplification> simplify_from_all_sides(Session& session, const render::Context& context,
                                                const vdtree::View& view, Request request);
