@@ -17,8 +17,8 @@ namespace unseen::session {
 namespace {
 
 constexpr int most_directions = 1000, most_lod_samples = 256;
-constexpr int quick_samples = 16;     // tell nothing from nothing most of the time
-constexpr int most_growths = 25;      // a hundred times as far: what shows there has another cause
+constexpr int quick_samples = 16;                       // tell nothing from nothing most of the time
+constexpr int most_growths = 25;                        // a hundred times as far: what shows there has another cause
 constexpr std::array lod_approaches = {1.44, 1.2, 1.1}; // times nearer, one after the other
 constexpr int approach_directions = 4;
 constexpr int margin_px = 32; // around the outline: what the judges look at beside a pixel
