@@ -122,6 +122,14 @@ TEST_F(Checked, RefusesWhatItCannotCheck) {
     EXPECT_THAT(complaint({}, {.cell_degrees = std::nan("")}), HasSubstr("cell_degrees"));
     EXPECT_THAT(complaint({}, {.seconds = 0}), HasSubstr("seconds"));
     EXPECT_THAT(complaint({}, {.samples = 0}), HasSubstr("samples"));
+    // The eye goes around a point beside the ball, and would pass through it.
+    vdtree::View beside = view_;
+    const double radius = session_.bounding_sphere().radius;
+    beside.eye = session_.bounding_sphere().centre + glm::dvec3(0, 0, 1.05 * radius);
+    beside.target = beside.eye + glm::dvec3(radius, 0, 0);
+    const auto inside = simplify_checked(session_, context_, beside, {}, {.cell_degrees = 10});
+    ASSERT_FALSE(inside);
+    EXPECT_THAT(std::string(inside.error().message), HasSubstr("into the solid of object 0"));
     vdtree::View flat = view_;
     flat.orthographic_height = 3;
     EXPECT_FALSE(simplify_checked(session_, context_, flat, {}));

@@ -119,8 +119,8 @@ TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
     std::vector<float> depth(64 * 64, infinity);
     for (std::size_t i = 0; i < depth.size(); ++i)
         if (i % 64 < 32) depth[i] = 3;
-    const auto shown = require(find_shown(tree, {}, *DepthPicture::create(view, depth), false));
-    const auto criterion = require(folding_hidden(tree, extent, shown->hidden));
+    const auto hidden = require(find_hidden(tree, {}, *DepthPicture::create(view, depth)));
+    const auto criterion = require(folding_hidden(tree, extent, *hidden));
     EXPECT_TRUE(criterion->is_monotone());
     Cut half(tree);
     ASSERT_TRUE(half.follow(*criterion, viewpoint));
@@ -144,10 +144,10 @@ TEST(DepthPicture, WhatFoldsStaysHidden) {
         view.width = 90, view.height = 80;
         const std::vector<float> depth = blocks(view, random);
         const DepthPicture picture = *DepthPicture::create(view, depth);
-        const auto shown = require(find_shown(tree, {}, picture, false));
+        const auto hidden = require(find_hidden(tree, {}, picture));
         // Nothing but what is hidden folds.
         const DistanceCriterion never = *extent_criterion(tree, view, 1e-9);
-        const auto criterion = require(folding_hidden(tree, never, shown->hidden));
+        const auto criterion = require(folding_hidden(tree, never, *hidden));
         Cut cut(tree);
         ASSERT_TRUE(cut.follow(*criterion, {.eye = view.eye - tree.origin()}));
         EXPECT_LT(cut.triangle_count(), tree.triangle_count()) << trial;

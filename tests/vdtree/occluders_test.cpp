@@ -14,20 +14,6 @@ namespace unseen::vdtree::occluders_test {
 
 using support::built;
 
-// The sum of the solid angles of all triangles, in turns: 1 inside, 0 outside, and -1 inside of what is inside out.
-double winding_number(const VertexTree& tree, glm::dvec3 at) {
-    double sum = 0;
-    for (const Triangle& t : support::sound(tree).triangles()) {
-        glm::dvec3 p[3];
-        for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[tree.wedge_of_leaf(t[k])]) - at;
-        const double a = glm::length(p[0]), b = glm::length(p[1]), c = glm::length(p[2]);
-        sum +=
-            2 * std::atan2(glm::dot(p[0], glm::cross(p[1], p[2])),
-                           a * b * c + glm::dot(p[0], p[1]) * c + glm::dot(p[1], p[2]) * a + glm::dot(p[2], p[0]) * b);
-    }
-    return sum / (4 * 3.14159265358979324);
-}
-
 double distance_from_surface(const VertexTree& tree, glm::dvec3 at) {
     double least = std::numeric_limits<double>::infinity();
     const auto corner = [&](const Triangle& t, std::size_t k) {

@@ -1,6 +1,7 @@
 // What a cut is made by: a criterion, a viewpoint and options.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 
 #include <glm/geometric.hpp>
@@ -144,8 +145,7 @@ double pixels_of(const Sight& sight, const vdtree::View& view) {
 Result<vdtree::ShownParts> find_shown(const Sight& sight, const Decision& decision, bool only_front) {
     const auto& pictures = decision.request.shown;
     const vdtree::NodeId nodes = sight.object.tree.interior_count();
-    vdtree::ShownParts all{std::vector<float>(nodes), std::vector<float>(nodes),
-                           std::vector<std::uint64_t>(vdtree::words_for(nodes), ~std::uint64_t{0})};
+    vdtree::ShownParts all{std::vector<float>(nodes), std::vector<float>(nodes)};
     for (const vdtree::DepthPicture& picture : pictures) {
         const auto shown = vdtree::find_shown(sight.object.tree, sight.object.placement, picture, only_front);
         if (!shown) return shown;
@@ -157,22 +157,25 @@ Result<vdtree::ShownParts> find_shown(const Sight& sight, const Decision& decisi
     return all;
 }
 
-// The criterion that folds what is hidden, and by the sum one that also counts what adds up.
-Result<ShownCriteria> make_shown_criteria(Sight& sight, const Decision& decision, const vdtree::DistanceCriterion& own,
-                                          const CutRecipe& recipe) {
+// The criterion without what is hidden in all pictures.
+Result<vdtree::DistanceCriterion> fold_hidden(const Sight& sight, const Decision& decision,
+                                              const vdtree::DistanceCriterion& own) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    std::vector<std::uint64_t> hidden(vdtree::words_for(tree.interior_count()), ~std::uint64_t{0});
+    for (const vdtree::DepthPicture& picture : decision.request.shown) {
+        const auto here = vdtree::find_hidden(tree, sight.object.placement, picture);
+        if (!here) return here.error();
+        std::ranges::transform(hidden, *here, hidden.begin(), std::bit_and());
+    }
+    return vdtree::folding_hidden(tree, own, hidden);
+}
+
+// The criterion with costs by what adds up.
+Result<vdtree::DistanceCriterion> add_up(Sight& sight, const Decision& decision, const vdtree::DistanceCriterion& own,
+                                         const CutRecipe& recipe) {
     const vdtree::VertexTree& tree = sight.object.tree;
     const auto shown = find_shown(sight, decision, recipe.options.cull_back_faces);
     if (!shown) return shown.error();
-    ShownCriteria made;
-    made.folds_hidden = folds_unseen(sight, decision);
-    if (made.folds_hidden) {
-        auto without = vdtree::folding_hidden(tree, own, shown->hidden);
-        if (!without) return without.error();
-        made.fold_test = share(std::move(*without));
-    } else {
-        made.fold_test = share(own);
-    }
-    if (why_not_summed(sight, decision)) return made;
     std::optional<vdtree::VertexTree> lit;
     if (sight.lighting) {
         auto under = sight.cache.lit_folds->under(tree, *sight.lighting);
@@ -182,10 +185,7 @@ Result<ShownCriteria> make_shown_criteria(Sight& sight, const Decision& decision
     const auto costs = perception::summed_costs(lit ? *lit : tree, *shown, sight.view, sight.object.placement,
                                                 test_options(sight, decision.request));
     if (!costs) return costs.error();
-    auto summed = vdtree::costing_at_least(tree, *made.fold_test, recipe.viewpoint, *costs);
-    if (!summed) return summed.error();
-    made.summed = share(std::move(*summed));
-    return made;
+    return vdtree::costing_at_least(tree, own, recipe.viewpoint, *costs);
 }
 
 // What pictures show takes as long to find as many cuts: kept for the next one that asks for other costs.
@@ -197,11 +197,17 @@ Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision,
                           last->view == sight.view && last->culls == recipe.options.cull_back_faces &&
                           last->folds_hidden == folds_unseen(sight, decision) && (last->summed || !is_summed);
     if (!is_known) {
-        auto made = make_shown_criteria(sight, decision, own->criterion, recipe);
-        if (!made) return made.error();
-        made->of = own, made->pictures = decision.request.shown, made->view = sight.view;
-        made->culls = recipe.options.cull_back_faces;
-        last = std::make_shared<const ShownCriteria>(std::move(*made));
+        ShownCriteria made{own, decision.request.shown, sight.view, recipe.options.cull_back_faces};
+        made.folds_hidden = folds_unseen(sight, decision);
+        auto fold_test = made.folds_hidden ? fold_hidden(sight, decision, own->criterion) : own->criterion;
+        if (!fold_test) return fold_test.error();
+        made.fold_test = share(std::move(*fold_test));
+        if (is_summed) {
+            auto summed = add_up(sight, decision, *made.fold_test, recipe);
+            if (!summed) return summed.error();
+            made.summed = share(std::move(*summed));
+        }
+        last = std::make_shared<const ShownCriteria>(std::move(made));
     }
     recipe.criterion = last->fold_test;
     if (!is_summed) return {};

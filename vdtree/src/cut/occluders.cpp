@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -235,6 +236,21 @@ std::vector<Sphere> inner_spheres(const VertexTree& tree, int count, int cells) 
     if (!sound) return {};
     Grid grid(*sound, std::clamp(cells, fewest_cells, most_cells) + 2 * border);
     return grid.is_empty() ? std::vector<Sphere>{} : grid.spheres(count);
+}
+
+double winding_number(const VertexTree& tree, glm::dvec3 at) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return std::numeric_limits<double>::quiet_NaN();
+    double sum = 0;
+    for (const Triangle& t : sound->triangles()) {
+        glm::dvec3 p[3];
+        for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[sound->wedge_of_leaf(t[k])]) - at;
+        const double a = glm::length(p[0]), b = glm::length(p[1]), c = glm::length(p[2]);
+        sum +=
+            2 * std::atan2(glm::dot(p[0], glm::cross(p[1], p[2])),
+                           a * b * c + glm::dot(p[0], p[1]) * c + glm::dot(p[1], p[2]) * a + glm::dot(p[2], p[0]) * b);
+    }
+    return sum / (4 * std::numbers::pi);
 }
 
 } // namespace unseen::vdtree

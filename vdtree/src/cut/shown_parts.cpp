@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 
 #include <tbb/parallel_sort.h>
 
@@ -47,32 +46,36 @@ public:
         });
     }
 
-    ShownParts find() {
+    // Notes which side of each triangle is seen, for what follows.
+    ShownParts find_areas() {
         const NodeId nodes = tree_.interior_count();
-        ShownParts shown{std::vector<float>(nodes), std::vector<float>(nodes), {}};
+        ShownParts shown{std::vector<float>(nodes), std::vector<float>(nodes)};
         std::vector<float> areas(tree_.triangle_count());
-        std::vector<std::uint8_t> seen(tree_.triangle_count());
-        parallel_loop(Index{0}, tree_.triangle_count(), [&](Index t) {
-            seen[t] = !is_hidden(tree_.triangles()[t]);
-            areas[t] = look_at(t, !seen[t]);
-        });
-        std::vector<std::uint8_t> is_seen(nodes); // whether any triangle that touches the node is
+        parallel_loop(Index{0}, tree_.triangle_count(), [&](Index t) { areas[t] = look_at(t); });
         for (Index t = 0; t < tree_.triangle_count(); ++t)
-            for (const Index corner : tree_.triangles()[t]) {
-                shown.area[node_over(corner)] += areas[t] / 3;
-                is_seen[node_over(corner)] |= seen[t];
-            }
+            for (const Index corner : tree_.triangles()[t]) shown.area[node_over(corner)] += areas[t] / 3;
         add_outlines(shown.outline);
         for (NodeId node = nodes; node-- > 1;) {
             const NodeId above = tree_.parents()[node];
             shown.area[above] += shown.area[node], shown.outline[above] += shown.outline[node];
-            is_seen[above] |= is_seen[node];
         }
-        unfold_what_pokes_out(is_seen);
-        shown.hidden.assign(words_for(nodes), 0);
-        for (NodeId node = 0; node < nodes; ++node)
-            if (!is_seen[node]) set_bit(shown.hidden, node);
         return shown;
+    }
+
+    // One bit a node.
+    std::vector<std::uint64_t> find_hidden() const {
+        const NodeId nodes = tree_.interior_count();
+        std::vector<std::uint8_t> seen(tree_.triangle_count());
+        parallel_loop(Index{0}, tree_.triangle_count(), [&](Index t) { seen[t] = !is_hidden(tree_.triangles()[t]); });
+        std::vector<std::uint8_t> is_seen(nodes); // whether any triangle that touches the node is
+        for (Index t = 0; t < tree_.triangle_count(); ++t)
+            for (const Index corner : tree_.triangles()[t]) is_seen[node_over(corner)] |= seen[t];
+        for (NodeId node = nodes; node-- > 1;) is_seen[tree_.parents()[node]] |= is_seen[node];
+        unfold_what_pokes_out(is_seen);
+        std::vector<std::uint64_t> hidden(words_for(nodes));
+        for (NodeId node = 0; node < nodes; ++node)
+            if (!is_seen[node]) set_bit(hidden, node);
+        return hidden;
     }
 
 private:
@@ -147,13 +150,16 @@ private:
     }
 
     // Square pixels of the triangle that are shown; notes which side of it is.
-    float look_at(Index t, bool is_all_hidden) {
+    float look_at(Index t) {
         const Triangle& triangle = tree_.triangles()[t];
         const Footprint &a = corners_[triangle[0]], &b = corners_[triangle[1]], &c = corners_[triangle[2]];
         if (!(std::min({a.nearest, b.nearest, c.nearest}) > 0)) return huge; // it reaches behind the eye
         const double twice = (b.top - a.top) * (c.left - a.left) - (b.left - a.left) * (c.top - a.top); // y is down
         signed_areas_[t] = static_cast<float>(inward_ ? -twice / 2 : twice / 2);
-        if (is_all_hidden || (only_front_ && signed_areas_[t] <= 0)) return 0;
+        if (only_front_ && signed_areas_[t] <= 0) return 0;
+        Footprint all = a;
+        all.add(b), all.add(c);
+        if (is_hidden(all)) return 0;
         double shown = 0;
         for (const auto& [u, v] : points) shown += is_hidden(between(a, b, c, u, v)) ? 0 : 1.0 / points.size();
         return static_cast<float>(shown * std::abs(twice) / 2);
@@ -205,14 +211,20 @@ private:
 void ShownParts::add(const ShownParts& other, float areas, float outlines) {
     std::ranges::transform(area, other.area, area.begin(), [&](float a, float b) { return a + areas * b; });
     std::ranges::transform(outline, other.outline, outline.begin(), [&](float a, float b) { return a + outlines * b; });
-    std::ranges::transform(hidden, other.hidden, hidden.begin(), std::bit_and());
 }
 
 Result<ShownParts> find_shown(const VertexTree& tree, const Similarity& placement, const DepthPicture& picture,
                               bool only_front) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
-    return PartsFinder(*sound, placement, picture, only_front).find();
+    return PartsFinder(*sound, placement, picture, only_front).find_areas();
+}
+
+Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
+                                               const DepthPicture& picture) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    return PartsFinder(*sound, placement, picture, false).find_hidden();
 }
 
 } // namespace unseen::vdtree

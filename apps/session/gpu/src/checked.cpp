@@ -10,7 +10,9 @@
 #include <glm/geometric.hpp>
 
 #include <unseen/session_gpu/picture_judge.h>
+#include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/internal/errors.h>
+#include <unseen/vdtree/internal/number_format.h>
 #include <unseen/vdtree/internal/stopwatch.h>
 
 #include "shown_depths.h"
@@ -20,9 +22,13 @@ namespace {
 
 constexpr double largest_cell = 10, ring_degrees = 5; // views stand on rings so far apart, eight more on each
 constexpr int most_check_samples = 256;
+// Pictures of fewer samples differ more: a cut that passes in them is not looked at in finer ones, nor is one that shows so
+// many times what may show.
+constexpr int coarse_samples = 16;
+constexpr double hopeless = 3;
 constexpr int depth_samples = 16;
-// The first views may show this share of what is allowed. The rest is a margin: other views show up to a quarter more.
-constexpr double aimed_share = 0.8;
+// The first views may show this share of what is allowed. The rest is a margin: other views show up to a tenth more.
+constexpr double aimed_share = 0.9;
 // Cuts are sought until the cost is known within this factor, which is one or two per cent of the triangles.
 constexpr double cost_step = 1.08;
 constexpr double least_cost = 0.05, most_cost = 1e4;
@@ -97,8 +103,9 @@ private:
         double cost = 0, share = 0; // of what is allowed
     };
     struct Place {
-        PictureJudge judge;
-        double v = 0; // of the last cut that was looked at from here
+        vdtree::View view;
+        std::optional<PictureJudge> quick = {}, fine = {}; // made when first asked
+        double share = 0;                                  // of the last cut that was looked at from here
     };
 
     bool is_over() const { return is_stopped_ || vdtree::ms_since(start_) > 1000 * options_.seconds; }
@@ -111,6 +118,8 @@ private:
 
     // What the views show, and the judges there.
     Result<void> look_around() {
+        const std::vector<vdtree::View> views = views_to_fit(view_, options_.cell_degrees);
+        if (const auto outside = stay_outside(views); !outside) return outside;
         Request first = request_;
         first.goal = Goal::imperceptible();
         const auto fine = session_.simplify(view_, first); // measures where that is called for
@@ -118,14 +127,13 @@ private:
         auto renderer = SceneRenderer::create(context_, session_);
         if (!renderer) return renderer.error();
         renderer_ = std::make_shared<SceneRenderer>(std::move(*renderer));
-        const std::vector<vdtree::View> views = views_to_fit(view_, options_.cell_degrees);
         const bool tells = !why_pictures_tell_nothing(session_, request_, *fine);
         for (const vdtree::View& view : views) {
             if (auto told =
                     tell(0.3 * static_cast<double>(fitted_.size()) / static_cast<double>(views.size()), "views");
                 !told)
                 return told;
-            if (auto placed = add_place(view); !placed) return placed;
+            fitted_.push_back({view});
             if (!tells) continue;
             const auto scene = renderer_->items(drawn_cuts(fine->cuts), view);
             if (!scene) return scene.error();
@@ -136,21 +144,49 @@ private:
         return {};
     }
 
-    Result<void> add_place(const vdtree::View& view) {
-        auto judge = PictureJudge::create(renderer_, session_, view, options_.samples);
-        if (!judge) return judge.error();
-        fitted_.push_back({std::move(*judge)});
-        return {};
-    }
-
     Result<Simplification> made_up_to(double cost) {
         request_.goal = {.cost = cost, .summed_cost = cost};
         return session_.simplify(view_, request_);
     }
 
-    // The larger difference, as a share of what is allowed.
-    Result<double> look(PictureJudge& judge, std::span<const vdtree::Cut> cuts) {
-        const auto verdict = judge.judge(cuts);
+    // No view may pass through a surface that the first one looks at from outside.
+    Result<void> stay_outside(std::span<const vdtree::View> views) const {
+        for (const Object& object : session_.scene().objects) {
+            const WorldSphere sphere = world_sphere(object);
+            const auto is_inside = [&](const vdtree::View& view) {
+                if (glm::length(view.eye - sphere.centre) > sphere.radius) return false;
+                const glm::dvec3 eye = vdtree::eye_in_tree(object.tree, view, object.placement);
+                return vdtree::winding_number(object.tree, eye) > 0.5;
+            };
+            if (object.tree.closedness() == vdtree::Closedness::open || is_inside(views[0])) continue;
+            if (std::ranges::none_of(views, is_inside)) continue;
+            const auto number = static_cast<std::uint64_t>(&object - session_.scene().objects.data());
+            return invalid_field(
+                "{check.cell_degrees = }{} takes the eye into the solid of object {}: move it away, or "
+                "make the cell smaller.",
+                {rounded(options_.cell_degrees, 3), std::to_string(number)});
+        }
+        return {};
+    }
+
+    // The larger difference, as a share of what is allowed: in fine pictures where coarse ones show more than `enough`.
+    Result<double> look(Place& place, std::span<const vdtree::Cut> cuts, double enough) {
+        const int quick = std::min(options_.samples, coarse_samples);
+        auto share = look(place.quick, place.view, quick, cuts);
+        if (share && *share > enough && *share < hopeless * enough && quick < options_.samples)
+            share = look(place.fine, place.view, options_.samples, cuts);
+        if (share) place.share = *share;
+        return share;
+    }
+
+    Result<double> look(std::optional<PictureJudge>& judge, const vdtree::View& view, int samples,
+                        std::span<const vdtree::Cut> cuts) {
+        if (!judge) {
+            auto made = PictureJudge::create(renderer_, session_, view, samples);
+            if (!made) return made.error();
+            judge = std::move(*made);
+        }
+        const auto verdict = judge->judge(cuts);
         if (!verdict) return verdict.error();
         ++facts_.looks;
         last_ = *verdict;
@@ -159,12 +195,11 @@ private:
 
     // The largest share of all views, or that of the first one that is too large; views that showed most before come first.
     Result<double> look_from_all(std::span<const vdtree::Cut> cuts) {
-        std::ranges::sort(fitted_, std::greater(), &Place::v);
+        std::ranges::sort(fitted_, std::greater(), &Place::share);
         double most = 0;
         for (Place& place : fitted_) {
-            const auto share = look(place.judge, cuts);
+            const auto share = look(place, cuts, aimed_share);
             if (!share) return share;
-            place.v = *share;
             most = std::max(most, *share);
             if (most > aimed_share) break;
         }
@@ -175,6 +210,7 @@ private:
     Result<void> seek() {
         Tried low, high;       // the largest cost that passed, and the least that did not
         double cost = most_v_; // by the model it passes
+        int in_a_row = 0;      // that passed; below 0: that did not
         for (int i = 0; i < most_cuts && (i == 0 || !is_over()); ++i) {
             if (auto told = tell(0.3 + 0.4 * i / most_cuts, "cuts"); !told) return told;
             auto cut = made_up_to(cost);
@@ -183,10 +219,13 @@ private:
             if (!share) return share.error();
             const bool passes = *share <= aimed_share;
             (passes ? low : high) = {cost, *share};
+            in_a_row = passes ? std::max(in_a_row, 0) + 1 : std::min(in_a_row, 0) - 1;
             if (passes) best_ = std::move(*cut), facts_.cost = cost;
             const bool is_between = low.cost > 0 && high.cost > 0;
             if ((is_between && high.cost <= cost_step * low.cost) || cost <= least_cost || cost >= most_cost) return {};
-            cost = std::clamp(next_cost(low, high), least_cost, most_cost);
+            // Where differences are far from a power, one side would move in small steps.
+            const bool halves = is_between && std::abs(in_a_row) > 1;
+            cost = std::clamp(halves ? std::sqrt(low.cost * high.cost) : next_cost(low, high), least_cost, most_cost);
         }
         facts_.is_settled = false;
         return {};
@@ -217,9 +256,8 @@ private:
                     facts_.is_settled = false, facts_.verified_views = 0;
                     return {};
                 }
-                auto judge = PictureJudge::create(renderer_, session_, view, options_.samples);
-                if (!judge) return judge.error();
-                const auto looked = look(*judge, best_->cuts);
+                Place place{view};
+                const auto looked = look(place, best_->cuts, 1);
                 if (!looked) return looked.error();
                 facts_.v = std::max(facts_.v, last_.v), facts_.second_v = std::max(facts_.second_v, last_.second_v);
                 most = std::max(most, *looked);

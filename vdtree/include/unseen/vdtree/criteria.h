@@ -168,6 +168,11 @@ double pixels_per_radian(const View& view);
 // VertexTree::check() fails, and if nothing fits in. Cost: some 0.1 s, and 50 ns a triangle; up to a dozen bytes a cell.
 std::vector<Sphere> inner_spheres(const VertexTree& tree, int count = 8, int cells = 96);
 
+// How many times the surface goes around a point in the tree's frame: the sum of the triangles' solid angles, in turns. 0
+// outside of a closed surface, 1 inside, -1 inside of one that is inside out; NaN if VertexTree::check() fails. Cost: some
+// 50 ns a triangle.
+double winding_number(const VertexTree& tree, glm::dvec3 at);
+
 // ---- criteria of the caller's own
 
 // For Cut::adjust(): writes the fold cost of each interior node in `nodes`, 0 or more. A node folds if its cost is at most

@@ -52,19 +52,21 @@ Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceC
 struct ShownParts {
     std::vector<float> area;    // square pixels, of triangles; a third of each to each corner
     std::vector<float> outline; // pixels, of edges between what faces the eye and what does not; half to each end
-    // One bit a node, the lowest first: all that the node and what is below it change stays hidden.
-    std::vector<std::uint64_t> hidden;
 
-    // Adds what another picture shows, as many times as much; hidden is what both hide. Precondition: both are of one tree.
+    // Adds what another picture shows, as many times as much. Precondition: both are of one tree.
     void add(const ShownParts& other, float areas, float outlines);
 };
 
-// Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines. A node is hidden
-// if the picture shows no point of any triangle that touches it. This must hold before anything folds, and after all
-// hidden nodes have folded. Points of large triangles are as close as the pixels that are looked at around each.
-// `only_front`: what faces away is not drawn, for closed surfaces. The picture must show the mesh, or a cut within a pixel
-// of it. Fails if VertexTree::check() fails. Cost: some 1 us a triangle, in parallel.
+// Triangles count by the share of ten of their points that the picture does not hide. Borders are outlines. `only_front`:
+// what faces away is not drawn, for closed surfaces. The picture must show the mesh, or a cut within a pixel of it. Fails if
+// VertexTree::check() fails. Cost: some 0.5 us a triangle, in parallel.
 Result<ShownParts> find_shown(const VertexTree& tree, const Similarity& placement, const DepthPicture& picture,
                               bool only_front);
+
+// One bit a node, the lowest first: all that the node and what is below it change stays hidden, for the picture shows no
+// point of any triangle that touches the node. This holds before anything folds, and after all hidden nodes have folded.
+// Points of large triangles are as close as the pixels that are looked at around each. The rest is as for find_shown().
+Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
+                                               const DepthPicture& picture);
 
 } // namespace unseen::vdtree

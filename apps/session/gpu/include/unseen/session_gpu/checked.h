@@ -29,8 +29,10 @@ struct CheckOptions {
 // Hidden is what is hidden in all views by which the cost is sought. With a cell, `request.purpose` counts as mesh, without
 // one as picture.
 //
-// Cost: for each view a picture of the full model, and some ten pictures and judgements; some 60 bytes a pixel and view
-// meanwhile. Fails for other goals than qualities, for orthographic views, and where Session::simplify() and drawing do; with `cancelled` if it is stopped before anything has passed.
+// Pictures have 16 samples where these are enough to tell, and else all. Cost: for each view a picture of the full model, and
+// some ten pictures and judgements; some 100 bytes a pixel and view meanwhile. Fails for other goals than qualities, for
+// orthographic views, for cells that reach into a solid, and where Session::simplify() and drawing do; with `cancelled` if it
+// is stopped before anything has passed.
 Result<Simplification> simplify_checked(Session& session, const render::Context& context, const vdtree::View& view,
                                         Request request, const CheckOptions& options = {});
 
