@@ -39,12 +39,14 @@ std::string mtl(const std::string& image) { return "newmtl m\nKd 1 0 0\nmap_Kd "
 
 // A triangle with a material whose texture is that; the image is embedded.
 std::string glb(const std::string& texture, const std::string& image = R"({"bufferView":2,"mimeType":"image/webp"})",
-                const std::string& nodes = R"([{"mesh":0}])", const std::string& rest = "") {
+                const std::string& nodes = R"([{"mesh":0}])", const std::string& rest = "",
+                const std::string& look = "{}") {
     const std::string data = mesh_files::gltf_triangle_data() + "  " + picture;
     json document = json::parse(mesh_files::gltf_triangle_json(
         nodes, R"({"byteLength":)" + std::to_string(data.size()) + "}",
         R"(,"materials":[{"name":"m","pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"textures":[)" +
             texture + R"(],"images":[)" + image + "]" + rest));
+    document["materials"][0].update(json::parse(look));
     document["meshes"][0]["primitives"][0]["material"] = 0;
     document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2;
     document["accessors"].push_back({{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC2"}});
@@ -117,7 +119,14 @@ const std::vector<Case>& cases() {
          "a.obj",
          2,
          {"2 images were not read, so 2 triangles show the colour of the material alone; the first: "
-          "'gone.png' is neither beside the file that names it nor beside the mesh; read.search_folder"}},
+          "'gone.png' is neither beside the file that names it nor beside the mesh; read.search_folder",
+          "what materials have of normal maps is not drawn: what is said of visibility does not know it."}},
+        {"light of its own",
+         {{"a.obj", "mtllib a.mtl\n" + textured}, {"a.mtl", "newmtl m\nKe 0 0.5 0\nnewmtl n\nmap_d d.png\n"}},
+         "a.obj",
+         2,
+         {"1 image was not read", "what materials have of emission is not drawn"}},
+        {"black light", {{"a.obj", "mtllib a.mtl\n" + textured}, {"a.mtl", "newmtl m\nKe 0 0 0\n"}}, "a.obj", 2},
         {"an image outside",
          {{"s/a.obj", "mtllib a.mtl\n" + textured}, {"s/a.mtl", mtl("../t.png")}, {"t.png", picture}},
          "s/a.obj",
@@ -204,6 +213,14 @@ const std::vector<Case>& cases() {
          "a.glb",
          1,
          {"image 0: 'gone.png' is neither beside"}},
+        {"what nobody draws",
+         {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "", R"(
+             {"normalTexture":{"index":0},"emissiveFactor":[0,0,0],"alphaMode":"MASK","extensions":{
+              "KHR_materials_ior":{"ior":1.5},"KHR_materials_unlit":{}}})")}},
+         "a.glb",
+         1,
+         {"of KHR_materials_unlit, cut-outs by the alpha of images and normal maps is not drawn"},
+         picture},
         {"an image of nothing",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":99})")}},
          "a.glb",

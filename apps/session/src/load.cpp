@@ -69,7 +69,7 @@ Message without_marks(std::string_view text) {
     return message;
 }
 
-// What the reader of a tree's mesh warned of, a line each: an attribute of trees in the cache.
+// What the reader of a tree's mesh warned of, a line each: an attribute of trees, so that whoever looks at one hears it.
 constexpr const char* reading_warnings = "reading_warnings";
 
 Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& options) {
@@ -211,6 +211,7 @@ Result<LoadedTree> load(const fs::path& file, const LoadOptions& options, bool m
         as_asked(may_map && is_large ? vdtree::map_tree(file) : vdtree::read_tree(file, options.messages.progress),
                  file, options);
     if (!tree) return tree.error();
+    warn_again(*tree, file, options.messages);
     LoadedTree loaded{std::move(*tree), TreeOrigin::file};
     TreeCache cache(options.cache);
     const bool has_all = perception::has_fold_measurement(loaded.tree) && perception::has_lit_folds(loaded.tree);

@@ -122,6 +122,7 @@ public:
         Material material{.name = std::move(name)};
         const json& of_file = array_of(document_, "materials")[index];
         where_ = numbered("material", index);
+        material.undrawn = undrawn(of_file);
         try {
             const json* surface = optional_object(of_file, "pbrMetallicRoughness");
             if (surface == nullptr) return material;
@@ -141,6 +142,34 @@ public:
     }
 
 private:
+    // With images, or else what shows without.
+    std::set<std::string> undrawn(const json& of_file) const {
+        std::set<std::string> all;
+        const auto has = [](const json& in, const char* key) {
+            const json* value = member(in, key);
+            return value != nullptr && value->is_object();
+        };
+        const auto is_positive = [](const json& value) { return value.is_number() && value > 0; };
+        const json* surface = member(of_file, "pbrMetallicRoughness");
+        const json* mode = member(of_file, "alphaMode");
+        if (images_ != nullptr) {
+            const bool has_image = surface != nullptr && has(*surface, "baseColorTexture");
+            if (has_image && mode != nullptr && *mode == "MASK") all.insert("cut-outs by the alpha of images");
+            if (has_image && mode != nullptr && *mode == "BLEND") all.insert("translucency by the alpha of images");
+            if (has(of_file, "normalTexture")) all.insert("normal maps");
+            if (has(of_file, "occlusionTexture")) all.insert("occlusion maps");
+        }
+        const json* emission = member(of_file, "emissiveFactor");
+        if (emission != nullptr && emission->is_array() && std::ranges::any_of(*emission, is_positive))
+            all.insert("emission");
+        if (const json* extensions = member(of_file, "extensions"); extensions != nullptr && extensions->is_object())
+            for (const auto& [name, value] : extensions->items())
+                if (name.starts_with("KHR_materials_") && name != "KHR_materials_ior" &&
+                    name != "KHR_materials_emissive_strength")
+                    all.insert(name);
+        return all;
+    }
+
     const json* optional_object(const json& in, const char* key) const {
         const json* value = member(in, key);
         if (value != nullptr && !value->is_object()) fail(where_, ": its ", key, " is no object; correct the JSON.");
@@ -567,6 +596,7 @@ ReadResult File::read_all() {
     result.document->files = impl_->images->read_all(lost);
     impl_->scene->read_materials(*impl_->materials, result, lost);
     if (impl_->source.options.images) warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
+    warn_of_undrawn(result.materials, result.mesh.ranges, result.warnings);
     result.warnings.insert(result.warnings.end(), impl_->warnings.begin(), impl_->warnings.end());
     result.document->json = to_text(without_geometry(impl_->document, result.document->files, result.warnings));
     return result;
@@ -578,6 +608,7 @@ ReadResult File::read_mesh(std::size_t mesh, const glm::dmat3& stretch) {
     LostImages lost;
     impl_->scene->read_materials(*impl_->materials, result, lost);
     warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
+    warn_of_undrawn(result.materials, result.mesh.ranges, result.warnings);
     return result;
 }
 

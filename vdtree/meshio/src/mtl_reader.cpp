@@ -25,11 +25,14 @@ public:
             if (keyword.empty() || keyword.front() == '#') continue;
             line_ = lines.line();
             if (keyword == "newmtl") begin(trimmed(rest));
-            else if (names_image(keyword)) read_image(rest, keyword == "map_Kd");
-            else if (!is_open_) continue; // before the first material, or in one that was there before
+            else if (names_image(keyword)) {
+                if (is_open_) note_undrawn(keyword);
+                read_image(rest, keyword == "map_Kd");
+            } else if (!is_open_) continue; // before the first material, or in one that was there before
             else if (keyword == "Kd") read_colour(rest);
             else if (keyword == "d") read_alpha(rest, false);
             else if (keyword == "Tr") read_alpha(rest, true);
+            else if (keyword == "Ke") read_emission(rest);
         }
         if (odd_lines_ > 0)
             contents_.warnings.push_back(name_ + ": " + first_odd_ +
@@ -49,6 +52,22 @@ private:
     void begin(std::string_view name) {
         is_open_ = names_.emplace(name).second;
         if (is_open_) contents_.materials.push_back({.name = std::string(name)});
+    }
+
+    void note_undrawn(std::string_view keyword) {
+        constexpr std::pair<std::string_view, const char*> names[] = {{"map_d", "cut-outs by the alpha of images"},
+                                                                      {"map_Ke", "emission"},
+                                                                      {"map_Bump", "normal maps"},
+                                                                      {"map_bump", "normal maps"},
+                                                                      {"bump", "normal maps"},
+                                                                      {"norm", "normal maps"}};
+        for (const auto& [word, what] : names)
+            if (keyword == word) material().undrawn.insert(what);
+    }
+
+    void read_emission(std::string_view rest) {
+        for (double value = 0; to_number(take_word(rest), value);)
+            if (value > 0) material().undrawn.insert("emission");
     }
 
     // Numbers from 0 to 1, with which a line begins; those beyond are clamped. False if there is another word.

@@ -95,6 +95,20 @@ void warn_of_missing_uvs(std::uint64_t triangles, ReadResult& result) {
         (result.mesh.uvs.empty() ? "; the colour of the material is shown alone." : ", and shows what is at 0, 0."));
 }
 
+void warn_of_undrawn(std::span<const Material> materials, std::span<const MeshRange> ranges,
+                     std::vector<Message>& warnings) {
+    std::set<std::string> used, undrawn;
+    for (const MeshRange& range : ranges)
+        if (range.kind == MeshRange::Kind::material && range.triangle_count > 0) used.insert(range.name);
+    for (const Material& material : materials)
+        if (used.contains(material.name)) undrawn.insert(material.undrawn.begin(), material.undrawn.end());
+    if (undrawn.empty()) return;
+    std::string all;
+    for (auto what = undrawn.begin(); what != undrawn.end(); ++what)
+        all += (what == undrawn.begin() ? "" : std::next(what) == undrawn.end() ? " and " : ", ") + *what;
+    warnings.push_back("what materials have of " + all + " is not drawn: what is said of visibility does not know it.");
+}
+
 void LostImages::add(const Message& why) {
     if (std::find(whys.begin(), whys.end(), why) == whys.end()) whys.push_back(why);
 }

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 
 #include <unseen/meshio/source_document.h>
 #include <unseen/vdtree/cut.h>
@@ -58,6 +59,8 @@ struct Material {
     std::shared_ptr<const std::string> image_bytes = {};
     vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
     UvMap uv_map = {}; // from the vertices' texture coordinates to those of the image
+    // What else the file says of how it looks, which nothing here draws or judges: "normal maps", "emission", ...
+    std::set<std::string> undrawn = {};
 
     bool has_image() const { return image_bytes != nullptr; }
 };
