@@ -97,7 +97,7 @@ struct PngCodec {
 struct PngReader : PngCodec {
     ByteView bytes;
     std::size_t position = 0;
-    bool is_interlaced = false;
+    bool is_interlaced = false, keeps_alpha = false;
     std::size_t row_bytes = 0;
     png_bytep row = nullptr;
     png_bytepp rows = nullptr;
@@ -144,10 +144,10 @@ void png_read_header(PngReader& r) {
     png_read_info(r.png, r.info);
 }
 
-// To grey or RGB of 8 or 16 bits. Gamma and colour profiles are left alone: code values are wanted as they are.
+// To grey or RGB of 8 or 16 bits, perhaps with alpha. Gamma and colour profiles are left alone: code values are wanted as they are.
 void png_set_transforms(PngReader& r) {
     png_set_expand(r.png);
-    png_set_strip_alpha(r.png);
+    if (!r.keeps_alpha) png_set_strip_alpha(r.png);
     png_set_interlace_handling(r.png);
     png_read_update_info(r.png, r.info);
 }
@@ -190,9 +190,10 @@ Result<void> decode_png_rows(PngReader& reader, const std::filesystem::path& fil
     return {};
 }
 
-Result<ImageFile> read_png(const std::filesystem::path& file, ByteView bytes, const TakeRow& take) {
+Result<ImageFile> read_png(const std::filesystem::path& file, ByteView bytes, const TakeRow& take, bool keeps_alpha) {
     PngReader reader;
     reader.bytes = bytes;
+    reader.keeps_alpha = keeps_alpha;
     reader.png =
         png_create_read_struct(PNG_LIBPNG_VER_STRING, static_cast<PngCodec*>(&reader), on_png_error, on_png_warning);
     if (reader.png != nullptr) reader.info = png_create_info_struct(reader.png);
@@ -216,7 +217,9 @@ Result<ImageFile> read_png(const std::filesystem::path& file, ByteView bytes, co
     header.image.width = static_cast<int>(width);
     header.image.height = static_cast<int>(height);
     header.image.channels = png_get_channels(reader.png, reader.info);
-    if (header.image.channels != 1 && header.image.channels != 3) return complain("neither grey nor RGB");
+    const int alpha = reader.keeps_alpha && header.image.channels % 2 == 0 ? 1 : 0;
+    if (header.image.channels - alpha != 1 && header.image.channels - alpha != 3)
+        return complain("neither grey nor RGB");
     if (auto decoded = decode_png_rows(reader, file, header, take); !decoded) return decoded.error();
     return header;
 }
@@ -699,10 +702,11 @@ bool is_image(std::string_view bytes) {
     return bytes.starts_with(png_magic) || bytes.starts_with(exr_magic) || is_pfm(bytes);
 }
 
-Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& file, const TakeRow& take) {
+Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& file, const TakeRow& take,
+                              bool keeps_alpha) {
     const ByteView view(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
     try {
-        if (bytes.starts_with(png_magic)) return read_png(file, view, take);
+        if (bytes.starts_with(png_magic)) return read_png(file, view, take, keeps_alpha);
         if (bytes.starts_with(exr_magic)) return read_exr(file, view, take);
         if (is_pfm(bytes)) return read_pfm(file, view, take);
     } catch (const std::bad_alloc&) {

@@ -1,5 +1,6 @@
 // The surface's shade, with the triangles' edges drawn over it (WIREFRAME). DISPLAY: for displays, opaque
-// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it. SHARE: instead of it, which share of its
+// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it. CUT_OUT: only where texels are there. DEPTH: no
+// colours. SHARE: instead of it, which share of its
 // light shadows leave it.
 #ifdef FLAT
 layout(location = 0) flat in vec4 surface_shade;
@@ -129,10 +130,24 @@ layout(location = 61) uniform vec4 uv_bounds; // the least of any vertex, and th
 
 const vec3 rec709 = vec3(0.2126, 0.7152, 0.0722);
 
-vec4 textured(vec4 shade, float highlight) {
+vec2 bounded_uv() {
     vec2 uv = mix(uv_bounds.xy, surface_uv, greaterThanEqual(surface_uv, uv_bounds.xy));
-    uv = mix(uv_bounds.zw, uv, lessThanEqual(uv, uv_bounds.zw));
-    vec3 rgb = shade.rgb * texture(surface_image, uv, lod_bias).rgb;
+    return mix(uv_bounds.zw, uv, lessThanEqual(uv, uv_bounds.zw));
+}
+
+#ifdef CUT_OUT
+layout(location = 63) uniform float least_share; // spread evenly from 0 to 1 over the samples of a pixel
+
+// Texels wider than this sample have outlines, where alpha is a half. Of finer ones a share of all samples is there.
+bool is_there() {
+    vec2 uv = bounded_uv();
+    float level = textureQueryLod(surface_image, uv).y + lod_bias;
+    return texture(surface_image, uv, lod_bias).a >= mix(0.5, least_share, clamp(level, 0.0, 1.0));
+}
+#endif
+
+vec4 textured(vec4 shade, float highlight) {
+    vec3 rgb = shade.rgb * texture(surface_image, bounded_uv(), lod_bias).rgb;
 #ifdef LIT
     rgb += vec3(highlight >= 0.0 ? highlight : 0.0); // neither less nor NaN, as for shades
     rgb /= max(dot(rgb, rec709), 1.0);
@@ -180,6 +195,16 @@ vec3 srgb_encoded(vec3 linear) {
 #endif
 
 void main() {
+#ifdef CUT_OUT
+    bool is_drawn = is_there(); // what is not is dropped at the end, for neighbours are looked at until then
+#else
+    const bool is_drawn = true;
+#endif
+#ifdef DEPTH
+    if (!is_drawn)
+        discard;
+    return;
+#endif
     vec4 result = bounded(surface_shade);
     float highlight = 0.0;
 #if defined(TEXTURED) && defined(LIT)
@@ -214,12 +239,16 @@ void main() {
 #endif
 #ifdef SHARE
     // Of what a picture shows, which is cut off at white. What has no light loses none.
+    if (!is_drawn)
+        discard;
     float shown = min(unhidden.a, 1.0);
     pixel = vec4(shown > 0.0 ? min(result.a + highlight, shown) / shown : 1.0);
     return;
 #endif
 #endif
 #ifdef SHARE
+    if (!is_drawn)
+        discard;
     pixel = vec4(1.0);
     return;
 #endif
@@ -235,5 +264,7 @@ void main() {
 #ifdef DISPLAY
     result.a = 1.0;
 #endif
+    if (!is_drawn)
+        discard;
     pixel = result;
 }

@@ -126,7 +126,12 @@ namespace {
 
 Result<Program> build_surface(const ProgramKey& key) {
     std::vector<ShaderSource> sources = {{ShaderSource::Stage::vertex, shaders::surface_vert}};
-    if (key.output == Output::depth) return Program::build("depth", sources);
+    if (key.output == Output::depth) {
+        if (!key.cut_out) return Program::build("depth", sources);
+        sources.push_back({ShaderSource::Stage::fragment, shaders::surface_frag});
+        constexpr std::string_view cut_out[] = {"TEXTURED", "CUT_OUT", "DEPTH"};
+        return Program::build("depth of what is there", sources, cut_out);
+    }
     std::string wrapped;
     if (key.compares || key.stippled)
         wrapped = "#define main surface_main\n#line 1\n" + std::string(shaders::surface_frag) +
@@ -145,6 +150,7 @@ Result<Program> build_surface(const ProgramKey& key) {
     static_assert(std::size(casting) == vdtree::most_shadow_lights);
     if (key.casting > 0) defines.push_back(casting[key.casting - 1]);
     if (key.mask) defines.push_back("MASK");
+    if (key.cut_out) defines.push_back("CUT_OUT");
     if (key.share) defines.push_back("SHARE");
     return Program::build("surface", sources, defines);
 }
@@ -164,7 +170,8 @@ Result<const Program*> find_or_build(std::map<Key, Program>& programs, const Key
 } // namespace
 
 Result<const Program*> Programs::surface(ProgramKey key) {
-    if (key.output == Output::depth) key = {.output = Output::depth}; // looks do not change where a surface is
+    // Other looks do not change where a surface is.
+    if (key.output == Output::depth) key = {.textured = key.cut_out, .output = Output::depth, .cut_out = key.cut_out};
     return find_or_build(surfaces_, key, [&] { return build_surface(key); });
 }
 

@@ -63,6 +63,7 @@ struct ProgramKey {
     bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
     int casting = 0;       // lights that cast shadows, and are drawn with them
     bool mask = false;     // writes the shadows' mask as well
+    bool cut_out = false;  // drops pixels whose texels are not there; of depth, too
     bool share = false;    // writes which share of its light comes to a surface, and nothing else
     auto operator<=>(const ProgramKey&) const = default;
 };

@@ -44,9 +44,16 @@ Result<std::vector<float>> farthest_depth(const Context& context, std::span<cons
     const auto nearest = near_plane(items, view);
     if (!nearest) return nearest.error();
     std::vector<float> least;
+    // What is cut out in part may show what is behind.
+    constexpr float nearly_all = 0.999f;
     for (const glm::dvec2 point : n_rooks(samples, seed)) {
-        if (auto drawn = draw(items, {view, point, *nearest}, *target, {.colour = std::nullopt}); !drawn)
-            return drawn.error();
+        const auto drawn = in_context(context, "Drawing depths", [&]() -> Result<void> {
+            const auto pass = SurfacePass::prepare(items, {view, point, *nearest}, target->impl(), 0);
+            if (!pass) return pass.error();
+            pass->draw(target->impl(), point, {.colour = std::nullopt}, 1, nullptr, nearly_all);
+            return {};
+        });
+        if (!drawn) return drawn.error();
         auto depth = read_depth(*target);
         if (!depth) return depth.error();
         if (least.empty()) least = std::move(*depth);

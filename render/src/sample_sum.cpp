@@ -109,7 +109,8 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
         impl_->begin(sampling.background);
         // Another pattern than that of the points, in another order, so that the two do not go together.
         const std::vector<glm::dvec2> texels = n_rooks(sampling.samples, sampling.seed + 1),
-                                      order = n_rooks(sampling.samples, sampling.seed + 2);
+                                      order = n_rooks(sampling.samples, sampling.seed + 2),
+                                      shares = n_rooks(sampling.samples, sampling.seed + 3);
         const auto turn = [&](std::size_t i) {
             return static_cast<std::size_t>(order[i].y * static_cast<double>(order.size()));
         };
@@ -117,7 +118,8 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
             const glm::dvec2 point = points[i];
             if (sampling.shadows && points.size() > 1)
                 if (auto shifted = sampling.shadows->impl().shift_texels(texels[turn(i)]); !shifted) return shifted;
-            pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used);
+            pass->draw(sample, point, {.colour = glm::vec4(sampling.background)}, points.size(), &used,
+                       static_cast<float>(shares[i].x));
             impl_->add(used);
         }
         return {};

@@ -226,7 +226,7 @@ void Shadows::Impl::aim() {
     }
 }
 
-void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
+void Shadows::Impl::draw_layer(const DepthPrograms& programs, std::size_t layer) {
     const Window& window = layers[layer].window;
     if (window.is_empty()) return;
     const glm::dvec2 first = glm::floor((window.low + 1.0) / 2.0 * static_cast<double>(size)),
@@ -246,12 +246,30 @@ void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
         const glm::dmat4 clip_from_unit = clip_from_ball * ball_from_unit_of(caster.cut, caster.placement, ball);
         if (is_outside(cut.box, clip_from_unit, window)) continue; // of six maps around a light, most
         cut.uploaded_bytes += tree.put(cut.glides);
+        const bool is_cut_out = tree.texture && tree.texture->has_cut_outs();
+        const Program& program = is_cut_out ? *programs.cut_out : *programs.whole;
         program.set(0, glm::mat4(clip_from_unit));
+        if (is_cut_out) tree.texture->cut_out(program, 0, 0.5f);
         draw_triangles(program, tree.arrays, cut.indices);
     }
 }
 
-void Shadows::Impl::draw(const Program& program) {
+Result<Shadows::Impl::DepthPrograms> Shadows::Impl::programs() const {
+    DepthPrograms made;
+    for (const bool cut_out : {false, true}) {
+        if (cut_out && std::ranges::none_of(drawn, [](const Caster& caster) {
+                const auto& texture = caster.cut.tree().impl().texture;
+                return texture && texture->has_cut_outs();
+            }))
+            break;
+        const auto program = context.impl().programs.surface({.output = Output::depth, .cut_out = cut_out});
+        if (!program) return program.error();
+        (cut_out ? made.cut_out : made.whole) = *program;
+    }
+    return made;
+}
+
+void Shadows::Impl::draw(const DepthPrograms& programs) {
     glQueryCounter(begun.id(), GL_TIMESTAMP);
     glViewport(0, 0, size, size);
     glDepthRange(0, 1);
@@ -262,7 +280,7 @@ void Shadows::Impl::draw(const Program& program) {
              GL_PRIMITIVE_RESTART, GL_CULL_FACE, GL_BLEND});
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER); // depth is reversed
-    for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(program, layer);
+    for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(programs, layer);
     glDisable(GL_SCISSOR_TEST);
     glQueryCounter(ended.id(), GL_TIMESTAMP);
 }
@@ -270,10 +288,10 @@ void Shadows::Impl::draw(const Program& program) {
 Result<void> Shadows::Impl::shift_texels(glm::dvec2 by) {
     const glm::dvec2 wanted = (by - 0.5) * (2.0 / size);
     if (lights.empty() || wanted == shift) return {};
-    const auto program = context.impl().programs.surface({.output = Output::depth});
-    if (!program) return program.error();
+    const auto made = programs();
+    if (!made) return made.error();
     shift = wanted;
-    draw(**program);
+    draw(*made);
     return {};
 }
 
@@ -318,11 +336,11 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters, const Receiver
     aim();
     for (Layer& layer : layers) layer.window = window_of(layer, receivers);
     if (lights.empty()) return {};
-    const auto program = context.impl().programs.surface({.output = Output::depth});
-    if (!program) return lights.clear(), program.error();
     drawn = std::move(now);
+    const auto made = programs();
+    if (!made) return lights.clear(), drawn.clear(), made.error();
     shift = glm::dvec2(0);
-    draw(**program);
+    draw(*made);
     ++redraws;
     return {};
 }

@@ -56,8 +56,13 @@ struct Shadows::Impl {
     Result<void> reserve(std::size_t layers);
     void aim();
     Window window_of(const Layer& layer, const Receivers& receivers) const;
-    void draw(const Program& program);
-    void draw_layer(const Program& program, std::size_t layer);
+    struct DepthPrograms {
+        const Program* whole = nullptr;
+        const Program* cut_out = nullptr; // null: nothing that is drawn has cut-outs
+    };
+    Result<DepthPrograms> programs() const;
+    void draw(const DepthPrograms& programs);
+    void draw_layer(const DepthPrograms& programs, std::size_t layer);
 
     // Fails where the item has other lights that cast shadows than these are of.
     Result<void> check(const Item& item) const;

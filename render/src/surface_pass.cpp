@@ -19,8 +19,6 @@ enum UniformLocation {
     material_location = 4,
     eye_location = 5,
     lights_location = 6,
-    lod_bias_location = 60,
-    uv_bounds_location = 61,
     whitest_shade_location = 62,
     layers_location = 64,
     shadow_lights_location = 96,
@@ -213,12 +211,14 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
         const bool is_stippled = !compares && item.stipple != glm::vec2(0, 1);
         const int casting =
             camera.shadows && item.lighting ? static_cast<int>(vdtree::shadow_lights(*item.lighting)) : 0;
+        const bool is_cut_out = tree.texture && tree.texture->has_cut_outs();
         const auto program = target.context.impl().programs.surface(
             {item.lighting.has_value(), tree.texture.has_value(), item.shading == Shading::flat, item.wireframe, output,
-             compares, is_stippled, casting, camera.shadow_mask.has_value(), use == Use::share_of_light});
+             compares, is_stippled, casting, camera.shadow_mask.has_value(), is_cut_out, use == Use::share_of_light});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
-        PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};
+        PreparedItem prepared{item.cut, projection, *program,
+                              cull_for(tree.tree.closedness(), projection.eye_inside || is_cut_out)};
         if (is_stippled && output != Output::depth) prepared.stipple = item.stipple;
         if (item.lighting && output != Output::depth) {
             if (auto made = tree.need_lit_vertices(); !made) return made.error();
@@ -266,7 +266,7 @@ PixelBox SurfacePass::pixels_of(std::span<const glm::dvec2> points) const {
 }
 
 void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count,
-                       const PixelBox* only) const {
+                       const PixelBox* only, float least_share) const {
     set_fixed_state(target);
     if (tile_) {
         glViewport(tile_->left - tile_->part.left, tile_->top - tile_->part.top, view_.width, view_.height);
@@ -278,7 +278,7 @@ void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear
     target.bind(attachment_, mask_);
     clear_target(target, clear, attachment_, mask_.has_value());
     const float lod_bias = -0.5f * std::log2(static_cast<float>(sample_count));
-    for (const PreparedItem& item : items_) draw_item(item, point, lod_bias);
+    for (const PreparedItem& item : items_) draw_item(item, point, lod_bias, least_share);
 }
 
 void SurfacePass::compare(const Target::Impl& target, glm::dvec2 point, const glm::vec4& compared) const {
@@ -290,7 +290,7 @@ void SurfacePass::compare(const Target::Impl& target, glm::dvec2 point, const gl
     }
 }
 
-void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const {
+void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias, float least_share) const {
     GpuCut::Impl& cut = item.cut.impl();
     GpuTree::Impl& tree = cut.tree.impl();
     if (cut.indices.count() == 0) return;
@@ -306,6 +306,7 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
 
     item.program->set(clip_from_unit_location, jittered(item.projection, view_, point));
     if (output_ != Output::depth) set_colours(item, lod_bias);
+    if (tree.texture && tree.texture->has_cut_outs()) tree.texture->cut_out(*item.program, lod_bias, least_share);
     draw_triangles(*item.program, tree.arrays, cut.indices);
     if (item.cull != Cull::nothing) return;
     // Both sides of a leaf fold onto each other. Where they lie in one place, the one that faces the eye is seen, not the
@@ -347,9 +348,7 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
         shadows_->bind();
     }
     if (tree.texture) {
-        program.set(lod_bias_location, lod_bias);
-        program.set(uv_bounds_location, tree.texture->uv_bounds());
-        tree.texture->bind();
+        tree.texture->bind(program, lod_bias);
     }
 }
 

@@ -4,19 +4,22 @@
 #include <algorithm>
 #include <bit>
 
+#include <glm/gtc/packing.hpp>
+
 #include "gl.h"
 
 namespace unseen::render {
 namespace {
 
-constexpr unsigned image_binding = 1;     // of surface.frag
+constexpr unsigned image_binding = 1; // of surface.frag, as the next
+constexpr int lod_bias_location = 60, uv_bounds_location = 61, least_share_location = 63;
 constexpr unsigned uv_location = 4;       // of surface.vert
 constexpr unsigned uv_buffer_binding = 2; // of the vertex array: 0 and 1 are the vertices' and the lit ones'
 
 // An image in linear light.
 struct Level {
     int width = 0, height = 0;
-    std::vector<glm::vec3> pixels;
+    std::vector<glm::vec4> pixels; // alpha: the share of it that is there
 };
 
 // The parts of `fine` cells that one of `coarse` covers, two or three.
@@ -46,7 +49,7 @@ Level halved(int width, int height, Pixel&& pixel) {
     for (int y = 0; y < level.height; ++y) {
         const Cover rows = cover_of(y, height, level.height);
         for (const Cover& cover : columns) {
-            glm::vec3 sum(0);
+            glm::vec4 sum(0);
             for (int i = 0; i < rows.count; ++i)
                 for (int k = 0; k < cover.count; ++k)
                     sum += rows.shares[i] * cover.shares[k] * pixel(cover.first + k, rows.first + i);
@@ -56,27 +59,44 @@ Level halved(int width, int height, Pixel&& pixel) {
     return level;
 }
 
-void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels) {
+// Rows of a level from `first` on. Drivers round what they convert to fewer channels or to half floats their own way, so
+// all of them are given here.
+void upload(const Texture2d& image, int number, int first, int width, int rows, std::span<const glm::vec4> pixels,
+            bool has_alpha) {
+    const std::size_t channels = has_alpha ? 4 : 3;
+    std::vector<std::uint16_t> halves;
+    halves.reserve(channels * pixels.size());
+    for (const glm::vec4& pixel : pixels)
+        for (std::size_t c = 0; c < channels; ++c)
+            halves.push_back(glm::packHalf1x16(pixel[static_cast<glm::length_t>(c)]));
+    glTextureSubImage2D(image.id(), number, 0, first, width, rows, has_alpha ? GL_RGBA : GL_RGB, GL_HALF_FLOAT,
+                        halves.data());
+}
+
+void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels, bool has_cut_outs) {
     const int width = static_cast<int>(texture.width), height = static_cast<int>(texture.height);
     const auto texel = [&](int x, int y) {
-        return glm::vec3(vdtree::linear_colour(
-            texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)]));
+        return texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)];
+    };
+    // The colours of what is not there are part of the means, as in other renderers: images go on under their cut-outs.
+    const auto covered = [&](int x, int y) {
+        return glm::vec4(glm::vec3(vdtree::linear_colour(texel(x, y))), vdtree::is_there(texel(x, y)) ? 1 : 0);
     };
     reset_pixel_stores();
-    std::vector<glm::vec3> row(texture.width);
+    std::vector<glm::vec4> row(texture.width);
     for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) row[static_cast<std::size_t>(x)] = texel(x, y);
-        glTextureSubImage2D(image.id(), 0, 0, y, width, 1, GL_RGB, GL_FLOAT, row.data());
+        for (int x = 0; x < width; ++x) row[static_cast<std::size_t>(x)] = vdtree::linear_colour(texel(x, y));
+        upload(image, 0, y, width, 1, row, has_cut_outs);
     }
     Level level;
     for (int number = 1; number < levels; ++number) {
-        if (number == 1) level = halved(width, height, texel);
+        if (number == 1) level = halved(width, height, covered);
         else
             level = halved(level.width, level.height, [&](int x, int y) {
                 return level.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width) +
                                     static_cast<std::size_t>(x)];
             });
-        glTextureSubImage2D(image.id(), number, 0, 0, level.width, level.height, GL_RGB, GL_FLOAT, level.pixels.data());
+        upload(image, number, 0, level.width, level.height, level.pixels, has_cut_outs);
     }
 }
 
@@ -100,6 +120,7 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
                                                  std::to_string(largest) + " texels a side, and the model's has " +
                                                  size + ": scale it down and build the tree again."};
     SurfaceTexture made;
+    made.has_cut_outs_ = vdtree::has_cut_outs(texture);
     for (const glm::vec2 uv : uvs) made.box_.include(uv);
     made.uvs_ = Buffer::create("texture coordinates");
     glNamedBufferStorage(made.uvs_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(uvs.size_bytes(), 1)),
@@ -108,12 +129,12 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
     const auto levels = static_cast<GLsizei>(std::bit_width(std::max(texture.width, texture.height)));
     // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent,
     // and coarse levels would be rounded to codes.
-    glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width),
-                       static_cast<GLsizei>(texture.height));
+    glTextureStorage2D(made.image_.id(), levels, made.has_cut_outs_ ? GL_RGBA16F : GL_RGB16F,
+                       static_cast<GLsizei>(texture.width), static_cast<GLsizei>(texture.height));
     if (glGetError() == GL_OUT_OF_MEMORY)
         return Error{ErrorCode::unsupported, "The graphics memory does not hold the model's texture of " + size +
                                                  " texels and its coordinates."};
-    upload_all(made.image_, texture, levels);
+    upload_all(made.image_, texture, levels, made.has_cut_outs_);
     glTextureParameteri(made.image_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
     glTextureParameteri(made.image_.id(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     glTextureParameteri(made.image_.id(), GL_TEXTURE_WRAP_S, gl_wrap(texture.wrap_u));
@@ -128,9 +149,16 @@ void SurfaceTexture::describe(unsigned vertex_array) const {
     glVertexArrayAttribBinding(vertex_array, uv_location, uv_buffer_binding);
 }
 
-void SurfaceTexture::bind() const {
+void SurfaceTexture::bind(const Program& program, float lod_bias) const {
+    program.set(lod_bias_location, lod_bias);
+    program.set(uv_bounds_location, glm::vec4(box_.lo, box_.hi)); // the least of all vertices, then the largest
     glBindTextureUnit(image_binding, image_.id());
     glBindSampler(image_binding, 0); // a window's other users may have put one there
+}
+
+void SurfaceTexture::cut_out(const Program& program, float lod_bias, float least_share) const {
+    bind(program, lod_bias);
+    program.set(least_share_location, least_share);
 }
 
 } // namespace unseen::render

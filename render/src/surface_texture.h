@@ -9,7 +9,7 @@
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/mesh.h>
 
-#include "gl_object.h"
+#include "program.h"
 
 namespace unseen::render {
 
@@ -20,11 +20,12 @@ public:
     // `uvs`: by vertex. Its mip levels are means in linear light.
     static Result<SurfaceTexture> create(const vdtree::TextureView& texture, std::span<const glm::vec2> uvs);
 
-    void describe(unsigned vertex_array) const; // the coordinates, as surface.vert takes them
-    void bind() const;                          // the image, as surface.frag does
+    void describe(unsigned vertex_array) const;              // the coordinates, as surface.vert takes them
+    void bind(const Program& program, float lod_bias) const; // the image, as surface.frag takes it
 
-    // The least coordinates of all vertices, then the largest.
-    glm::vec4 uv_bounds() const noexcept { return {box_.lo, box_.hi}; }
+    bool has_cut_outs() const noexcept { return has_cut_outs_; } // texels where nothing is drawn
+    // Binds likewise for a program that cuts out; see SurfacePass::draw().
+    void cut_out(const Program& program, float lod_bias, float least_share) const;
 
 private:
     SurfaceTexture() = default;
@@ -32,6 +33,7 @@ private:
     Buffer uvs_;
     Texture2d image_;
     vdtree::UvBox box_;
+    bool has_cut_outs_ = false;
 };
 
 } // namespace unseen::render

@@ -192,6 +192,55 @@ TEST_F(MaterialCommandTest, SeamsHoldUnderMapsOfEveryKind) {
     }
 }
 
+// Grey, 8 x 8; alpha 60 in the left half, 255 in the right one.
+const std::string half_there = [] {
+    const std::string_view hex =
+        "89504e470d0a1a0a0000000d4948445200000008000000080806000000c40fbe8b000000154944415478da633871e2840d"
+        "1afe8f8c1946860200f918bd61ff432eba0000000049454e44ae426082";
+    std::string bytes;
+    for (std::size_t i = 0; i < hex.size(); i += 2)
+        bytes.push_back(static_cast<char>(std::stoi(std::string(hex.substr(i, 2)), nullptr, 16)));
+    return bytes;
+}();
+
+TEST_F(MaterialCommandTest, WhatAlphaLeavesOutIsNotDrawn) {
+    const auto drawn = [&](const Json& look) {
+        GltfScene scene(16, 24);
+        Json& material = scene.document["materials"][0];
+        material = {{"name", "checkers"}, {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}};
+        material.merge_patch(look);
+        scene.document["nodes"][0]["children"] = {1};
+        auto images = this->images();
+        images[0] = half_there;
+        write_text(path("in.glb"), scene.glb(images));
+        const std::string said = succeed({"render", "in.glb", "--as", "model", "--full", "--size", "128x128",
+                                          "--samples", "16", "--background", "100", "-o", "out.pfm"})
+                                     .err;
+        EXPECT_EQ(said.find("translucency") != std::string::npos, look.value("alphaMode", "") == "BLEND") << said;
+        return require(unseen::perception::read_image(path("out.pfm")))->image.values;
+    };
+    const auto different = [](const std::vector<float>& a, const std::vector<float>& b) {
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < a.size(); ++i) count += std::abs(a[i] - b[i]) > 0.01f * b[i];
+        return count;
+    };
+    const std::vector<float> all = drawn(Json::object()), nothing(all.size(), all[0]);
+    EXPECT_GT(different(all, nothing), 5000u);
+    EXPECT_EQ(drawn({{"alphaMode", "OPAQUE"}}), all);
+    EXPECT_EQ(drawn({{"alphaMode", "BLEND"}}), all) << "a limit, which is said";
+    EXPECT_EQ(different(drawn({{"alphaMode", "MASK"}, {"alphaCutoff", 0}}), all), 0u);
+    EXPECT_EQ(different(drawn({{"alphaMode", "MASK"}, {"alphaCutoff", 0.2}}), all), 0u); // 60 / 255 is more
+    const std::vector<float> half = drawn({{"alphaMode", "MASK"}});
+    const std::size_t cut_out = different(half, all);
+    EXPECT_GT(cut_out, 2000u);
+    EXPECT_GT(different(half, nothing), 1000u);
+    EXPECT_LT(4 * different(drawn({{"alphaMode", "MASK"}, {"alphaCutoff", 0.3}}), half), cut_out); // its outlines
+    const Json half_as_opaque = {{"baseColorFactor", {1, 1, 1, 0.5}}};
+    const Json both = {{"alphaMode", "MASK"}, {"alphaCutoff", 0.2}, {"pbrMetallicRoughness", half_as_opaque}};
+    EXPECT_LT(4 * different(drawn(both), half), cut_out);
+    EXPECT_EQ(different(drawn({{"alphaMode", "MASK"}, {"alphaCutoff", 2}}), nothing), 0u);
+}
+
 TEST_F(MaterialCommandTest, PartsThatVanishLeaveTheirNodes) {
     write_text(path("in.glb"), GltfScene().glb(images()));
     succeed({"simplify", "in.glb", "--triangles", "8", "-o", "out.glb"});

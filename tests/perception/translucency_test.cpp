@@ -17,13 +17,19 @@ using vdtree::NodeId;
 using vdtree::VertexTree;
 using vdtree::View;
 
-// A flat even square of 60 x 60 units whose right half, from x = 2 on, has this alpha.
-VertexTree square(float alpha_on_the_right) {
+// A flat even square of 60 x 60 units whose right half, from x = 2 on, has this alpha, or a texture's texels are not there.
+VertexTree square(float alpha_on_the_right, bool is_cut_out = false) {
     constexpr int n = 61;
     Mesh mesh;
+    if (is_cut_out) {
+        mesh.texture = {60, 60, vdtree::Wrap::clamp, vdtree::Wrap::clamp, {}};
+        for (int i = 0; i < 60 * 60; ++i)
+            mesh.texture.texels.push_back({160, 160, 160, static_cast<std::uint8_t>(i % 60 < 32 ? 255 : 0)});
+    }
     for (int row = 0; row < n; ++row) {
         for (int column = 0; column < n; ++column) {
             mesh.positions.push_back({column - n / 2, row - n / 2, 0});
+            if (is_cut_out) mesh.uvs.push_back(glm::vec2(column, row) / 60.0f);
             mesh.colours.push_back({0.4f, 0.4f, 0.4f, column - n / 2 >= 2 ? alpha_on_the_right : 1.0f});
         }
     }
@@ -92,6 +98,14 @@ TEST_P(Translucency, KeepsWhatTheSceneMayShowThrough) {
     const Halves halves = halves_of(tree, GetParam());
     EXPECT_LT(halves.left, 100);
     EXPECT_EQ(halves.right, 2 * 19 * 48); // all: from 5 to 24, and from -24 to 24
+}
+
+TEST_P(Translucency, KeepsWhatShowsBetweenTexels) {
+    const VertexTree tree = square(1, true);
+    ASSERT_TRUE(vdtree::verify(tree));
+    const Halves halves = halves_of(tree, GetParam());
+    EXPECT_LT(halves.left, 100);
+    EXPECT_EQ(halves.right, 2 * 19 * 48);
 }
 
 TEST_P(Translucency, OfOpaqueMeshesIsNone) {

@@ -8,6 +8,7 @@
 #include "gl_test.h"
 #include "scenes.h"
 #include "shapes.h"
+#include "textures.h"
 
 namespace unseen::render::shadow_test {
 
@@ -351,6 +352,17 @@ TEST_F(ShadowTest, AreTheSameWhereTheyAreLookedFor) {
         EXPECT_EQ(redraws(std::nullopt), 2u);
         EXPECT_EQ(redraws(std::span<const Item>(&items[2], 1)), 2u);
     }
+}
+
+TEST_F(ShadowTest, NothingIsCastWhereTexelsAreNotThere) {
+    vdtree::Texture left_half{8, 8, {}, {}, {}};
+    for (int i = 0; i < 64; ++i)
+        left_half.texels.push_back({255, 255, 255, static_cast<std::uint8_t>(i % 8 < 4 ? 255 : 0)});
+    const Scene card(shapes::placed(textures::textured_grid(4, left_half), 0.125, {-0.25, -0.25, 0.5}));
+    const Drawn drawn = draw({&floor, &card}, {.lights = {sun({1, 0, 1})}}, from_above());
+    const auto lit = [&](double x) { return drawn.mask_at(pixel_at(x), window_px / 2)[0]; };
+    for (const double x : {-0.72, -0.6, -0.53}) EXPECT_LT(lit(x), 0.01f) << x;
+    for (const double x : {-0.8, -0.47, -0.4, -0.3}) EXPECT_GT(lit(x), 0.99f) << x;
 }
 
 TEST_F(ShadowTest, RefusesWhatCannotBe) {

@@ -4,6 +4,8 @@
 #include <GL/glcorearb.h>
 
 #include <unseen/render/context.h>
+#include <unseen/render/draw.h>
+#include <unseen/render/internal/frame.h>
 #include <unseen/render/renderer.h>
 #include <unseen/vdtree/geomorph.h>
 #include <unseen/vdtree/internal/light_bounds.h>
@@ -242,6 +244,59 @@ TEST_F(Textured, AreBoundedUnderLights) {
             if (both < 1) EXPECT_LE(range.lo, shown + 1e-5) << node;
         }
     }
+}
+
+// ---- texels that are not there
+
+// `there` of each run of `of` columns.
+Texture striped(std::uint32_t side, std::uint32_t there, std::uint32_t of) {
+    Texture texture{side, side, {}, {}, {}};
+    for (std::uint32_t i = 0; i < side * side; ++i)
+        texture.texels.push_back({255, 255, 255, static_cast<std::uint8_t>(i % side % of < there ? 255 : 0)});
+    return texture;
+}
+
+TEST_F(Textured, NothingIsDrawnWhereTexelsAreNotThere) {
+    const VertexTree tree = built(textures::textured_grid(4, striped(8, 2, 4)));
+    for (const auto shading : {render::Shading::smooth, render::Shading::flat})
+        for (const bool wireframe : {false, true}) {
+            const render::Frame frame =
+                draw(tree, 4, 64, {.shading = shading, .wireframe = wireframe, .background = 0.25f});
+            for (int x = 0; x < 64; ++x) {
+                if (x % 16 == 0 || x % 16 == 15) continue; // an outline
+                const bool is_there = x % 32 < 16;
+                if (!is_there) EXPECT_EQ(luminance(frame, x, 13), 0.25) << x;
+                else if (!wireframe) EXPECT_NEAR(luminance(frame, x, 13), 1, code_step) << x;
+            }
+        }
+    auto gpu = require(render::GpuTree::create(*context_, tree));
+    render::GpuCut gpu_cut(*gpu);
+    Cut cut(tree);
+    cut.unfold_all();
+    ASSERT_TRUE(gpu_cut.follow(cut));
+    View view;
+    view.width = view.height = 64;
+    view.fov_y_degrees = 2 * std::atan(0.5 / 10) * 180 / 3.14159265358979;
+    view.target = {2, 2, 0};
+    view.eye = {2, 2, 40};
+    const render::Item item{gpu_cut};
+    const auto depth = require(render::farthest_depth(*context_, {&item, 1}, view));
+    for (int x = 2; x < 64; ++x)
+        if (x % 16 > 1 && x % 16 < 14)
+            EXPECT_EQ(std::isinf((*depth)[static_cast<std::size_t>(64 * 13 + x)]), x % 32 >= 16) << x;
+}
+
+// However fine the texels are, and however many samples there are: as much is covered as texels are there.
+TEST_F(Textured, CutOutsCoverTheShareThatIsThere) {
+    for (const std::uint32_t there : {1u, 3u, 5u, 7u})
+        for (const std::uint32_t side : {32u, 256u, 2048u}) {
+            const VertexTree tree = built(textures::textured_grid(4, striped(side, there, 8)));
+            const render::Frame frame = draw(tree, 4, 16, {.samples = 64, .background = 0});
+            double mean = 0;
+            for (int y = 0; y < 16; ++y)
+                for (int x = 0; x < 16; ++x) mean += luminance(frame, x, y) / 256;
+            EXPECT_NEAR(mean, there / 8.0, 0.04) << side; // all pixels are alike, and a sample is 0.016
+        }
 }
 
 } // namespace unseen::texture_test

@@ -215,11 +215,11 @@ const std::vector<Case>& cases() {
          {"image 0: 'gone.png' is neither beside"}},
         {"what nobody draws",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "", R"(
-             {"normalTexture":{"index":0},"emissiveFactor":[0,0,0],"alphaMode":"MASK","extensions":{
+             {"normalTexture":{"index":0},"emissiveFactor":[0,0,0],"alphaMode":"BLEND","extensions":{
               "KHR_materials_ior":{"ior":1.5},"KHR_materials_unlit":{}}})")}},
          "a.glb",
          1,
-         {"of KHR_materials_unlit, cut-outs by the alpha of images and normal maps is not drawn"},
+         {"of KHR_materials_unlit, normal maps and translucency by the alpha of images is not drawn"},
          picture},
         {"an image of nothing",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":99})")}},

@@ -111,8 +111,8 @@ Reason chroma(const Cutting& c) {
 }
 
 Reason translucency(const Cutting& c) {
-    if (!is_translucent(c.sight)) return {false, "no vertex has an alpha below 1"};
-    return {true, "where a vertex has an alpha below 1, anything in the scene may show through"};
+    if (!is_translucent(c.sight)) return {false, "no vertex has an alpha below 1, and all texels are there"};
+    return {true, "where a vertex has an alpha below 1 or texels are cut out, anything in the scene may show through"};
 }
 
 Reason texture(const Cutting& c) {

@@ -148,8 +148,9 @@ Result<Texture> decode_codes(std::string_view bytes, const std::filesystem::path
         const auto channels = static_cast<std::size_t>(file.image.channels);
         for (std::size_t i = 0; i < row.size(); i += channels) {
             Texel texel{0, 0, 0, 255};
+            if (channels % 2 == 0) texel[3] = code_of(static_cast<double>(row[i + channels - 1]));
             for (std::size_t c = 0; c < 3; ++c) {
-                const float value = row[channels == 1 ? i : i + c];
+                const float value = row[channels <= 2 ? i : i + c];
                 if (!(value >= 0 && value <= 1))
                     return malformed(name, "the value of pixel (" + std::to_string(i / channels) + ", " +
                                                std::to_string(y) + ") is " + std::to_string(value) +
@@ -161,7 +162,7 @@ Result<Texture> decode_codes(std::string_view bytes, const std::filesystem::path
         }
         return {};
     };
-    const auto decoded = perception::decode_rows(bytes, name, take);
+    const auto decoded = perception::decode_rows(bytes, name, take, true);
     return decoded ? Result<Texture>(std::move(texture)) : decoded.error();
 }
 

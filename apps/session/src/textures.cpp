@@ -151,8 +151,8 @@ Result<Atlas> make_atlas(std::span<const AtlasPart> parts) {
 
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
-    using Look =
-        std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>, std::array<double, 6>>;
+    using Look = std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::optional<float>, std::array<float, 4>,
+                            std::array<double, 6>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
@@ -161,6 +161,7 @@ std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) 
         const Look look{m.image_bytes.get(),
                         m.wrap_u,
                         m.wrap_v,
+                        m.alpha_cutoff,
                         {m.colour.r, m.colour.g, m.colour.b, m.colour.a},
                         {uv[0][0], uv[0][1], uv[1][0], uv[1][1], m.uv_map.offset.x, m.uv_map.offset.y}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
@@ -206,13 +207,28 @@ std::vector<std::size_t> part_vertices(meshio::ReadResult& read, const std::vect
     return of_vertex;
 }
 
+// Stretches alpha so that texels are there from a half on (vdtree::is_there()), and the outline between two lies where it
+// did. Without a cut-off all are there.
+void cut_out(Texture& texture, std::optional<float> cutoff) {
+    std::array<std::uint8_t, 256> stretched{};
+    for (std::size_t code = 0; code < stretched.size(); ++code) {
+        const double alpha = static_cast<double>(code) / 255, least = static_cast<double>(cutoff.value_or(0));
+        const double above = least < 1 ? (alpha - least) / (1 - least) : 1;
+        stretched[code] = static_cast<std::uint8_t>(!(least > 0)     ? 255
+                                                    : alpha >= least ? 128 + std::lround(127 * above)
+                                                                     : std::lround(127 * alpha / least));
+    }
+    for (vdtree::Texel& texel : texture.texels) texel[3] = stretched[texel[3]];
+}
+
 // The images that are asked for, each decoded once. Null: it could not be decoded.
 class Images {
 public:
     explicit Images(bool from_top) : from_top_(from_top) {}
 
     const Texture* of(const meshio::Material& material) {
-        auto [entry, is_new] = images_.try_emplace({material.image_bytes.get(), material.wrap_u, material.wrap_v});
+        auto [entry, is_new] =
+            images_.try_emplace({material.image_bytes.get(), material.wrap_u, material.wrap_v, material.alpha_cutoff});
         if (is_new) {
             const std::string name = material.image.empty() ? "the image of material '" + material.name + "'"
                                                             : material.image.generic_string();
@@ -224,6 +240,7 @@ public:
                 entry->second = std::move(*texture);
                 entry->second->wrap_u = material.wrap_u;
                 entry->second->wrap_v = material.wrap_v;
+                cut_out(*entry->second, material.alpha_cutoff);
             }
         }
         return entry->second ? &*entry->second : nullptr;
@@ -245,7 +262,8 @@ public:
 private:
     bool from_top_;
     Budget texels_{0, 0, std::uint64_t{1} << 29};
-    std::map<std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap>, std::optional<Texture>> images_;
+    std::map<std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::optional<float>>, std::optional<Texture>>
+        images_;
     std::vector<std::string> complaints_;
 };
 
@@ -266,6 +284,7 @@ Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult&
                                  {mesh_file.string()})};
     auto texture = read_texture(image, read.uvs_from_top);
     if (!texture) return texture.error();
+    cut_out(*texture, std::nullopt);
     read.mesh.texture = std::move(*texture);
     return {};
 }

@@ -135,6 +135,13 @@ public:
                 fail(where_, ": its texture lies by texture coordinates that are not read, which are 0 to ",
                      last_uv_set, ".");
             add_texture(*texture, material, lost);
+            if (mode == nullptr || *mode != "MASK") return material;
+            const json* cutoff = member(of_file, "alphaCutoff");
+            if (cutoff != nullptr && !(cutoff->is_number() && *cutoff >= 0))
+                fail(where_, ": its alphaCutoff should be a number, 0 or more; correct it.");
+            const float factor = std::exchange(material.colour.a, 1.0f);
+            const float least = cutoff != nullptr ? cutoff->get<float>() : 0.5f;
+            material.alpha_cutoff = least <= factor ? least / std::max(factor, 1e-6f) : 2.0f;
         } catch (const Fault& fault) {
             warnings.push_back(fault.what + " Material " + in_quotes(material.name) + " is drawn without that.");
         }
@@ -154,7 +161,6 @@ private:
         const json* mode = member(of_file, "alphaMode");
         if (images_ != nullptr) {
             const bool has_image = surface != nullptr && has(*surface, "baseColorTexture");
-            if (has_image && mode != nullptr && *mode == "MASK") all.insert("cut-outs by the alpha of images");
             if (has_image && mode != nullptr && *mode == "BLEND") all.insert("translucency by the alpha of images");
             if (has(of_file, "normalTexture")) all.insert("normal maps");
             if (has(of_file, "occlusionTexture")) all.insert("occlusion maps");

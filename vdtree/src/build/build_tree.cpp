@@ -25,6 +25,7 @@
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/team.h>
 #include <unseen/vdtree/internal/texture_bounds.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/vectors.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
@@ -425,23 +426,29 @@ private:
         g_->needs = std::move(needs.needs);
     }
 
-    // Nodes with a corner of the ring that has an alpha below 1.
+    // Nodes with a corner of the ring that has an alpha below 1, or with texels in it that are not there.
     void mark_translucent() {
         const TreeLinks links = links_of(*g_);
-        const auto shows_through = [&](Index leaf) { return !(g_->colours[links.wedge_of_leaf(leaf)].a >= 1); };
-        const Index leaves = g_->colours.empty() ? 0 : links.leaves();
-        bool any = false;
-        for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
+        const CutOuts cut_outs(source_.texture);
+        const auto has_alpha = [&](Index leaf) { return !(g_->colours[links.wedge_of_leaf(leaf)].a >= 1); };
+        const auto shows_through = [&](const Triangle& t) {
+            if (!g_->colours.empty() && std::ranges::any_of(t, has_alpha)) return true;
+            if (cut_outs.is_empty()) return false;
+            UvBox box;
+            for (const Index leaf : t) box.include(g_->uvs[links.wedge_of_leaf(leaf)]);
+            return cut_outs.any(box);
+        };
         const auto mark = [&](NodeId node) {
             bounds_[node].flags = static_cast<std::uint8_t>(bounds_[node].flags | translucent_ring);
         };
-        if (any) {
-            for (const Triangle& t : g_->triangles)
-                if (std::any_of(t.begin(), t.end(), shows_through))
-                    for (const Index leaf : t) mark(links.parents[links.place_of_leaf(leaf)]);
-            for (NodeId node = links.interior(); node-- > 1;)
-                if (bounds_[node].flags & translucent_ring) mark(links.parents[node]);
+        bool any = false;
+        for (const Triangle& t : g_->triangles) {
+            if (!shows_through(t)) continue;
+            for (const Index leaf : t) mark(links.parents[links.place_of_leaf(leaf)]);
+            any = true;
         }
+        for (NodeId node = any ? links.interior() : 0; node-- > 1;)
+            if (bounds_[node].flags & translucent_ring) mark(links.parents[node]);
         g_->bounds = std::move(bounds_);
     }
 

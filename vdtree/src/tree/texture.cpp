@@ -77,6 +77,38 @@ double linear_luminance(Texel texel) noexcept {
     return rec709_luminance(glm::dvec3(linear[texel[0]], linear[texel[1]], linear[texel[2]]));
 }
 
+bool has_cut_outs(const TextureView& texture) noexcept { return !std::ranges::all_of(texture.texels, is_there); }
+
+CutOuts::CutOuts(const TextureView& texture) : width_(texture.width), height_(texture.height) {
+    if (!has_cut_outs(texture)) return;
+    const std::size_t columns = std::size_t{width_} + 1;
+    sums_.assign(columns * (std::size_t{height_} + 1), 0);
+    for (std::size_t y = 0; y < height_; ++y) {
+        std::uint32_t of_row = 0;
+        for (std::size_t x = 0; x < width_; ++x) {
+            of_row += !is_there(texture.texels[y * width_ + x]);
+            sums_[(y + 1) * columns + x + 1] = sums_[y * columns + x + 1] + of_row;
+        }
+    }
+}
+
+bool CutOuts::any(const UvBox& box) const {
+    if (is_empty() || box.is_empty()) return false;
+    if (!(box.lo.x >= 0 && box.lo.y >= 0 && box.hi.x <= 1 && box.hi.y <= 1)) return true;
+    const auto cells = [](float lo, float hi, std::uint32_t size) { // with the texels beside them
+        const double first = std::floor(static_cast<double>(lo) * size - 1),
+                     end = std::ceil(static_cast<double>(hi) * size + 1);
+        return std::pair(static_cast<std::size_t>(std::max(first, 0.0)),
+                         static_cast<std::size_t>(std::min<double>(end, size)));
+    };
+    const auto [left, right] = cells(box.lo.x, box.hi.x, width_);
+    const auto [top, bottom] = cells(box.lo.y, box.hi.y, height_);
+    const std::size_t columns = std::size_t{width_} + 1;
+    return sums_[bottom * columns + right] - sums_[top * columns + right] - sums_[bottom * columns + left] +
+               sums_[top * columns + left] !=
+           0;
+}
+
 TexturePyramid::TexturePyramid(const TextureView& texture)
     : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
     Level base{width_, height_, {}, {}};

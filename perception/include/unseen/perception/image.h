@@ -43,7 +43,9 @@ Result<ImageFile> decode_image(std::string_view bytes, const std::filesystem::pa
 // Decodes an image and hands over its rows from the top, so that it need not fit into memory as floats. The image that
 // `take` receives and that is returned has a size and no values. An error of `take` ends decoding.
 using TakeRow = FunctionRef<Result<void>(const ImageFile& image, int y, std::span<const float> row)>;
-Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& name, const TakeRow& take);
+// `keeps_alpha`: what a PNG has of it is one channel more, from 0 to 1.
+Result<ImageFile> decode_rows(std::string_view bytes, const std::filesystem::path& name, const TakeRow& take,
+                              bool keeps_alpha = false);
 
 // Whether the bytes begin like a file of one of these formats.
 bool is_image(std::string_view bytes);

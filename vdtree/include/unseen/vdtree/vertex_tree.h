@@ -145,7 +145,7 @@ struct NormalMask {
 
 enum NodeFlags : std::uint8_t {
     irregular_ring = 1,   // the ring has a boundary, non-manifold or inconsistently oriented edge
-    translucent_ring = 2, // a corner of the ring has an alpha below 1: anything behind it may show
+    translucent_ring = 2, // a corner of the ring has an alpha below 1, or texels are not there: what is behind may show
 };
 
 // What a fold test reads of an interior node, in one cache line's half.

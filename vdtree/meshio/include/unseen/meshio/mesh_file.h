@@ -59,6 +59,8 @@ struct Material {
     std::shared_ptr<const std::string> image_bytes = {};
     vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
     UvMap uv_map = {}; // from the vertices' texture coordinates to those of the image
+    // Texels of the image whose alpha is less are not there; none: alpha does not count. Above 1: none of them is.
+    std::optional<float> alpha_cutoff = {};
     // What else the file says of how it looks, which nothing here draws or judges: "normal maps", "emission", ...
     std::set<std::string> undrawn = {};
 

@@ -15,6 +15,10 @@ std::int64_t wrapped_texel(std::int64_t i, std::int64_t size, Wrap wrap) noexcep
 glm::vec4 linear_colour(Texel texel) noexcept;
 double linear_luminance(Texel texel) noexcept;
 
+// Whether anything is drawn where the texel is: its alpha is a half or more.
+inline bool is_there(Texel texel) noexcept { return texel[3] >= 128; }
+bool has_cut_outs(const TextureView& texture) noexcept; // texels that are not there
+
 // The least box around texture coordinates; empty until something is included.
 struct UvBox {
     glm::vec2 lo = glm::vec2(std::numeric_limits<float>::infinity());
@@ -34,6 +38,21 @@ struct UvBox {
         }
     }
     bool operator==(const UvBox&) const = default;
+};
+
+// Where texels are not there.
+class CutOuts {
+public:
+    // Precondition: a valid texture. Cost: a pass over the texels; 4 bytes of memory for each, if any is not there.
+    explicit CutOuts(const TextureView& texture);
+
+    bool is_empty() const noexcept { return sums_.empty(); }
+    // Whether there are any in the box or beside it; true for boxes that reach beyond 0..1, if there are any at all.
+    bool any(const UvBox& box) const;
+
+private:
+    std::uint32_t width_, height_;
+    std::vector<std::uint32_t> sums_; // above and to the left of each texel's corners
 };
 
 // The least and the largest luminance of a texture, and its mean, over areas of all sizes: for each of its mip levels.
