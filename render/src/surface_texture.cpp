@@ -83,6 +83,7 @@ void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int 
         return glm::vec4(glm::vec3(vdtree::linear_colour(texel(x, y))), vdtree::is_there(texel(x, y)) ? 1 : 0);
     };
     reset_pixel_stores();
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 2); // of half floats, three of which need not be a multiple of four bytes
     std::vector<glm::vec4> row(texture.width);
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) row[static_cast<std::size_t>(x)] = vdtree::linear_colour(texel(x, y));
@@ -98,6 +99,7 @@ void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int 
             });
         upload(image, number, 0, level.width, level.height, level.pixels, has_cut_outs);
     }
+    reset_pixel_stores();
 }
 
 GLint gl_wrap(vdtree::Wrap wrap) {

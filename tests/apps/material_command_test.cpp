@@ -395,7 +395,7 @@ TEST_F(ObjMaterialTest, WhatIsMissingIsMissedAloneAtEveryBudget) {
                 for (const auto& corner : face) {
                     EXPECT_EQ(corner[1] < 0, name == "left upper check") << name;
                     if (corner[1] < 0) continue;
-                    const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]);
+                    const auto &p = out.vector(0, corner[0]), &uv = out.vector(1, corner[1]);
                     EXPECT_NEAR(uv[0], p[0] + (p[0] < 0.1 ? 2 : -0.25), 1e-4) << name;
                     EXPECT_NEAR(uv[1], (p[1] + 1) / 2, 1e-4) << name;
                 }
@@ -580,8 +580,8 @@ TEST_F(BoxTest, HasItsSeamsEdgesAndNamesInObjAtEveryBudget) {
             triangles += of_part.size();
             for (const auto& face : of_part)
                 for (const auto& corner : face) {
-                    const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]),
-                               n = out.vector(2, corner[2]);
+                    const auto &p = out.vector(0, corner[0]), &uv = out.vector(1, corner[1]),
+                               &n = out.vector(2, corner[2]);
                     expect_corner(side, {p[0], p[1], p[2]}, {uv[0], uv[1]}, {n[0], n[1], n[2]});
                 }
         }
@@ -641,7 +641,7 @@ TEST_F(BoxTest, GetsTheNormalsThatItIsDrawnWith) {
     for (const auto& [name, of_part] : out.faces)
         for (const auto& face : of_part)
             for (const auto& corner : face) {
-                const auto p = out.vector(0, corner[0]), uv = out.vector(1, corner[1]), n = out.vector(2, corner[2]);
+                const auto &p = out.vector(0, corner[0]), &uv = out.vector(1, corner[1]), &n = out.vector(2, corner[2]);
                 expect_corner(name.substr(0, 2), {p[0], p[1], p[2]}, {uv[0], uv[1]}, {n[0], n[1], n[2]});
             }
     succeed({"simplify", "bare.obj", "--full", "-o", "out.glb"});

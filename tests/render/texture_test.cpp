@@ -246,6 +246,18 @@ TEST_F(Textured, AreBoundedUnderLights) {
     }
 }
 
+TEST_F(Textured, AnyNumberOfColumnsIsDrawn) {
+    for (const std::uint32_t width : {1u, 3u, 5u, 7u}) {
+        const Texture texture = textures::noise(width, 3, width);
+        const int window = static_cast<int>(30 * width);
+        const render::Frame frame = draw(built(textures::textured_grid(4, texture)), 4, window);
+        for (std::uint32_t i = 0; i < width; ++i) {
+            const glm::dvec3 expected(vdtree::linear_colour(texture.texels[width + i]));
+            expect_near(colour(frame, static_cast<int>(30 * i + 15), window / 2), expected, 0.05);
+        }
+    }
+}
+
 // ---- texels that are not there
 
 // `there` of each run of `of` columns.
