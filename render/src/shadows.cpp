@@ -249,7 +249,7 @@ void Shadows::Impl::draw_layer(const DepthPrograms& programs, std::size_t layer)
         const bool is_cut_out = tree.texture && tree.texture->has_cut_outs();
         const Program& program = is_cut_out ? *programs.cut_out : *programs.whole;
         program.set(0, glm::mat4(clip_from_unit));
-        if (is_cut_out) tree.texture->cut_out(program, 0, 0.5f);
+        if (is_cut_out) tree.texture->bind(program, 0, 0.5f);
         draw_triangles(program, tree.arrays, cut.indices);
     }
 }

@@ -305,8 +305,9 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
     glCullFace(item.cull == Cull::front ? GL_FRONT : GL_BACK);
 
     item.program->set(clip_from_unit_location, jittered(item.projection, view_, point));
-    if (output_ != Output::depth) set_colours(item, lod_bias);
-    if (tree.texture && tree.texture->has_cut_outs()) tree.texture->cut_out(*item.program, lod_bias, least_share);
+    if (output_ != Output::depth) set_colours(item);
+    if (tree.texture && (output_ != Output::depth || tree.texture->has_cut_outs()))
+        tree.texture->bind(*item.program, lod_bias, least_share);
     draw_triangles(*item.program, tree.arrays, cut.indices);
     if (item.cull != Cull::nothing) return;
     // Both sides of a leaf fold onto each other. Where they lie in one place, the one that faces the eye is seen, not the
@@ -319,7 +320,7 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
     glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
+void SurfacePass::set_colours(const PreparedItem& item) const {
     const GpuTree::Impl& tree = item.cut.tree().impl();
     const Program& program = *item.program;
     program.set(lowest_shade_location, item.is_lit ? glm::vec4(0) : tree.lowest_shade);
@@ -346,9 +347,6 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
         program.set(shadow_kinds_location, item.shadows.kinds);
         program.set(world_from_unit_location, item.shadows.world_from_unit);
         shadows_->bind();
-    }
-    if (tree.texture) {
-        tree.texture->bind(program, lod_bias);
     }
 }
 

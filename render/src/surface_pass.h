@@ -84,7 +84,7 @@ private:
           shadows_(camera.shadows ? &camera.shadows->impl() : nullptr) {}
     static Cull cull_for(vdtree::Closedness closedness, bool eye_inside);
     void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias, float least_share = 0.5f) const;
-    void set_colours(const PreparedItem& item, float lod_bias) const;
+    void set_colours(const PreparedItem& item) const;
 
     vdtree::View view_;
     std::optional<Tile> tile_;

@@ -151,16 +151,12 @@ void SurfaceTexture::describe(unsigned vertex_array) const {
     glVertexArrayAttribBinding(vertex_array, uv_location, uv_buffer_binding);
 }
 
-void SurfaceTexture::bind(const Program& program, float lod_bias) const {
+void SurfaceTexture::bind(const Program& program, float lod_bias, float least_share) const {
     program.set(lod_bias_location, lod_bias);
     program.set(uv_bounds_location, glm::vec4(box_.lo, box_.hi)); // the least of all vertices, then the largest
+    if (has_cut_outs_) program.set(least_share_location, least_share);
     glBindTextureUnit(image_binding, image_.id());
     glBindSampler(image_binding, 0); // a window's other users may have put one there
-}
-
-void SurfaceTexture::cut_out(const Program& program, float lod_bias, float least_share) const {
-    bind(program, lod_bias);
-    program.set(least_share_location, least_share);
 }
 
 } // namespace unseen::render

@@ -20,12 +20,11 @@ public:
     // `uvs`: by vertex. Its mip levels are means in linear light.
     static Result<SurfaceTexture> create(const vdtree::TextureView& texture, std::span<const glm::vec2> uvs);
 
-    void describe(unsigned vertex_array) const;              // the coordinates, as surface.vert takes them
-    void bind(const Program& program, float lod_bias) const; // the image, as surface.frag takes it
+    void describe(unsigned vertex_array) const; // the coordinates, as surface.vert takes them
+    // The image, as surface.frag takes it. `least_share`: see SurfacePass::draw(); of programs that cut out.
+    void bind(const Program& program, float lod_bias, float least_share) const;
 
     bool has_cut_outs() const noexcept { return has_cut_outs_; } // texels where nothing is drawn
-    // Binds likewise for a program that cuts out; see SurfacePass::draw().
-    void cut_out(const Program& program, float lod_bias, float least_share) const;
 
 private:
     SurfaceTexture() = default;

@@ -49,12 +49,15 @@ protected:
         auto renderer = require(render::Renderer::create(*context_, tree));
         Cut cut(tree);
         cut.unfold_all();
+        return std::move(*require(renderer->draw(cut, from_the_front(n, window), options)));
+    }
+    static View from_the_front(int n, int window) {
         View view;
         view.width = view.height = window;
         view.fov_y_degrees = 2 * std::atan(0.5 / 10) * 180 / 3.14159265358979;
         view.target = {n * 0.5, n * 0.5, 0};
         view.eye = view.target + glm::dvec3(0, 0, 10.0 * n);
-        return std::move(*require(renderer->draw(cut, view, options)));
+        return view;
     }
     static glm::dvec3 colour(const render::Frame& frame, int x, int y) {
         const std::size_t i = 3 * static_cast<std::size_t>(y * frame.width + x);
@@ -286,13 +289,8 @@ TEST_F(Textured, NothingIsDrawnWhereTexelsAreNotThere) {
     Cut cut(tree);
     cut.unfold_all();
     ASSERT_TRUE(gpu_cut.follow(cut));
-    View view;
-    view.width = view.height = 64;
-    view.fov_y_degrees = 2 * std::atan(0.5 / 10) * 180 / 3.14159265358979;
-    view.target = {2, 2, 0};
-    view.eye = {2, 2, 40};
     const render::Item item{gpu_cut};
-    const auto depth = require(render::farthest_depth(*context_, {&item, 1}, view));
+    const auto depth = require(render::farthest_depth(*context_, {&item, 1}, from_the_front(4, 64)));
     for (int x = 2; x < 64; ++x)
         if (x % 16 > 1 && x % 16 < 14)
             EXPECT_EQ(std::isinf((*depth)[static_cast<std::size_t>(64 * 13 + x)]), x % 32 >= 16) << x;
