@@ -221,6 +221,13 @@ const std::vector<Case>& cases() {
          1,
          {"of KHR_materials_unlit, normal maps and translucency by the alpha of images is not drawn"},
          picture},
+        {"a cut-off that is no number",
+         {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",
+                        R"({"alphaMode":"MASK","alphaCutoff":"x"})")}},
+         "a.glb",
+         1,
+         {"material 0: its alphaCutoff should be a number, 0 or more; correct it. Material 'm' is drawn without "
+          "that."}},
         {"an image of nothing",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":99})")}},
          "a.glb",

@@ -134,14 +134,8 @@ public:
             if (!colour_uv_set(of_file))
                 fail(where_, ": its texture lies by texture coordinates that are not read, which are 0 to ",
                      last_uv_set, ".");
+            if (mode != nullptr && *mode == "MASK") cut_out(of_file, material);
             add_texture(*texture, material, lost);
-            if (mode == nullptr || *mode != "MASK") return material;
-            const json* cutoff = member(of_file, "alphaCutoff");
-            if (cutoff != nullptr && !(cutoff->is_number() && *cutoff >= 0))
-                fail(where_, ": its alphaCutoff should be a number, 0 or more; correct it.");
-            const float factor = std::exchange(material.colour.a, 1.0f);
-            const float least = cutoff != nullptr ? cutoff->get<float>() : 0.5f;
-            material.alpha_cutoff = least <= factor ? least / std::max(factor, 1e-6f) : 2.0f;
         } catch (const Fault& fault) {
             warnings.push_back(fault.what + " Material " + in_quotes(material.name) + " is drawn without that.");
         }
@@ -174,6 +168,16 @@ private:
                     name != "KHR_materials_emissive_strength")
                     all.insert(name);
         return all;
+    }
+
+    // By the image's alpha times the factor's, so that the rest is opaque.
+    void cut_out(const json& of_file, Material& material) const {
+        const json* cutoff = member(of_file, "alphaCutoff");
+        if (cutoff != nullptr && !(cutoff->is_number() && *cutoff >= 0))
+            fail(where_, ": its alphaCutoff should be a number, 0 or more; correct it.");
+        const float factor = std::exchange(material.colour.a, 1.0f);
+        const float least = cutoff != nullptr ? cutoff->get<float>() : 0.5f;
+        material.alpha_cutoff = least <= factor ? least / std::max(factor, 1e-6f) : 2.0f;
     }
 
     const json* optional_object(const json& in, const char* key) const {
