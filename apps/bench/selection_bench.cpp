@@ -218,7 +218,7 @@ private:
         const session::Observer& observer = scene_.session.observer();
         codes_ = session::code_image(frame, observer.display);
         judge_ = std::make_unique<perception::Judge>(require(perception::Judge::create(
-            session::luminance_image(frame, observer.display), session::judge_options(observer))));
+            session::light_image(frame, observer.display), session::judge_options(observer))));
     }
 
     void step(Method& method, const vdtree::View& view, std::size_t number, bool is_judged) {
@@ -247,7 +247,7 @@ private:
         const perception::Display& display = scene_.session.observer().display;
         method.frames.push_back(
             {number, triangles,
-             static_cast<double>(require(judge_->judge(session::luminance_image(*frame, display))).visible_pixels),
+             static_cast<double>(require(judge_->judge(session::light_image(*frame, display))).visible_pixels),
              require(perception::ssim(codes_, session::code_image(*frame, display)))});
     }
 

@@ -22,7 +22,7 @@ using Pictures = std::vector<Image>;
 
 struct Column {
     SheetCut cut;
-    Image luminance; // cd/m2, of the whole window
+    Image light; // cd/m2, of the whole window
     Pictures pictures, maps;
 };
 
@@ -74,7 +74,7 @@ public:
         if (!simplified) return simplified.error();
         const vdtree::Cut& cut = simplified->cuts.front();
         if (auto ok = draw(column, cut); !ok) return ok.error();
-        made.pixels = column.luminance.values.size();
+        made.pixels = column.light.values.size();
         made.report = std::move(*simplified);
         return full.values.empty() ? Result<void>() : judge(column, full);
     }
@@ -90,7 +90,7 @@ private:
         const auto whole = draw(cut, view_, options);
         if (!whole) return whole.error();
         column.cut.draw_ms = whole->draw_ms;
-        column.luminance = session::luminance_image(*whole, session_.observer().display);
+        column.light = session::light_image(*whole, session_.observer().display);
         if (o_.has_cuts) {
             const vdtree::View small = small_view(view_, o_.cell_px.value_or(usual_cell_px));
             if (auto ok = draw_twice(column.pictures, cut, small, options); !ok) return ok;
@@ -135,7 +135,7 @@ private:
         if (column.cut.gaze) options.gaze_px = column.cut.gaze->px;
         options.csf_table = session_.observer().csf;
         options.gain = options.csf_table ? 1 : session_.observer().person.gain;
-        auto judgement = perception::judge_modern(full, column.luminance, options);
+        auto judgement = perception::judge_modern(full, column.light, options);
         if (!judgement) return judgement.error();
         column.cut.judgement = std::move(*judgement);
         return {};
@@ -186,7 +186,7 @@ Result<void> fill_all(std::vector<Column>& columns, session::Session& session, c
         if (o.progress && !o.progress(share, column.cut.name.c_str()))
             return Error{ErrorCode::cancelled, "The drawing was cancelled."};
         if (auto ok = maker.fill(column, full); !ok) return ok;
-        if (full.values.empty()) full = std::move(column.luminance);
+        if (full.values.empty()) full = std::move(column.light);
     }
     session.set_gaze(gaze_before);
     return {};

@@ -94,12 +94,13 @@ Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const 
 
 // The judges modern and second.
 Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
-    const Image reference = perception::to_luminance(pair.reference, display);
-    const Image test = perception::to_luminance(pair.test, display);
     const auto options = judge_options(a, display);
     if (!options) return options.error();
-    if (a.device == gpu) return compare_on_gpu(reference, test, *options);
-    auto judgement = perception::judge_modern(reference, test, *options);
+    if (a.device == gpu)
+        return compare_on_gpu(perception::to_luminance(pair.reference, display),
+                              perception::to_luminance(pair.test, display), *options);
+    auto judgement = perception::judge_modern(perception::to_light(pair.reference, display),
+                                              perception::to_light(pair.test, display), *options);
     if (!judgement) return judgement.error();
     return Verdict{std::move(*judgement), {}};
 }
@@ -158,7 +159,8 @@ std::string judged_by(const CompareArguments& a, const Verdict& verdict, const p
     text += ", seen from " + rounded(display.distance.value(), 3) + " m, ";
     text += a.gaze_px ? "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y)
                       : std::string("wherever they look");
-    return verdict.gpu.empty() ? text : text + ", on the GPU (" + verdict.gpu + ")";
+    if (verdict.judgement.judges_colour) text += "; in luminance and colour";
+    return verdict.gpu.empty() ? text : text + "; in luminance alone, on the GPU (" + verdict.gpu + ")";
 }
 
 // A difference is seen around the pixels that differ, too: fewer pixels may differ than it is visible at.
@@ -189,6 +191,7 @@ Result<int> run(const CompareArguments& a) {
                        {"pixels", judgement.pixels},
                        {"max_ratio", number_or_null(judgement.max_ratio)},
                        {"ssim", number_or_null(ssim)},
+                       {"judges_colour", judgement.judges_colour},
                        {"device", a.device}};
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (!a.map.empty()) {
@@ -229,7 +232,8 @@ Command compare_command(CLI::App& app, Setup& setup) {
     add_value(*verb, "--field", a->field_degrees, within(1e-3, 179.9), "DEGREES",
               "With rpg99: the image's horizontal field (default: as shown on the display)");
     add_value(*verb, "--device", a->device, one_of({"cpu", gpu}), "NAME",
-              "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1%");
+              "Where the judges modern and second run: cpu (default), or gpu, which agrees within 0.1% and sees "
+              "luminance alone");
     add_gaze_option(*verb, a->gaze_px);
     add_value(*verb, "--map", a->map, ending_in({".png"}), "OUT.png",
               "The differences, with a scale below: blue where invisible, yellow to red where visible");

@@ -125,9 +125,8 @@ Result<FrameChange> FlightChanges::after(const session::Follower& flight, const 
     const perception::Image full = session::luminance_image(*drawn, display),
                             now = session::luminance_image(frame, display);
     const perception::JudgeOptions judging = session::judge_options(session_.observer());
-    const auto judge = perception::Judge::create(full, judging);
-    if (!judge) return judge.error();
-    const auto judged = judge->judge(now);
+    const auto judged =
+        perception::judge_modern(session::light_image(*drawn, display), session::light_image(frame, display), judging);
     if (!judged) return judged.error();
     FrameChange result;
     result.picture = judged->max_ratio;

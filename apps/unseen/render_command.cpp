@@ -47,7 +47,7 @@ Result<perception::Image> image_of(const RenderArguments& a, session::Session& s
                                    const render::Frame& frame) {
     if (a.map) return draw_fold_map(result.cuts.front(), session, view, request, *a.map, view);
     const perception::Display& display = session.observer().display;
-    return is_for_people(a.out) ? session::code_image(frame, display) : session::luminance_image(frame, display);
+    return is_for_people(a.out) ? session::code_image(frame, display) : session::light_image(frame, display);
 }
 
 void print(const RenderArguments& a, const session::Session& session, const session::Simplification& result,

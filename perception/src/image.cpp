@@ -738,6 +738,22 @@ Result<void> write_image(const std::filesystem::path& file, const Image& image) 
     return write_bytes(file, *bytes);
 }
 
+Image to_light(const ImageFile& file, const Display& display) {
+    const Image& in = file.image;
+    bool is_grey = true;
+    if (in.channels == 3)
+        for (std::size_t i = 0; i < in.values.size(); i += 3)
+            is_grey &= in.values[i] == in.values[i + 1] && in.values[i] == in.values[i + 2];
+    if (is_grey) return to_luminance(file, display);
+    if (file.is_absolute) return in;
+    const CodeDecoder code_to_light(display, file.bits);
+    Image out{in.width, in.height, in.channels, {}};
+    out.values.reserve(in.values.size());
+    for (const float code : in.values)
+        out.values.push_back(static_cast<float>(to_luminance(display, code_to_light(code)).value()));
+    return out;
+}
+
 Image to_luminance(const ImageFile& file, const Display& display) {
     const Image& in = file.image;
     Image out{in.width, in.height, 1, {}};

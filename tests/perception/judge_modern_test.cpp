@@ -3,6 +3,12 @@
 // it judges for the median person, who is castleCSF. People: tests/calibration/people_test.cpp.
 #include <unseen/perception/judge.h>
 
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include <unseen/perception/internal/chroma.h>
+#include <unseen/vdtree/colour.h>
+
 #include "testing.h"
 
 namespace unseen::perception::judge_modern_test {
@@ -22,18 +28,44 @@ struct Gabor {
     SquareDegrees area() const { return SquareDegrees(std::numbers::pi * sigma_deg() * sigma_deg()); }
 };
 
+// Over the luminance, by column and row.
+double modulation(const Gabor& g, int side, int x, int y) {
+    const double sigma = g.sigma_deg(), angle = g.orientation_deg * std::numbers::pi / 180;
+    const double dx = (x - side / 2) / default_ppd(), dy = (y - side / 2) / default_ppd();
+    const double along = dx * std::cos(angle) + dy * std::sin(angle);
+    const double envelope = std::exp(-(dx * dx + dy * dy) / (2 * sigma * sigma));
+    return g.contrast * envelope * std::cos(2 * std::numbers::pi * g.freq_cpd * along + g.phase);
+}
+
 Image draw(const Gabor& g, int side) {
     Image image = flat(side, side, 0);
-    const double sigma = g.sigma_deg(), angle = g.orientation_deg * std::numbers::pi / 180;
-    for (int y = 0; y < side; ++y) {
-        for (int x = 0; x < side; ++x) {
-            const double dx = (x - side / 2) / default_ppd(), dy = (y - side / 2) / default_ppd();
-            const double along = dx * std::cos(angle) + dy * std::sin(angle);
-            const double envelope = std::exp(-(dx * dx + dy * dy) / (2 * sigma * sigma));
-            const double wave = std::cos(2 * std::numbers::pi * g.freq_cpd * along + g.phase);
-            image.at(x, y) = static_cast<float>(g.luminance * (1 + g.contrast * envelope * wave));
-        }
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x)
+            image.at(x, y) = static_cast<float>(g.luminance * (1 + modulation(g, side, x, y)));
+    return image;
+}
+
+// Linear RGB of this luminance and opponent chroma.
+glm::dvec3 rgb_of(double luminance, glm::dvec2 chroma) {
+    glm::dmat3 channels; // by primary
+    for (int k = 0; k < 3; ++k) {
+        glm::dvec3 primary(0);
+        primary[k] = 1;
+        channels[k] = glm::dvec3(rec709_luminance(primary), opponent_chroma(primary));
     }
+    return glm::inverse(channels) * glm::dvec3(luminance, chroma);
+}
+
+// The same in a direction of colour (0: red-green, 1: yellow-violet), of one luminance.
+Image draw_isoluminant(const Gabor& g, int side, int direction) {
+    Image image{side, side, 3, std::vector<float>(static_cast<std::size_t>(3 * side * side))};
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            glm::dvec2 chroma(0);
+            chroma[direction] = g.luminance * modulation(g, side, x, y);
+            const glm::dvec3 rgb = rgb_of(g.luminance, chroma);
+            for (int k = 0; k < 3; ++k) image.at(x, y, k) = static_cast<float>(rgb[k]);
+        }
     return image;
 }
 
@@ -130,6 +162,88 @@ TEST(JudgeModern, SeesMoreOfWhatIsLarger) {
         EXPECT_GT(v, 1.1 * last) << radius_cycles;
         last = v;
     }
+}
+
+// Gratings of one luminance, by both judges: castleCSF's branches of colour.
+TEST(JudgeModern, SeesIsoluminantGaborsAtTheirThreshold) {
+    constexpr std::array models = {CsfModel::castle_red_green, CsfModel::castle_yellow_violet};
+    const JudgeOptions second = second_judge_options(median_person);
+    for (const int direction : {0, 1}) {
+        std::vector<double> all;
+        for (const double luminance : {5.0, 50.0})
+            for (const double freq : {0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.5, 8.0})
+                for (const double radius_cycles : {1.0, 1.5, 4.0})
+                    for (const double eccentricity : {0.0, 10.0}) {
+                        Gabor g{freq, 0, luminance, 30, 0.5, radius_cycles};
+                        const int side = side_for(g);
+                        if (5 * g.sigma_deg() * default_ppd() > side) continue; // cut off by the picture's border
+                        g.contrast = 1 / closed_form(g, eccentricity, models[static_cast<std::size_t>(direction)]);
+                        if (g.contrast > (direction == 0 ? 0.1 : 0.8)) continue; // no display shows it
+                        JudgeOptions options = looking_aside(eccentricity, side);
+                        const Image grey = flat(side, side, luminance), test = draw_isoluminant(g, side, direction);
+                        const auto judged = require(judge_modern(grey, test, options));
+                        EXPECT_TRUE(judged->judges_colour);
+                        all.push_back(judged->max_ratio);
+                        EXPECT_GT(judged->max_ratio, 1 / three_decibels) << direction << ' ' << freq << ' ' << luminance
+                                                                        << ' ' << radius_cycles << ' ' << eccentricity;
+                        EXPECT_LT(judged->max_ratio, three_decibels) << direction << ' ' << freq << ' ' << luminance
+                                                                    << ' ' << radius_cycles << ' ' << eccentricity;
+                        options.csf = second.csf, options.beta = second.beta;
+                        EXPECT_NEAR(require(judge_modern(grey, test, options))->max_ratio / judged->max_ratio, 1, 0.15);
+                    }
+        ASSERT_GE(all.size(), 30u);
+        std::ranges::nth_element(all, all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2));
+        EXPECT_NEAR(all[all.size() / 2], 1, 0.1) << direction;
+    }
+}
+
+// A pattern in all three channels is seen as their root sum of squares, as castleCSF pools them.
+TEST(JudgeModern, AddsTheEnergiesOfChannels) {
+    const Gabor g{2, 0.02, 20, 0, 0};
+    const int side = side_for(g);
+    const Image grey = flat(side, side, 20), luminance = draw(g, side), red_green = draw_isoluminant(g, side, 0);
+    Image both = red_green;
+    for (std::size_t i = 0; i < both.values.size(); ++i) both.values[i] += luminance.values[i / 3] - grey.values[i / 3];
+    const auto seen = [&](const Image& test) { return require(judge_modern(grey, test, median()))->max_ratio; };
+    EXPECT_NEAR(seen(both), std::hypot(seen(luminance), seen(red_green)), 0.05 * seen(both));
+}
+
+// Greys are judged alike whether they are told by one number or by three, and colours that do not differ add nothing.
+TEST(JudgeModern, JudgesColourOnlyWhereItDiffers) {
+    const Gabor g{4, 0.03, 20, 0, 0};
+    const Image reference = flat(96, 96, 20), test = draw(g, 96);
+    const auto three = [](const Image& grey, glm::vec3 tint) {
+        Image rgb{grey.width, grey.height, 3, {}};
+        for (const float value : grey.values)
+            for (int k = 0; k < 3; ++k) rgb.values.push_back(value * tint[k]);
+        return rgb;
+    };
+    const auto as_grey = require(judge_modern(reference, test, {}));
+    EXPECT_FALSE(as_grey->judges_colour);
+    for (const auto& [a, b] : {std::pair(three(reference, glm::vec3(1)), three(test, glm::vec3(1))),
+                               std::pair(reference, three(test, glm::vec3(1)))}) {
+        const auto judged = require(judge_modern(a, b, {}));
+        EXPECT_FALSE(judged->judges_colour);
+        EXPECT_NEAR(judged->max_ratio, as_grey->max_ratio, 1e-4 * as_grey->max_ratio);
+    }
+    const glm::vec3 tint = glm::vec3(rgb_of(1, {0.05, -0.1}));
+    EXPECT_FALSE(require(judge_modern(three(reference, tint), three(reference, tint), {}))->judges_colour);
+    EXPECT_TRUE(require(judge_modern(three(reference, tint), three(test, tint), {}))->judges_colour);
+}
+
+// A seam of red and green of one luminance moves: nothing that luminance tells.
+TEST(JudgeModern, SeesASeamOfOneLuminanceMove) {
+    const auto seam = [](int at) {
+        Image image{128, 128, 3, std::vector<float>(3 * 128 * 128)};
+        for (int y = 0; y < 128; ++y)
+            for (int x = 0; x < 128; ++x) {
+                const glm::dvec3 rgb = rgb_of(30, {x < at ? 2.0 : -2.0, 0});
+                for (int k = 0; k < 3; ++k) image.at(x, y, k) = static_cast<float>(rgb[k]);
+            }
+        return image;
+    };
+    EXPECT_GT(require(judge_modern(seam(64), seam(67), {}))->max_ratio, 2);
+    EXPECT_EQ(require(judge_modern(seam(64), seam(64), {}))->max_ratio, 0);
 }
 
 TEST(JudgeModern, SeesSoManyTimesAsMuchAsThePerson) {
@@ -449,7 +563,11 @@ TEST(JudgeModern, RefusesBadInput) {
     EXPECT_FALSE(judge_modern(flat(0, 0, 1), flat(0, 0, 1), {}));
     Image colour = flat(8, 8, 1);
     colour.channels = 3;
-    EXPECT_FALSE(judge_modern(colour, colour, {}));
+    EXPECT_FALSE(judge_modern(colour, colour, {})); // a third of the numbers
+    colour.values = std::vector<float>(3 * 64, 1.0f);
+    EXPECT_TRUE(judge_modern(colour, colour, {}));
+    colour.values[35] = -20; // its luminance is below 0
+    EXPECT_FALSE(judge_modern(good, colour, {}));
     JudgeOptions options;
     options.beta = std::numeric_limits<double>::quiet_NaN();
     EXPECT_FALSE(judge_modern(good, good, options));

@@ -176,11 +176,12 @@ const ChromaticConstants& chromatic_constants(CsfModel model) {
     return model == CsfModel::castle_red_green ? red_green_constants : yellow_violet_constants;
 }
 
+// Below its frequency the branch is flat, which is the band shape cut off at its very top.
+BandShape shape_of(const ChromaticConstants& k) { return {k.log2_bandwidth, 0, k.area0, k.frequency0}; }
+
 double foveal_sensitivity(const ChromaticConstants& k, double freq_cpd, double lum, double omega_hz, double area_deg2) {
     const double response = std::exp(-std::pow(omega_hz, k.temporal_exponent) / k.temporal_scale);
-    // Below its frequency the branch is flat, which is the band shape cut off at its very top.
-    const BandShape shape{k.log2_bandwidth, 0, k.area0, k.frequency0};
-    return response * evaluate(k.peak, lum) * channel(shape, freq_cpd, k.frequency, area_deg2);
+    return response * evaluate(k.peak, lum) * channel(shape_of(k), freq_cpd, k.frequency, area_deg2);
 }
 
 // The two decays of a model.
@@ -198,8 +199,9 @@ bool is_castle_family(CsfModel model) {
     return model == CsfModel::castle || model == CsfModel::stela || is_chromatic(model);
 }
 
-SquareDegrees castle_summation_area(CyclesPerDegree frequency) {
-    return SquareDegrees(summation_area(castle_constants.sustained, frequency.value()));
+SquareDegrees castle_summation_area(CyclesPerDegree frequency, CsfModel model) {
+    const BandShape shape = is_chromatic(model) ? shape_of(chromatic_constants(model)) : castle_constants.sustained;
+    return SquareDegrees(summation_area(shape, frequency.value()));
 }
 
 double castle_family_at_fovea(CsfModel model, const Stimulus& s) {

@@ -170,7 +170,7 @@ double summation_area(const BandConditions& c, double freq_cpd) {
     switch (c.model) {
     case CsfModel::barten_1999: return barten_summation_area({}, frequency).value();
     case CsfModel::barten_fitted: return barten_summation_area(fitted_barten, frequency).value();
-    default: return castle_summation_area(frequency).value();
+    default: return castle_summation_area(frequency, c.model).value();
     }
 }
 
@@ -353,15 +353,15 @@ double contrast_floor(const Display& display) { return std::max(black_level(disp
 
 float most_thresholds(double beta) { return std::min(1e8f, std::exp2(120 / static_cast<float>(beta))); }
 
-BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Plane& eccentricities) {
-    const auto [darkest, brightest] = std::minmax_element(reference.values.begin(), reference.values.end());
+BandConditions conditions_for(const Plane& luminance, const JudgeOptions& options, const Plane& eccentricities) {
+    const auto [darkest, brightest] = std::minmax_element(luminance.values.begin(), luminance.values.end());
     Range eccentricity;
     if (!eccentricities.values.empty()) {
         const auto [nearest, farthest] =
             std::minmax_element(eccentricities.values.begin(), eccentricities.values.end());
         eccentricity = {*nearest, *farthest};
     }
-    return conditions_for(reference.width, reference.height, {*darkest, *brightest}, eccentricity, options);
+    return conditions_for(luminance.width, luminance.height, {*darkest, *brightest}, eccentricity, options);
 }
 
 BandConditions conditions_for(int width, int height, Range luminance, Range eccentricity, const JudgeOptions& options) {

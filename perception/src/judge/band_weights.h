@@ -38,7 +38,7 @@ struct BandConditions {
     Range eccentricity; // of its pixels, degrees
     int base_level = 0;
 };
-BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Plane& eccentricities);
+BandConditions conditions_for(const Plane& luminance, const JudgeOptions& options, const Plane& eccentricities);
 BandConditions conditions_for(int width, int height, Range luminance, Range eccentricity, const JudgeOptions& options);
 // What the screen cannot show cannot be a reference luminance either.
 double contrast_floor(const Display& display);

@@ -2,8 +2,12 @@
 // sensitivity to unlimited gratings (judge/band_weights.h) and masked by the reference. How much there is of one
 // decides how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of
 // area (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The
-// bands are pooled.
+// squares of the channels (luminance, and where colours differ red-green and yellow-violet) are added; the bands are
+// pooled.
 #include <limits>
+#include <mutex>
+
+#include <unseen/perception/internal/chroma.h>
 
 #include "judge/band_weights.h"
 #include "judge/judge_input.h"
@@ -96,30 +100,65 @@ Plane smooth(const Plane& in) {
     return out;
 }
 
+// ---- channels -------------------------------------------------------------------------------------------------------
+
+enum class Channel : std::size_t { luminance, red_green, yellow_violet };
+constexpr std::array chromatic = {Channel::red_green, Channel::yellow_violet};
+
+// A pixel's three channels: luminance, and chroma in units of it (opponent_chroma()).
+glm::dvec3 channels_at(const Image& image, std::size_t pixel) {
+    if (image.channels == 1) return {image.values[pixel], 0, 0};
+    const float* const at = image.values.data() + 3 * pixel;
+    const glm::dvec3 rgb(at[0], at[1], at[2]);
+    const double luminance = rec709_luminance(rgb);
+    const glm::dvec2 chroma = opponent_chroma(rgb);
+    return {luminance, chroma};
+}
+
+Plane plane_of(const Image& image, Channel channel) {
+    Plane plane(image.width, image.height);
+    if (channel == Channel::luminance && image.channels == 1) {
+        plane.values = image.values;
+        return plane;
+    }
+    for (std::size_t i = 0; i < plane.values.size(); ++i)
+        plane.values[i] = static_cast<float>(channels_at(image, i)[static_cast<int>(channel)]);
+    return plane;
+}
+
 // ---- bands ----------------------------------------------------------------------------------------------------------
 
-// One band of the reference, at its own resolution.
+// One band of a channel of the reference, at its own resolution.
 struct ReferenceBand {
     int level = 0;
     bool is_base = false;
     Plane luminance; // cd/m2, floored
-    Plane contrast;
+    Plane contrast;  // over the luminance
 };
 
-// Leaves the next level in `reference`.
-ReferenceBand split_reference(Plane& reference, int level, bool is_base, float floor_cdm2) {
+// Splits what is finer than the next level from a plane, and leaves that level in it.
+struct Split {
+    Plane coarse, fine;
+};
+Split split(Plane& plane) {
+    Plane next = reduce(plane);
+    Split parts{expand(next, plane.width, plane.height), std::move(plane)};
+    for (std::size_t i = 0; i < parts.fine.values.size(); ++i) parts.fine.values[i] -= parts.coarse.values[i];
+    plane = std::move(next);
+    return parts;
+}
+
+// Leaves the next level in `luminance`, and in `chroma` where that is not empty: then the contrast is of that.
+ReferenceBand split_reference(Plane& luminance, Plane& chroma, int level, bool is_base, float floor_cdm2) {
     ReferenceBand band;
     band.level = level, band.is_base = is_base;
     if (is_base) { // what the pyramid did not split; a base does not mask itself
-        band.luminance = std::move(reference);
+        band.luminance = std::move(luminance);
         band.contrast = Plane(band.luminance.width, band.luminance.height);
     } else {
-        Plane next = reduce(reference);
-        band.luminance = expand(next, reference.width, reference.height);
-        band.contrast = std::move(reference);
-        for (std::size_t i = 0; i < band.luminance.values.size(); ++i)
-            band.contrast.values[i] -= band.luminance.values[i];
-        reference = std::move(next);
+        Split parts = split(luminance);
+        band.luminance = std::move(parts.coarse);
+        band.contrast = chroma.values.empty() ? std::move(parts.fine) : split(chroma).fine;
     }
     for (std::size_t i = 0; i < band.luminance.values.size(); ++i) {
         float& luminance = band.luminance.values[i];
@@ -135,14 +174,18 @@ struct RowSight {
     std::vector<float> elevation; // of thresholds, by the reference
 };
 
-// The reference, band by band.
+// A channel of the reference, band by band.
 class Reference {
 public:
-    Reference(const Image& image, const JudgeOptions& options)
+    Reference(const Image& image, const JudgeOptions& options, Channel channel = Channel::luminance)
         : eccentricities_(eccentricities(image.width, image.height, options)),
-          conditions_(conditions_for(image, options, eccentricities_)),
-          floor_cdm2_(static_cast<float>(contrast_floor(options.display))), rest_(image.width, image.height) {
-        rest_.values = image.values;
+          floor_cdm2_(static_cast<float>(contrast_floor(options.display))), rest_(plane_of(image, Channel::luminance)) {
+        conditions_ = conditions_for(rest_, options, eccentricities_);
+        if (channel == Channel::luminance) return;
+        rest_of_chroma_ = plane_of(image, channel);
+        conditions_.model = channel == Channel::red_green ? CsfModel::castle_red_green : CsfModel::castle_yellow_violet;
+        if (options.csf_table) conditions_.gain = default_person.gain; // a viewer's table is of luminance alone
+        conditions_.table = nullptr;
     }
 
     const BandConditions& conditions() const { return conditions_; }
@@ -151,7 +194,7 @@ public:
     template <class Use>
     void for_each_band(Use use) {
         for (int level = 0; level <= conditions_.base_level; ++level)
-            use(split_reference(rest_, level, level == conditions_.base_level, floor_cdm2_));
+            use(split_reference(rest_, rest_of_chroma_, level, level == conditions_.base_level, floor_cdm2_));
     }
 
     // `use(y, sight)` for each row of a band.
@@ -185,7 +228,7 @@ private:
     Plane eccentricities_;
     BandConditions conditions_;
     float floor_cdm2_;
-    Plane rest_; // what is not split into bands yet
+    Plane rest_, rest_of_chroma_; // what is not split into bands yet; no chroma in the channel of luminance
 };
 
 // What the reference makes of one band of differences.
@@ -236,48 +279,105 @@ void take_root(std::vector<float>& powers, float beta) {
 } // namespace
 
 struct Judge::State {
+    using Bands = std::vector<Band>; // from fine to coarse
+
     Image reference;
     JudgeOptions options;
-    std::vector<Band> bands; // from fine to coarse
+    Bands of_luminance;
+
+    // By channel; made for the first picture whose colours differ.
+    const std::array<Bands, chromatic.size()>& of_chroma() const {
+        std::call_once(chroma_is_asked_for_, [&] {
+            for (std::size_t i = 0; i < chromatic.size(); ++i) of_chroma_[i] = prepare(chromatic[i]);
+        });
+        return of_chroma_;
+    }
+    Bands prepare(Channel channel) const {
+        Bands bands;
+        Reference by_band(reference, options, channel);
+        by_band.for_each_band([&](const ReferenceBand& band) { bands.push_back(prepare_band(by_band, band)); });
+        return bands;
+    }
+
+private:
+    mutable std::once_flag chroma_is_asked_for_;
+    mutable std::array<Bands, chromatic.size()> of_chroma_;
 };
 
-Judge::Judge(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+namespace {
 
-Result<Judge> Judge::create(Image reference, const JudgeOptions& options) {
-    if (auto ok = check(options); !ok) return ok.error();
-    if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
-    auto state = std::make_shared<State>();
-    Reference bands(reference, options);
-    bands.for_each_band([&](const ReferenceBand& band) { state->bands.push_back(prepare_band(bands, band)); });
-    state->reference = std::move(reference);
-    state->options = options;
-    return Judge(std::move(state));
-}
+// Differences of a channel, band by band.
+struct Differences {
+    const std::vector<Band>* bands;
+    Plane rest; // what is not split yet
 
-Result<Judgement> Judge::judge(const Image& test) const {
-    const Image& reference = state_->reference;
-    if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
-    const auto beta = static_cast<float>(state_->options.beta);
-    const float most = most_thresholds(state_->options.beta);
-    Plane difference(reference.width, reference.height), sum(reference.width, reference.height);
-    for (std::size_t i = 0; i < difference.values.size(); ++i)
-        difference.values[i] = test.values[i] - reference.values[i];
-    for (const Band& band : state_->bands) {
-        Plane here = std::move(difference);
-        if (!band.is_base) {
-            difference = reduce(here);
-            const Plane back = expand(difference, here.width, here.height);
-            for (std::size_t i = 0; i < back.values.size(); ++i) here.values[i] -= back.values[i];
-        }
+    // Squares of the differences in thresholds, summed over the window. Leaves the next level in `rest`.
+    Plane energies(const Band& band, float most) {
+        Plane here = band.is_base ? std::move(rest) : split(rest).fine;
         const Plane smoothed = smooth(here);
         for (std::size_t i = 0; i < here.values.size(); ++i) {
             const float thresholds = std::min(
                 std::abs(band.own.values[i] * here.values[i] + band.smoothed.values[i] * smoothed.values[i]), most);
             here.values[i] = 2 * thresholds * thresholds;
         }
-        Plane powers = band.window.sums(here);
+        return band.window.sums(here);
+    }
+};
+
+// Test less reference, by channel; of chroma only where some colour differs by more than the rounding of greys.
+std::vector<Plane> differences_of(const Image& reference, const Image& test) {
+    constexpr double rounding = 1e-6; // of the luminance: a thousandth of what can be seen
+    std::vector<Plane> all{Plane(reference.width, reference.height)};
+    std::vector<float>& luminance = all.front().values;
+    if (reference.channels == 1 && test.channels == 1) {
+        for (std::size_t i = 0; i < luminance.size(); ++i) luminance[i] = test.values[i] - reference.values[i];
+        return all;
+    }
+    all.resize(1 + chromatic.size(), all.front());
+    bool is_coloured = false;
+    for (std::size_t i = 0; i < all.front().values.size(); ++i) {
+        const glm::dvec3 was = channels_at(reference, i), is = channels_at(test, i), by = is - was;
+        for (int k = 0; k < 3; ++k) all[static_cast<std::size_t>(k)].values[i] = static_cast<float>(by[k]);
+        is_coloured |= std::max(std::abs(by[1]), std::abs(by[2])) > rounding * std::max(was[0], is[0]);
+    }
+    if (!is_coloured) all.resize(1);
+    return all;
+}
+
+} // namespace
+
+Judge::Judge(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+
+Result<Judge> Judge::create(Image reference, const JudgeOptions& options) {
+    if (auto ok = check(options); !ok) return ok.error();
+    if (auto ok = check_light("judge", reference, "reference"); !ok) return ok.error();
+    auto state = std::make_shared<State>();
+    state->reference = std::move(reference);
+    state->options = options;
+    state->of_luminance = state->prepare(Channel::luminance);
+    return Judge(std::move(state));
+}
+
+Result<Judgement> Judge::judge(const Image& test) const {
+    const Image& reference = state_->reference;
+    if (auto ok = check_light_pair("judge", reference, test); !ok) return ok.error();
+    const auto beta = static_cast<float>(state_->options.beta);
+    const float most = most_thresholds(state_->options.beta);
+    std::vector<Differences> channels;
+    for (Plane& difference : differences_of(reference, test)) {
+        const std::size_t before = channels.size();
+        channels.push_back(
+            {before == 0 ? &state_->of_luminance : &state_->of_chroma()[before - 1], std::move(difference)});
+    }
+    Plane sum(reference.width, reference.height);
+    for (std::size_t k = 0; k < state_->of_luminance.size(); ++k) {
+        Plane powers = channels.front().energies((*channels.front().bands)[k], most);
+        for (std::size_t c = 1; c < channels.size(); ++c) {
+            const Plane more = channels[c].energies((*channels[c].bands)[k], most);
+            for (std::size_t i = 0; i < powers.values.size(); ++i) powers.values[i] += more.values[i];
+        }
         raise(powers.values, beta);
-        spread(powers, band.level, sum, [](float& to, float from) { to += from; });
+        spread(powers, state_->of_luminance[k].level, sum, [](float& to, float from) { to += from; });
     }
 
     take_root(sum.values, beta);
@@ -287,6 +387,7 @@ Result<Judgement> Judge::judge(const Image& test) const {
         std::count_if(sum.values.begin(), sum.values.end(), [](float v) { return !(v < 1); }));
     judgement.max_ratio = static_cast<double>(*std::max_element(sum.values.begin(), sum.values.end()));
     judgement.visibility = {reference.width, reference.height, 1, std::move(sum.values)};
+    judgement.judges_colour = channels.size() > 1;
     return judgement;
 }
 
@@ -304,7 +405,7 @@ JudgeOptions second_judge_options(const Person& person, const Display& display,
 
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
-    if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
+    if (auto ok = check_light("judge", reference, "reference"); !ok) return ok.error();
     Plane threshold(reference.width, reference.height);
     std::fill(threshold.values.begin(), threshold.values.end(), std::numeric_limits<float>::max());
     Reference bands(reference, options);

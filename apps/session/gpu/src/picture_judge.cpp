@@ -24,7 +24,7 @@ Result<PictureJudge> PictureJudge::create(std::shared_ptr<SceneRenderer> rendere
     const auto frame = made.renderer_->draw(drawn_cuts(whole), view, made.drawing());
     if (!frame) return frame.error();
     const Observer& observer = session.observer();
-    made.full_ = luminance_image(*frame, observer.display);
+    made.full_ = light_image(*frame, observer.display);
     made.full_codes_ = code_image(*frame, observer.display);
     std::optional<glm::dvec2> gaze;
     if (observer.gaze) gaze = observer.gaze->px;
@@ -49,12 +49,12 @@ Result<PictureVerdict> PictureJudge::judge(std::span<const vdtree::Cut> cuts) {
 
 Result<PictureVerdict> PictureJudge::judge(const render::Frame& frame) const {
     const perception::Display& display = session_.observer().display;
-    const perception::Image luminance = luminance_image(frame, display);
+    const perception::Image light = light_image(frame, display);
     auto other = std::async(std::launch::async, [&] {
-        auto judgement = second_->judge(luminance);
+        auto judgement = second_->judge(light);
         return std::pair(std::move(judgement), perception::ssim(full_codes_, code_image(frame, display)));
     });
-    const auto verdict = judge_->judge(luminance);
+    const auto verdict = judge_->judge(light);
     const auto [second, similarity] = other.get();
     if (!verdict) return verdict.error();
     if (!second) return second.error();

@@ -138,13 +138,29 @@ perception::Image code_image(const render::Frame& frame, const perception::Displ
     return image;
 }
 
-perception::Image luminance_image(const render::Frame& frame, const perception::Display& display) {
-    perception::Image image{frame.width, frame.height, 1, {}};
-    image.values.reserve(frame.luminance.size());
-    for (const float relative : frame.luminance)
+namespace {
+
+perception::Image on_display(int width, int height, int channels, std::span<const float> relative,
+                             const perception::Display& display) {
+    perception::Image image{width, height, channels, {}};
+    image.values.reserve(relative.size());
+    for (const float value : relative)
         image.values.push_back(
-            static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
+            static_cast<float>(perception::to_luminance(display, static_cast<double>(value)).value()));
     return image;
+}
+
+} // namespace
+
+perception::Image luminance_image(const render::Frame& frame, const perception::Display& display) {
+    return on_display(frame.width, frame.height, 1, frame.luminance, display);
+}
+
+perception::Image light_image(const render::Frame& frame, const perception::Display& display) {
+    const std::vector<float>& rgb = frame.colour;
+    bool is_grey = true;
+    for (std::size_t i = 0; i < rgb.size(); i += 3) is_grey &= rgb[i] == rgb[i + 1] && rgb[i] == rgb[i + 2];
+    return is_grey ? luminance_image(frame, display) : on_display(frame.width, frame.height, 3, rgb, display);
 }
 
 } // namespace unseen::session

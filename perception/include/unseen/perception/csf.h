@@ -67,7 +67,8 @@ double sensitivity(CsfModel model, const Stimulus& stimulus);
 SquareDegrees patch_area(CyclesPerDegree frequency);
 
 // The law of area: a patch of area A is seen sqrt(A / (A + Ac)) times as well as an unlimited one, with this Ac.
-SquareDegrees castle_summation_area(CyclesPerDegree frequency);
+// `model`: one of castleCSF's branches of colour has its own; all others get that of luminance.
+SquareDegrees castle_summation_area(CyclesPerDegree frequency, CsfModel model = CsfModel::castle);
 
 // What Barten's model leaves open; by default the values that he gives for a usual observer.
 struct BartenConstants {

@@ -1,4 +1,4 @@
-// Luminance images and their files.
+// Images of luminance or light, and their files.
 #pragma once
 
 #include <cstdint>
@@ -60,5 +60,7 @@ Result<void> write_image(const std::filesystem::path& file, const Image& image);
 // Luminance in cd/m2 as the display shows it: PNG codes are decoded, weighted (Rec. 709) and mapped; absolute
 // files are weighted only.
 Image to_luminance(const ImageFile& file, const Display& display);
+// The same as linear RGB in cd/m2; one channel of luminance where all pixels are grey.
+Image to_light(const ImageFile& file, const Display& display);
 
 } // namespace unseen::perception

@@ -23,34 +23,37 @@ struct Judgement {
     Image visibility; // V by pixel: visible at 1 and above
     std::uint64_t visible_pixels = 0;
     std::uint64_t pixels = 0;
-    double max_ratio = 0; // the largest V
+    double max_ratio = 0;       // the largest V
+    bool judges_colour = false; // colours differ somewhere: the channels of colour were judged, too
 };
 
-// The modern judge. Images are luminance in cd/m2. Its steps:
+// The modern judge. Images are luminance in cd/m2, or linear RGB (Rec. 709) of which white (L, L, L) is L cd/m2. Its steps:
 // - a decimated Laplacian pyramid with its base band;
 // - Weber contrast of the difference against the reference's local luminance;
 // - sensitivity by pixel and band, from luminance and eccentricity; Daly masking by the reference alone;
 // - in each band, energy (squares of contrasts in thresholds) is summed over a window whose shape follows the law of
 //   area of the CSF: many small differences side by side are seen better than one;
+// - where colours differ, the same in the directions red-green and yellow-violet (opponent contrasts over the
+//   luminance, castleCSF's branches of colour, masking by the reference in the same direction); energies are added;
 // - a Minkowski sum over the bands.
 //
 // A Gabor patch of any area reaches V = 1 within 3 dB of contrast 1 / (gain S), between 0.5 cpd and the display's
 // limit. V of a pixel depends on its surroundings, up to a degree and more at low frequencies.
 class Judge {
 public:
-    // Prepares the reference: some 50 ns and 15 bytes a pixel. Fails on NaN, infinite or negative luminance, and on
-    // invalid options: a display that validate() refuses, a gaze that is not finite, a chromatic CSF, a gain outside of
+    // Prepares the reference: some 50 ns and 15 bytes a pixel, and twice that again for the first picture of other colours.
+    // Fails on NaN, infinite or negative luminance, and on invalid options: a display that validate() refuses, a gaze that is not finite, a chromatic CSF, a gain outside of
     // its range, a beta outside of 1 to 8.
     static Result<Judge> create(Image reference, const JudgeOptions& options);
 
-    // Judges a picture of the reference's size. Cost: some 40 ns a pixel. Fails on another size, and on NaN, infinite
-    // or negative luminance. Threads may judge at the same time.
+    // Judges a picture of the reference's size, grey or coloured. Cost: some 40 ns a pixel, three times that where colours
+    // differ. Fails on another size, and on NaN, infinite or negative luminance. Threads may judge at the same time.
     Result<Judgement> judge(const Image& test) const;
 
 private:
     struct State;
     explicit Judge(std::shared_ptr<const State> state);
-    std::shared_ptr<const State> state_; // never changes
+    std::shared_ptr<const State> state_; // shows no change
 };
 
 // create() and judge() in one call.

@@ -27,7 +27,7 @@ public:
     Result<PictureVerdict> judge(std::span<const vdtree::Cut> cuts);
     Result<PictureVerdict> judge(const render::Frame& frame) const;
 
-    const perception::Image& full() const { return full_; }             // luminance, cd/m2
+    const perception::Image& full() const { return full_; }             // see light_image()
     const perception::Image& full_codes() const { return full_codes_; } // code values
     SceneRenderer& renderer() { return *renderer_; }
     render::DrawOptions drawing() const; // what judged pictures are drawn with

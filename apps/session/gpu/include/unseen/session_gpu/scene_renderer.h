@@ -55,8 +55,11 @@ private:
     std::shared_ptr<Impl> impl_;
 };
 
-// A frame's colours as code values for the display, and its luminance on the display in cd/m2.
+// A frame's colours as code values for the display.
 perception::Image code_image(const render::Frame& frame, const perception::Display& display);
+// What the display makes of a frame, in cd/m2: its luminance; and the light that judges see, which is linear RGB unless
+// all of the frame is grey.
 perception::Image luminance_image(const render::Frame& frame, const perception::Display& display);
+perception::Image light_image(const render::Frame& frame, const perception::Display& display);
 
 } // namespace unseen::session
