@@ -31,7 +31,8 @@ BenchReport bench_engine(const EngineOptions& options);
 
 // What fold tests save, and whether anything of it can be seen; against what was promised. Inputs: the meshes and the
 // others; if there are no meshes, installed ones.
-inline constexpr std::array perception_groups = {"savings", "aside", "random", "far", "hard", "tolerance", "checked"};
+inline constexpr std::array perception_groups = {"savings", "aside",     "random",  "far",
+                                                 "hard",    "tolerance", "checked", "foliage"};
 struct PerceptionOptions : BenchOptions {
     std::vector<std::string> meshes = {}; // of all groups
     std::vector<std::string> others = {}; // in the random views and far away, too

@@ -123,7 +123,8 @@ void add_perception_options(CLI::App& verb, PerceptionOptions& o) {
         ->type_name("MESH");
     verb.add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
     const std::vector<std::string> groups(perception_groups.begin(), perception_groups.end());
-    add_value(verb, "--only", o.only, one_of(groups), "LIST", "Groups: " + listed(groups) + " (default: all)")
+    add_value(verb, "--only", o.only, one_of(groups), "LIST",
+              "Groups: " + listed(groups) + " (default: all but foliage: name its meshes)")
         ->delimiter(',')
         ->allow_extra_args(false);
     add_window_option(verb, o.window_px, "Its side; promises are about 1024 (default)");
