@@ -16,7 +16,6 @@ constexpr OptionName option_names[] = {
     {"scene.background = ", "--background "},
     {"observer.csf = ", "--csf "},
     {"request.fold_test", "--fold-test"},
-    {"request.chroma", "--chroma"},
     {"request.keeps_shadows", "--shadows"},
     {"request.masking", "--masking scene"},
     {"request.shown", "--visibility picture"},

@@ -374,7 +374,6 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
               "The best cut that T milliseconds are enough for");
     add_value(group, "--pixels", goal.tolerance_px, positive(), "E", "Fold what is smaller than E pixels, seen or not");
     add_fold_test_option(group, o.request.fold_test);
-    group.add_flag("--chroma", o.request.chroma, "Also keep changes of colour that can be seen, not only of luminance");
     add_gaze_option(group, o.gaze_px);
     add_velocity_option(group, o.velocity_deg_s);
     // Spellings that came before.
@@ -394,7 +393,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) 
         rules.end(),
         {{"--full", Rule::excludes, {"--imperceptible", "--quality", "--triangles", "--ratio", "--pixels"}, one},
          {"--quality", Rule::excludes, {"--imperceptible", "--triangles", "--ratio", "--pixels"}, one},
-         {"--full", Rule::excludes, {"--milliseconds", "--fold-test", "--chroma"}, "nothing is folded"},
+         {"--full", Rule::excludes, {"--milliseconds", "--fold-test"}, "nothing is folded"},
          {"--imperceptible", Rule::excludes, {"--triangles", "--ratio", "--pixels"}, one},
          {"--triangles", Rule::excludes, {"--ratio", "--pixels"}, one},
          {"--ratio", Rule::excludes, {"--pixels"}, one},

@@ -176,18 +176,12 @@ Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& r
 }
 
 Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&& tree) {
-    if (!perception::knows_texture(tree)) {
-        print_note(a.mesh +
-                   " has a texture over vertices of several hues, and what folds change of it is not measured: "
-                   "the fold test is then luebke-hallen-safe (--texture none leaves it out).");
-        return std::move(tree);
-    }
     ProgressBar bar("measuring what folds change");
     return session::measured(tree, a.threads, std::ref(bar));
 }
 
 Result<vdtree::VertexTree> measure_under_lights(const BuildArguments& a, const vdtree::VertexTree& tree) {
-    if (!perception::knows_texture(tree))
+    if (!perception::knows_lit_texture(tree))
         return Error{ErrorCode::unsupported,
                      a.mesh +
                          " has a texture over vertices of several hues, and what folds change of it under lights is "

@@ -236,7 +236,7 @@ std::vector<Rule> level_rules() {
     const std::string why = "only --method perceptual draws layers and maps";
     return {{"--method selection", Rule::needs_one_of, {"--selection"}, "make one with 'unseen levels precompute'"},
             {"--selection", Rule::excludes, {"--method perceptual", "--method distance", "--method area"}},
-            {"--selection", Rule::excludes, {"--levels", "--fold-test", "--chroma"}, "the levels are the file's"},
+            {"--selection", Rule::excludes, {"--levels", "--fold-test"}, "the levels are the file's"},
             {"--triangles", Rule::needs_one_of, {"--selection"}, "--bias gives other methods more or fewer triangles"},
             {"--bias", Rule::needs_one_of, {"--method distance", "--method area"}},
             {"--maps", Rule::excludes, others, why},
@@ -281,7 +281,6 @@ Command levels_command(CLI::App& app, Setup& setup) {
     add_verbose_option(*verb, o.is_verbose);
     add_methods(*verb, o);
     add_fold_test_option(*verb, o.what.request.fold_test, true);
-    verb->add_flag("--chroma", o.what.request.chroma, "Levels also keep changes of colour that can be seen");
     add_gaze_option(*verb, o.what.gaze_px);
     add_velocity_option(*verb, o.what.velocity_deg_s);
     setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);

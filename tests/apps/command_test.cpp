@@ -92,9 +92,6 @@ TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
         {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "extent"},
         {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "guess"},
         {"simplify", "ball.obj", "-o", "out.ply", "--gaze", "1"},
-        {"simplify", "ball.obj", "-o", "out.ply", "--full", "--chroma"},
-        {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "error", "--chroma"},
-        {"simplify", "ball.obj", "-o", "out.ply", "--pixels", "2", "--chroma"},
         {"compare", "a.png"},
         {"compare", "a.png", "b.png", "--model", "rpg99", "--gaze", "1", "1"},
         {"make"},
@@ -554,7 +551,6 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
         return effect_named(report, "fold test")["why"].get<std::string>();
     };
     EXPECT_THAT(fold_test(simplify({})), StartsWith("error"));
-    EXPECT_THAT(fold_test(simplify({"--chroma"})), StartsWith("error")); // the mesh is grey
     write_text(path("lights.json"),
                R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
     EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})),
@@ -590,15 +586,19 @@ protected:
     }
 };
 
-TEST_F(PaintedBallTest, ChromaKeepsWhatLuminanceFolds) {
-    EXPECT_EQ(effect_named(simplify({"--chroma"}), "chroma")["on"], false); // of the ball as it was
+TEST_F(PaintedBallTest, ColourKeepsWhatLuminanceFolds) {
+    const std::vector<std::string> tests = {"error", "luebke-hallen", "luebke-hallen-safe"};
+    std::vector<int> grey; // the ball as it was
+    for (const std::string& test : tests) {
+        const Json report = simplify({"--fold-test", test});
+        EXPECT_EQ(effect_named(report, "colour")["on"], false);
+        grey.push_back(report["triangles"]);
+    }
     paint(1);
-    const Json grey = simplify({"--fold-test", "luebke-hallen"});
-    EXPECT_EQ(effect_named(grey, "chroma")["on"], false);
-    for (const std::string test : {"luebke-hallen", "luebke-hallen-safe"}) {
-        const Json coloured = simplify({"--fold-test", test, "--chroma"});
-        EXPECT_EQ(effect_named(coloured, "chroma")["on"], true);
-        EXPECT_GT(coloured["triangles"].get<int>(), grey["triangles"].get<int>() * 5 / 4);
+    for (std::size_t i = 0; i < tests.size(); ++i) {
+        const Json report = simplify({"--fold-test", tests[i]});
+        EXPECT_EQ(effect_named(report, "colour")["on"], true);
+        EXPECT_GT(report["triangles"].get<int>(), grey[i] * 5 / 4);
     }
 }
 

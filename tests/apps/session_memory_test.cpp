@@ -45,15 +45,14 @@ int change(Question& q, int number) {
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 
-    auto& [goal, fold_test, chroma, milliseconds, hysteresis, purpose, order, shown, masking, keeps_shadows,
-           may_measure, reasons] = q.request;
+    auto& [goal, fold_test, milliseconds, hysteresis, purpose, order, shown, masking, keeps_shadows, may_measure,
+           reasons] = q.request;
     set(goal, Goal::full());
     set(goal, Goal::budget(400));
     set(goal, Goal::budget(400, true));
     set(goal, Goal::pixels(2));
     set(goal, Goal::quality(session::Quality::good));
     for (const session::FoldTestFacts& facts : session::fold_tests()) set(fold_test, facts.test);
-    set(chroma, true);
     set(milliseconds, 1e6);
     set(goal, Goal::up_to(3));
     set(hysteresis, 2.0f);

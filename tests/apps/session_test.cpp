@@ -46,7 +46,6 @@ TEST(Request, NamesTheFieldThatIsWrong) {
     EXPECT_THAT(complaint_about({.goal = Goal::pixels(1), .fold_test = FoldTest::error}),
                 HasSubstr("request.fold_test"));
     EXPECT_THAT(complaint_about({.fold_test = FoldTest::extent}), HasSubstr("request.fold_test = extent"));
-    EXPECT_THAT(complaint_about({.fold_test = FoldTest::error, .chroma = true}), HasSubstr("request.chroma"));
     EXPECT_THAT(complaint_about({.milliseconds = nan}), HasSubstr("request.milliseconds"));
     EXPECT_THAT(complaint_about({.goal = Goal::up_to(nan)}), HasSubstr("request.goal.cost"));
     EXPECT_THAT(complaint_about({.goal = {.summed_cost = -1}}), HasSubstr("request.goal.cost"));
@@ -99,13 +98,6 @@ TEST(Session, RefusesObjectsThatAreNotThere) {
     EXPECT_THAT(error_in(session.plan(view, {}, 2)), HasSubstr("There is no object 2: the scene has 2"));
     EXPECT_FALSE(session.recipe(view, {}, 2));
     EXPECT_DEATH(session.tree(2), "There is no object 2");
-}
-
-TEST(Session, ChromaAsksNothingOfWhatIsGrey) {
-    auto session = *Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
-    const auto plain = require(session.simplify()), chroma = require(session.simplify({.chroma = true}));
-    EXPECT_EQ(chroma->fold_tests.front(), FoldTest::error);
-    EXPECT_EQ(chroma->stats.triangles, plain->stats.triangles);
 }
 
 TEST(Session, SharesABudgetAmongItsObjects) {

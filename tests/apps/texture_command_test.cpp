@@ -266,7 +266,6 @@ TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
     write_png("p.png", halves());
     write_square("p.png");
     build("square.obj");
-    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--chroma"}), HasSubstr("--texture none"));
     write_text(path("l.json"), R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.5}]})");
     if (const auto seen = draw("t.vdt", {"--lights", "l.json", "--full"})) {
         EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.6, 1);

@@ -1,11 +1,13 @@
 // Colour as a source of contrast: isoluminant patterns that luminance alone would fold.
 #include <unseen/perception/criterion.h>
+#include <unseen/perception/fold_measurement.h>
 #include <unseen/perception/internal/chroma.h>
 #include <unseen/perception/internal/cut_rings.h>
 
 #include <glm/mat3x3.hpp>
 
 #include <unseen/vdtree/builder.h>
+#include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -67,20 +69,19 @@ View view_from(double eye_distance) {
 // Where a unit is four pixels, a cell is half a degree, and the checkerboard has a cycle a degree.
 constexpr double near = 1968.5 / 4;
 
-struct Test {
-    bool safe, chroma;
-};
+enum class By { error, safe, published };
+constexpr By all_tests[] = {By::error, By::safe, By::published};
 
-Result<DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, Test test, bool gazes = false) {
+Result<DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, By test, bool gazes = false) {
     FoldTestOptions options;
     options.scene = {0.2f, 0.4f};
-    options.chroma = test.chroma;
     if (gazes) options.gaze_px = glm::dvec2(128, 128);
-    return test.safe ? luebke_hallen_safe_distances(tree, *bound_cut_rings(tree), view, options)
-                     : luebke_hallen_distances(tree, view, options);
+    if (test == By::error) return error_distances(*measure_folds(tree), view, options);
+    return test == By::safe ? luebke_hallen_safe_distances(tree, *bound_cut_rings(tree), view, options)
+                            : luebke_hallen_distances(tree, view, options);
 }
 
-Cut cut_of(const VertexTree& tree, double eye_distance, Test test) {
+Cut cut_of(const VertexTree& tree, double eye_distance, By test) {
     const View view = view_from(eye_distance);
     const auto criterion = require(criterion_of(tree, view, test));
     EXPECT_TRUE(criterion->is_monotone());
@@ -124,8 +125,16 @@ TEST(Chroma, IsNoneOfGreysAndThatOfTheConesOtherwise) {
     }
 }
 
+// In greys of the colours' luminances.
+template <class Colour>
+VertexTree grey_checkerboard(Colour&& colour) {
+    return checkerboard(
+        [&](bool is_one) { return glm::vec4(glm::vec3(rec709_luminance(glm::vec3(colour(is_one)))), 1); });
+}
+
 TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
-    const VertexTree tree = red_green_checkerboard(0.2);
+    const VertexTree tree = red_green_checkerboard(0.2),
+                     grey = grey_checkerboard([](bool is_red) { return red_or_green(is_red ? 0.2 : -0.2); });
     // There is next to no contrast of luminance, and the pattern can be seen all the same.
     const vdtree::LuminanceRange range = tree.luminance_range();
     EXPECT_LT(range.hi - range.lo, 1e-4f);
@@ -136,22 +145,23 @@ TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
     const glm::dvec2 chroma = opponent_chroma(glm::dvec3(red_or_green(0.2))) / 0.3;
     EXPECT_GT(support::castle_visibility({0, std::abs(chroma.x), std::abs(chroma.y)}, cycles), 5);
 
-    for (const bool safe : {false, true}) {
+    EXPECT_TRUE(has_colours(tree));
+    EXPECT_FALSE(has_colours(grey));
+    EXPECT_TRUE(ring_chroma(grey)->empty());
+    for (const By test : all_tests) {
         const int whole = 2 * 27 * 27;
-        EXPECT_LT(inner_triangles(cut_of(tree, near, {safe, false})), whole / 20);
-        EXPECT_GT(inner_triangles(cut_of(tree, near, {safe, true})), whole / 2);
+        EXPECT_LT(inner_triangles(cut_of(grey, near, test)), whole / 20);
+        // `error` needs no more than the corners of the cells.
+        EXPECT_GT(inner_triangles(cut_of(tree, near, test)), whole / (test == By::error ? 5 : 2));
     }
 }
 
 // Colours that nobody bounded are not taken for greys.
 TEST(Chroma, IsRefusedOfRingsBoundedWithoutIt) {
     const VertexTree tree = red_green_checkerboard(0.2);
-    FoldTestOptions options;
     const auto rings = require(bound_cut_rings(tree, false));
     EXPECT_TRUE(rings->chroma.empty());
-    EXPECT_TRUE(luebke_hallen_safe_distances(tree, *rings, view_from(near), options));
-    options.chroma = true;
-    EXPECT_FALSE(luebke_hallen_safe_distances(tree, *rings, view_from(near), options));
+    EXPECT_FALSE(luebke_hallen_safe_distances(tree, *rings, view_from(near), {}));
 }
 
 // Rings hold their corners and proxies, and those of the nodes below.
@@ -182,44 +192,16 @@ TEST(Chroma, OfRingsNests) {
 }
 
 TEST(Chroma, LetsGoWhatNobodySees) {
-    const VertexTree tree = red_green_checkerboard(0.002);
+    const VertexTree tree = red_green_checkerboard(0.0005);
     ASSERT_FALSE(ring_chroma(tree)->empty());
-    for (const bool safe : {false, true})
-        EXPECT_LT(inner_triangles(cut_of(tree, near, {safe, true})), 2 * 27 * 27 / 20);
-}
-
-TEST(Chroma, FoldsNothingThatLuminanceKeeps) {
-    const VertexTree tree = checkerboard(
-        [](bool is_one) { return is_one ? glm::vec4(0.5f, 0.3f, 0.3f, 1) : glm::vec4(0.2f, 0.33f, 0.4f, 1); });
-    for (const bool safe : {false, true}) {
-        for (const double distance : {near / 4, near, 4 * near, 20 * near}) {
-            const Cut grey = cut_of(tree, distance, {safe, false}), coloured = cut_of(tree, distance, {safe, true});
-            for (NodeId node = 0; node < tree.interior_count(); ++node)
-                EXPECT_TRUE(coloured.is_wanted(node) || !grey.is_wanted(node));
-        }
-    }
-}
-
-TEST(Chroma, OfGreyMeshesCostsNothing) {
-    const VertexTree tree =
-        checkerboard([](bool is_light) { return glm::vec4(glm::vec3(is_light ? 0.35f : 0.25f), 1); });
-    EXPECT_TRUE(ring_chroma(tree)->empty());
-    for (const bool safe : {false, true}) {
-        for (const bool gazes : {false, true}) {
-            const auto with = require(criterion_of(tree, view_from(near), {safe, true}, gazes)),
-                       without = require(criterion_of(tree, view_from(near), {safe, false}, gazes));
-            EXPECT_EQ(with->parts().switch_distance, without->parts().switch_distance);
-            EXPECT_EQ(with->parts().least_cost, without->parts().least_cost);
-        }
-    }
+    for (const By test : all_tests) EXPECT_LT(inner_triangles(cut_of(tree, near, test)), 2 * 27 * 27 / 20);
 }
 
 TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
     const VertexTree tree = checkerboard(
         [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
-    for (const bool safe : {false, true}) {
-        EXPECT_TRUE(require(criterion_of(tree, view_from(near), {safe, true}, true))->is_monotone());
-    }
+    for (const By test : all_tests)
+        EXPECT_TRUE(require(criterion_of(tree, view_from(near), test, true))->is_monotone());
 }
 
 // Colours are drawn at the luminance that the light gives them, and their chroma is that of what is drawn.

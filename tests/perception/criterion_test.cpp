@@ -352,7 +352,6 @@ std::pair<int, int> survive_random_lies(const VertexTree& tree, std::uint64_t se
             EXPECT_LE(cut.indices().size(), 3 * std::size_t{mapped->triangle_count()});
             ++taken;
         };
-        options.chroma = has_chroma(*mapped) && mapped->texture().empty();
         follow(luebke_hallen_distances(*mapped, view, options));
         if (has_fold_measurement(*mapped)) follow(error_distances(*mapped, view, options));
         const auto rings = bound_cut_rings(*mapped);

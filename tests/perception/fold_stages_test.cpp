@@ -240,7 +240,7 @@ Drawn draw(const VertexTree& tree, std::span<const Triangle> triangles, std::siz
     const StageCamera camera = stage_camera(tree.bounding_sphere(), direction);
     const TexturedLight untextured;
     StageSurfaces surfaces;
-    StagePainter painter(tree, untextured, camera, surfaces);
+    StagePainter painter(tree, {&untextured, 1}, camera, surfaces);
     auto pictures =
         painter.draw<1>(triangles, [&](WedgeId wedge) { return std::array<float, 1>{tree.luminance()[wedge]}; });
     return {static_cast<double>(painter.drawn()) / (stage_samples * stage_samples), std::move(pictures[0])};

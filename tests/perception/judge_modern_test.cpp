@@ -185,9 +185,9 @@ TEST(JudgeModern, SeesIsoluminantGaborsAtTheirThreshold) {
                         EXPECT_TRUE(judged->judges_colour);
                         all.push_back(judged->max_ratio);
                         EXPECT_GT(judged->max_ratio, 1 / three_decibels) << direction << ' ' << freq << ' ' << luminance
-                                                                        << ' ' << radius_cycles << ' ' << eccentricity;
+                                                                         << ' ' << radius_cycles << ' ' << eccentricity;
                         EXPECT_LT(judged->max_ratio, three_decibels) << direction << ' ' << freq << ' ' << luminance
-                                                                    << ' ' << radius_cycles << ' ' << eccentricity;
+                                                                     << ' ' << radius_cycles << ' ' << eccentricity;
                         options.csf = second.csf, options.beta = second.beta;
                         EXPECT_NEAR(require(judge_modern(grey, test, options))->max_ratio / judged->max_ratio, 1, 0.15);
                     }

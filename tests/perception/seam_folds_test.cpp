@@ -261,7 +261,7 @@ std::vector<Contact> contacts_of(const Mesh& mesh) {
     const SoundTree sound = support::sound(tree);
     const Progress nobody;
     MeasuringProgress progress(nobody);
-    return find_contacts(std::span(&sound, 1), progress);
+    return find_contacts(std::span(&sound, 1), false, progress);
 }
 
 TEST(Contacts, AreFoundAroundHubs) {

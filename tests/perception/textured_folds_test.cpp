@@ -2,6 +2,7 @@
 
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/perception/internal/chroma.h>
 #include <unseen/perception/internal/lit_folds.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/tree_io.h>
@@ -156,16 +157,40 @@ TEST(TexturedFolds, CountAsTheirVerticesTintThem) {
     mesh.colours.assign(mesh.positions.size(), glm::vec4(0.4f, 0, 0, 1));
     mesh.colours[7] *= 0.5f; // darker, of the same hue
     mesh.colours[7].a = 1;
-    EXPECT_TRUE(knows_texture(support::built(mesh)));
+    EXPECT_TRUE(knows_lit_texture(support::built(mesh)));
     EXPECT_GT(largest_contrast(measured(mesh)), 0.3f);
     mesh.colours[7] = glm::vec4(0, 0.4f, 0, 1);
     const VertexTree of_two = support::built(mesh);
-    EXPECT_FALSE(knows_texture(of_two));
-    EXPECT_TRUE(knows_texture(*of_two.untextured()));
-    const auto refused = measure_folds(of_two);
+    EXPECT_FALSE(knows_lit_texture(of_two));
+    EXPECT_TRUE(knows_lit_texture(*of_two.untextured()));
+    EXPECT_TRUE(measure_folds(of_two)); // by its primaries
+    const auto refused = LitFolds::measure(of_two);
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message.find("several hues"), std::string::npos) << refused.error().message;
-    EXPECT_FALSE(LitFolds::measure(of_two));
+}
+
+// The same two on white vertices differ in colour alone.
+TEST(TexturedFolds, CountTheirColours) {
+    Texture texture = textures::checkerboard(64, 64, 4, 0, 255), grey = texture;
+    for (Texel& t : texture.texels) t = t[0] > 0 ? Texel{255, 0, 0, 255} : Texel{0, 139, 139, 255};
+    for (Texel& t : grey.texels) t = t[0] > 0 ? Texel{127, 127, 127, 255} : Texel{128, 128, 128, 255};
+    const VertexTree coloured = measured(textures::textured_sphere(3, texture)),
+                     plain = measured(textures::textured_sphere(3, grey));
+    EXPECT_TRUE(has_colours(coloured));
+    EXPECT_FALSE(has_colours(plain)); // a code is less than compression makes of greys
+    EXPECT_GT(largest_contrast(coloured), 5 * largest_contrast(plain));
+    const auto amplitudes = [](const VertexTree& tree) {
+        double sum = 0;
+        for (const FoldRecord& record : tree.attribute<FoldRecord>(record_name))
+            sum += static_cast<double>(record.amplitudes[0][1]);
+        return sum;
+    };
+    EXPECT_GT(amplitudes(coloured), 5 * amplitudes(plain));
+    double of_stages[2] = {};
+    for (const bool is_plain : {false, true})
+        for (const FoldStage& stage : (is_plain ? plain : coloured).attribute<FoldStage>(stages_name))
+            of_stages[is_plain] = std::max(of_stages[is_plain], static_cast<double>(stage.contrast[4][2][0]));
+    EXPECT_GT(of_stages[0], 2 * of_stages[1]);
 }
 
 TEST(StandIns, HaveTheUsualContrast) {

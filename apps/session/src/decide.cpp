@@ -11,15 +11,9 @@
 namespace unseen::session {
 namespace {
 
-bool knows_texture(Sight& sight) {
-    std::optional<bool>& known = sight.cache.knows_texture;
-    if (!known) known = perception::knows_texture(sight.object.tree);
-    return *known;
-}
-
-bool has_chroma(Sight& sight) {
-    std::optional<bool>& known = sight.cache.has_chroma;
-    if (!known) known = perception::has_chroma(sight.object.tree);
+bool knows_lit_texture(Sight& sight) {
+    std::optional<bool>& known = sight.cache.knows_lit_texture;
+    if (!known) known = perception::knows_lit_texture(sight.object.tree);
     return *known;
 }
 
@@ -33,16 +27,16 @@ struct Choice {
     std::string_view why = {};
 };
 
-// Chooses a perceptual test that handles this scene, and its colours if they count.
-Choice suitable_test(Sight& sight, bool chroma, bool may_measure) {
+// Chooses a perceptual test that handles this scene.
+Choice suitable_test(Sight& sight, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
     if (sight.lighting && !sight.lights->stands_still())
         return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
     if (sight.lighting && sight.lighting->specular > 0)
         return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
-    if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
-    if (!knows_texture(sight))
-        return {FoldTest::luebke_hallen_safe, "the test error does not know textures over vertices of several hues"};
+    if (sight.lighting && !knows_lit_texture(sight))
+        return {FoldTest::luebke_hallen_safe,
+                "under lights the test error does not know textures over vertices of several hues"};
     if (sight.lighting && sight.is_crowded)
         return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
     if (sight.lighting && has_lit_errors(sight)) return {};
@@ -54,7 +48,7 @@ Choice suitable_test(Sight& sight, bool chroma, bool may_measure) {
 }
 
 // Whether a test knows what it would have to look at.
-Result<void> check_knowledge(Sight& sight, FoldTest test, bool chroma, bool shown) {
+Result<void> check_knowledge(Sight& sight, FoldTest test, bool shown) {
     if (!is_perceptual(test)) return {};
     if (sight.lighting && test == FoldTest::error && (!sight.lights->stands_still() || sight.lighting->specular > 0))
         return invalid_field(
@@ -63,16 +57,11 @@ Result<void> check_knowledge(Sight& sight, FoldTest test, bool chroma, bool show
             {name_of(test)});
     if (sight.lighting && shown && test != FoldTest::error)
         return invalid_field("{request.shown} and {scene.lights} go together with {request.fold_test = }error alone.");
-    if (sight.lighting && chroma)
-        return invalid_field("{request.chroma} and {scene.lights} exclude each other: ranges of colour are those of "
-                             "the tree's own light.");
-    if (sight.object.tree.texture().empty()) return {};
-    if (chroma)
+    if (sight.lighting && test == FoldTest::error && !knows_lit_texture(sight))
         return invalid_field(
-            "{request.chroma} does not look at the colours of textures: leave it out, or add {load.without_textures}.");
-    if (test == FoldTest::error && !knows_texture(sight))
-        return invalid_field("{request.fold_test = }error does not measure textures over vertices of several hues: use "
-                             "{request.fold_test = }luebke-hallen-safe, or add {load.without_textures}.");
+            "{request.fold_test = }error does not measure textures over vertices of several hues under "
+            "{scene.lights}: use {request.fold_test = }luebke-hallen-safe, or add "
+            "{load.without_textures}.");
     return {};
 }
 
@@ -89,12 +78,11 @@ Result<Decision> decide(Sight& sight, const Request& request, std::size_t object
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
     // The full model needs no measuring, so what is measured already does not decide its test.
-    Choice choice = suitable_test(sight, request.chroma && has_chroma(sight), !folds || request.may_measure);
+    Choice choice = suitable_test(sight, !folds || request.may_measure);
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
-    if (const auto known = check_knowledge(sight, choice.test, request.chroma, !request.shown.empty()); !known)
-        return known.error();
+    if (const auto known = check_knowledge(sight, choice.test, !request.shown.empty()); !known) return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure && !(sight.lighting && has_lit_errors(sight)))
         return invalid_field(

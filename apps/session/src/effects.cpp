@@ -105,8 +105,14 @@ Reason beyond_table(const Cutting& c) {
 }
 
 Reason chroma(const Cutting& c) {
-    if (!c.decision.request.chroma) return {false, Message::of("without {request.chroma} only luminance counts")};
-    if (!perception::has_chroma(c.sight.object.tree)) return {false, "nothing has any colour"};
+    std::optional<bool>& has_colours = c.sight.cache.has_colours;
+    if (!has_colours) has_colours = perception::has_colours(c.sight.object.tree);
+    if (!*has_colours) return {false, "nothing has any colour"};
+    if (c.sight.lighting)
+        return {false, Message::of("under {scene.lights} what folds change is known of luminance alone")};
+    if (c.decision.test == FoldTest::error)
+        return {true, "what folds change of red-green and yellow-violet counts beside luminance"};
+    if (!c.sight.object.tree.texture().empty()) return {false, "the fold test looks at luminance alone in textures"};
     return {true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
 
@@ -268,7 +274,7 @@ constexpr EffectRow effect_rows[] = {
      }},
     {"motion", Needs::perception, only_perceptual_knows, motion},
     {"beyond the csf table", Needs::perception, only_perceptual_looks_up, beyond_table},
-    {"chroma", Needs::perception, only_perceptual_knows, chroma},
+    {"colour", Needs::perception, only_perceptual_knows, chroma},
     {"translucency", Needs::perception, only_perceptual_knows, translucency},
     {"texture", Needs::nothing, "", texture},
     {"pre-lit colours", Needs::nothing, "", prelit},

@@ -16,7 +16,7 @@ bool is_perceptual(const Decision& decision);
 Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision);
 
 // The options of perception's tests, with the observer's own gaze.
-perception::FoldTestOptions test_options(const Sight& sight, const Request& request);
+perception::FoldTestOptions test_options(const Sight& sight);
 
 // What the test compares, as the reason of an effect; see fold_tests.cpp.
 std::string what_it_looks_at(const Sight& sight, FoldTest test);
@@ -62,7 +62,7 @@ struct Key {
     std::optional<double> farthest_gaze_px = {};
     perception::SceneLuminance scene = {0, 0};
     std::shared_ptr<const vdtree::Lighting> still_lights = {}; // of the test by errors
-    bool is_lit = false, chroma = false;
+    bool is_lit = false;
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     vdtree::View lens = {};
     bool operator==(const Key&) const = default;
@@ -86,7 +86,7 @@ struct ShownCriteria {
 Key key_of(const Sight& sight, const Decision& decision);
 
 // The gaze is where the key says: one criterion does for all gazes up to there.
-perception::FoldTestOptions test_options(const Sight& sight, const Decision& decision, const Key& key);
+perception::FoldTestOptions test_options(const Sight& sight, const Key& key);
 
 // See fold_tests.cpp, where each test makes its own.
 Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Decision& decision, const Key& key);

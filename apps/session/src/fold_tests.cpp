@@ -18,16 +18,16 @@ struct Row {
     Criterion (*make)(Sight& sight, const Decision& decision, const Key& key);
 };
 
-Criterion make_luebke_hallen(Sight& sight, const Decision& decision, const Key& key) {
-    const perception::FoldTestOptions options = test_options(sight, decision, key);
+Criterion make_luebke_hallen(Sight& sight, const Decision&, const Key& key) {
+    const perception::FoldTestOptions options = test_options(sight, key);
     return sight.lighting ? perception::lit_distances(sight.object.tree, sight.cache.light_bounds, sight.view, options)
                           : perception::luebke_hallen_distances(sight.object.tree, sight.view, options);
 }
 
-Criterion make_luebke_hallen_safe(Sight& sight, const Decision& decision, const Key& key) {
-    const perception::FoldTestOptions options = test_options(sight, decision, key);
+Criterion make_luebke_hallen_safe(Sight& sight, const Decision&, const Key& key) {
+    const perception::FoldTestOptions options = test_options(sight, key);
     const vdtree::VertexTree& tree = sight.object.tree;
-    const auto rings = cut_rings(sight.object, sight.cache, decision.request.chroma);
+    const auto rings = cut_rings(sight.object, sight.cache);
     if (!rings) return rings.error();
     if (!sight.lighting) return perception::luebke_hallen_safe_distances(tree, **rings, sight.view, options);
     auto bounds = lit_cut_rings(sight.object, sight.cache);
@@ -51,7 +51,7 @@ std::vector<vdtree::Lighting> without_hidden(const vdtree::Lighting& lighting) {
 }
 
 Criterion make_error(Sight& sight, const Decision& decision, const Key& key) {
-    const perception::FoldTestOptions options = test_options(sight, decision, key);
+    const perception::FoldTestOptions options = test_options(sight, key);
     const auto by_errors = [&](const auto& of) {
         return decision.masking ? perception::masked_error_distances(of, sight.object.placement, *decision.masking,
                                                                      sight.view, options)
@@ -167,14 +167,13 @@ Key key_of(const Sight& sight, const Decision& decision) {
     key.scene = sight.luminance;
     key.is_lit = sight.lighting != nullptr;
     if (decision.test == FoldTest::error) key.still_lights = sight.lighting;
-    key.chroma = decision.request.chroma;
     key.csf = sight.csf;
     if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
     return key;
 }
 
-perception::FoldTestOptions test_options(const Sight& sight, const Decision& decision, const Key& key) {
-    perception::FoldTestOptions options = test_options(sight, decision.request);
+perception::FoldTestOptions test_options(const Sight& sight, const Key& key) {
+    perception::FoldTestOptions options = test_options(sight);
     if (key.farthest_gaze_px) options.gaze_px = vdtree::axis_px(sight.view) + glm::dvec2(*key.farthest_gaze_px, 0);
     return options;
 }

@@ -172,7 +172,7 @@ Message kept_in(const TreeCache& cache) {
 
 Result<vdtree::VertexTree> measured_as_asked(vdtree::VertexTree tree, const LoadOptions& options,
                                              const Progress& progress) {
-    if (tree.interior_count() > most_measured || !perception::knows_texture(tree)) return tree;
+    if (tree.interior_count() > most_measured) return tree;
     if (options.measures) return measured(tree, 0, progress);
     return options.conserves_light && tree.texture().empty() ? vdtree::conserve_light(tree) : std::move(tree);
 }

@@ -25,8 +25,8 @@ vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
     const bool window_only = decision.request.purpose == Purpose::picture && !may_cast_anything(sight, decision) &&
                              !is_wholly_in_window(sight);
-    vdtree::Viewpoint viewpoint = perception::viewpoint_of(
-        sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
+    vdtree::Viewpoint viewpoint = perception::viewpoint_of(sight.object.tree, sight.view, test_options(sight),
+                                                           sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
@@ -54,12 +54,11 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
 
 } // namespace
 
-perception::FoldTestOptions test_options(const Sight& sight, const Request& request) {
+perception::FoldTestOptions test_options(const Sight& sight) {
     perception::FoldTestOptions options;
     options.display = sight.observer.display;
     options.scene = sight.luminance;
     options.csf = sight.csf;
-    options.chroma = request.chroma;
     options.gaze_px = sight.gaze_px;
     return options;
 }
@@ -182,8 +181,8 @@ Result<vdtree::DistanceCriterion> add_up(Sight& sight, const Decision& decision,
         if (!under) return under.error();
         lit = under->share();
     }
-    const auto costs = perception::summed_costs(lit ? *lit : tree, *shown, sight.view, sight.object.placement,
-                                                test_options(sight, decision.request));
+    const auto costs =
+        perception::summed_costs(lit ? *lit : tree, *shown, sight.view, sight.object.placement, test_options(sight));
     if (!costs) return costs.error();
     return vdtree::costing_at_least(tree, own, recipe.viewpoint, *costs);
 }

@@ -66,14 +66,6 @@ Result<void> validate(const Request& r) {
     if (!r.masking.empty() && r.purpose != Purpose::picture)
         return invalid_field("{request.masking} is of pictures: set {request.purpose} = picture.");
     if (const auto goal = validate_goal(r); !goal) return goal;
-    // Where none is asked for, one that knows colours is taken.
-    const bool knows_chroma =
-        !r.fold_test || *r.fold_test == FoldTest::luebke_hallen || *r.fold_test == FoldTest::luebke_hallen_safe;
-    const bool may_count = r.goal.kind != Goal::Kind::full && r.goal.kind != Goal::Kind::pixels;
-    if (r.chroma && !(knows_chroma && may_count))
-        return invalid_field("{request.chroma} needs {request.fold_test = }luebke-hallen or luebke-hallen-safe, and a "
-                             "goal that folds by "
-                             "it.");
     if (r.milliseconds && !(*r.milliseconds >= 0 && std::isfinite(*r.milliseconds)))
         return invalid_field("{request.milliseconds} must be 0 or more, and finite.");
     if (r.milliseconds && r.goal.kind == Goal::Kind::full)

@@ -107,7 +107,7 @@ std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache&
 
 Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& object, ObjectCache& cache) {
     if (!cache.lit_cut_rings) {
-        const auto rings = cut_rings(object, cache, false);
+        const auto rings = cut_rings(object, cache);
         if (!rings) return rings.error();
         auto bounded = perception::bound_lit_cut_rings(object.tree, **rings);
         if (!bounded) return bounded.error();
@@ -116,12 +116,11 @@ Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& o
     return cache.lit_cut_rings;
 }
 
-Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache, bool with_chroma) {
-    if (!cache.cut_rings || (with_chroma && !cache.rings_have_chroma)) {
-        auto bounded = perception::bound_cut_rings(object.tree, with_chroma);
+Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache) {
+    if (!cache.cut_rings) {
+        auto bounded = perception::bound_cut_rings(object.tree);
         if (!bounded) return bounded.error();
         cache.cut_rings = std::move(*bounded);
-        cache.rings_have_chroma = with_chroma;
     }
     return &*cache.cut_rings;
 }
@@ -187,8 +186,12 @@ Result<SharedLighting> Session::State::lighting(const vdtree::View& view, std::s
 // another one.
 perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>& sights) const {
     perception::SceneLuminance all{background, background};
+    perception::ChromaRange colours = backdrop_colours_.value_or(perception::ChromaRange());
     for (const Sight& sight : sights) {
         const vdtree::VertexTree& tree = sight.object.tree;
+        std::optional<perception::ChromaRange>& own_colours = sight.cache.colours;
+        if (!own_colours) own_colours = perception::colour_reach(tree);
+        colours = perception::unite(colours, *own_colours);
         perception::SceneLuminance own{tree.luminance_range().lo, tree.luminance_range().hi,
                                        vdtree::LuminanceRange{background, background}};
         if (sight.lighting)
@@ -202,6 +205,7 @@ perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>
         all.darkest = std::min(all.darkest, range.lo);
         all.brightest = std::max(all.brightest, range.hi);
     }
+    all.colour = perception::as_luminance(colours);
     return all;
 }
 
@@ -237,6 +241,11 @@ Result<void> Session::State::set_gaze_of(Sight& sight) {
 
 // What a light makes of every vertex; once where lights stand still and have no highlights that go with the eye.
 Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
+    if (!backdrop_colours_) {
+        backdrop_colours_.emplace();
+        for (const auto& item : scene.backdrop)
+            backdrop_colours_ = perception::unite(*backdrop_colours_, perception::colour_reach(item.tree));
+    }
     const bool stays = !scene.lights || scene.lights->stands_still();
     if (stays && backdrop_ranges_.size() == scene.backdrop.size()) return {};
     backdrop_ranges_.clear();

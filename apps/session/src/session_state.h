@@ -60,6 +60,7 @@ private:
     bool is_crowded_ = false;
     std::vector<vdtree::Plane> window_;                   // of the last look
     std::vector<vdtree::LuminanceRange> backdrop_ranges_; // of luminance, as they are lit
+    std::optional<perception::ChromaRange> backdrop_colours_;
 };
 
 } // namespace unseen::session

@@ -143,7 +143,7 @@ Result<std::shared_ptr<const perception::ShadowEdges>> edges_of(Sight& sight, co
     std::erase_if(all.known_edges, [](const auto& known) { return known.edges.expired(); });
     const auto found = std::ranges::find(all.known_edges, edges_key, &SceneShadows::KnownEdges::key);
     if (found != all.known_edges.end()) return all.last_edges = found->edges.lock();
-    auto made = perception::ShadowEdges::create(sight.view, test_options(sight, decision, key), ambient);
+    auto made = perception::ShadowEdges::create(sight.view, test_options(sight, key), ambient);
     if (!made) return made.error();
     all.last_edges = std::make_shared<const perception::ShadowEdges>(std::move(*made));
     all.known_edges.push_back({edges_key, all.last_edges});

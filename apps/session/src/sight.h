@@ -15,10 +15,10 @@ struct ShownCriteria; // likewise
 struct ObjectCache {
     std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
     std::optional<perception::CutRings> cut_rings = {};
-    std::optional<vdtree::Sphere> all = {}; // see sphere_of_all()
-    std::optional<bool> knows_texture = {}; // see perception::knows_texture()
-    std::optional<bool> has_chroma = {};    // see perception::has_chroma()
-    bool rings_have_chroma = false;         // few requests look at colours, and bounding them takes time
+    std::optional<vdtree::Sphere> all = {};              // see sphere_of_all()
+    std::optional<bool> knows_lit_texture = {};          // see perception::knows_lit_texture()
+    std::optional<bool> has_colours = {};                // see perception::has_colours()
+    std::optional<perception::ChromaRange> colours = {}; // see perception::colour_reach()
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
     std::optional<perception::LitFolds> lit_folds = {};  // measured where the default test asks for it
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
@@ -101,6 +101,6 @@ WorldSphere sphere_of_all(const Object& object, ObjectCache& cache);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
 // What lights make of the rings of all cuts.
 Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& object, ObjectCache& cache);
-Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache, bool with_chroma);
+Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache);
 
 } // namespace unseen::session

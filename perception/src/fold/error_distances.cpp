@@ -3,6 +3,8 @@
 
 #include <map>
 
+#include <unseen/perception/internal/chroma.h>
+
 #include "fold/pattern_eye.h"
 
 namespace unseen::perception {
@@ -264,6 +266,7 @@ public:
                   double highest_cpd, SwitchDistances& switch_distances)
         : tree_(tree), levels_(options.display), switch_distances_(switch_distances),
           darkest_(levels_.in_cdm2(options.scene.darkest)), brightest_(levels_.in_cdm2(options.scene.brightest)),
+          colour_(levels_.difference_in_cdm2(std::max(options.scene.colour, as_luminance(colour_reach(tree))))),
           object_radius_(tree.support_spheres()[vdtree::VertexTree::root()].radius) {
         const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
         whole_ = levels_.luminance_level(levels_.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
@@ -312,7 +315,7 @@ public:
         for (const auto& [bright, dark] : {std::pair(brightest_, lo), std::pair(hi, darkest_)}) {
             const double mean = (bright + dark) / 2;
             const Pattern own{.luminance = levels_.luminance_level(mean),
-                              .largest = levels_.contrast_level(bright - dark, mean),
+                              .largest = levels_.contrast_level(std::hypot(bright - dark, colour_), mean),
                               .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
@@ -333,9 +336,12 @@ private:
     // cd/m2: the largest difference of light between places of the ring, or at the edge of a shadow.
     double moved_light(const LitErrors& lit, NodeId node) const {
         const vdtree::LuminanceRange range = lit.tree->ring_luminance()[node];
-        const double of_vertices = tree_.texture().empty()
-                                       ? levels_.in_cdm2(range.hi) - levels_.in_cdm2(range.lo)
-                                       : levels_.difference_in_cdm2(spread_of_vertices(*lit.tree, node));
+        const double of_luminance = tree_.texture().empty()
+                                        ? levels_.in_cdm2(range.hi) - levels_.in_cdm2(range.lo)
+                                        : levels_.difference_in_cdm2(spread_of_vertices(*lit.tree, node));
+        const double of_vertices = lit.colour_range.empty()
+                                       ? of_luminance
+                                       : std::hypot(of_luminance, levels_.difference_in_cdm2(lit.colour_range[node]));
         return std::max(of_vertices, levels_.difference_in_cdm2(lit.edge_of_shadow(node)));
     }
     // cd/m2: by how much the fold changes light where it changes luminance by this much and shifts by this distance.
@@ -350,6 +356,7 @@ private:
     PatternLevels levels_;
     SwitchDistances& switch_distances_;
     double darkest_, brightest_; // cd/m2
+    double colour_;              // cd/m2: how far apart colours in the scene are
     float object_radius_;
     int whole_;         // luminance level of the whole mesh
     double whole_peak_; // the sensitivity to it

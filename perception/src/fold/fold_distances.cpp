@@ -2,6 +2,7 @@
 
 #include <unseen/perception/internal/cut_rings.h>
 #include <unseen/vdtree/internal/light_bounds.h>
+#include <unseen/vdtree/internal/parallel.h>
 
 #include "fold/fold_classes.h"
 #include "fold/fold_screen.h"
@@ -188,8 +189,16 @@ Sensitivities sensitivities_for(const FoldTestOptions& options, const Surround& 
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
-    all.red_green = seen(red_green);
-    all.yellow_violet = seen(yellow_violet);
+    // Whoever sees luminance so many times as well as the median person sees colours so.
+    const Luminance usual(20);
+    const double gain =
+        csf_of(options).peak_sensitivity(Degrees(0), usual) / CsfTable::standard().peak_sensitivity(Degrees(0), usual);
+    const auto for_observer = [&](const CsfTable& table) {
+        const auto scaled = table.scaled(gain);
+        return seen(scaled ? *scaled : table);
+    };
+    all.red_green = for_observer(red_green);
+    all.yellow_violet = for_observer(yellow_violet);
     return all;
 }
 
@@ -258,25 +267,34 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
     const bool is_around_spheres = !parts.lengths.empty();
     parts.switch_distance.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
     parts.least_cost.assign(parts.switch_distance.size(), 0);
-    std::unordered_map<std::uint64_t, std::vector<double>> known; // extents, which do not depend on shifts of the mean
+    // Extents do not depend on shifts of the mean, which is all that many rows differ by.
+    std::unordered_map<std::uint64_t, std::size_t> known;
+    std::vector<std::size_t> extents_of, first_rows; // by row; by extents
     for (std::size_t i = 0; i < rows.levels().size(); ++i) {
-        const Row row(rows.levels()[i], classes);
         Level without_shifts = rows.levels()[i];
         without_shifts.shift = 0;
         without_shifts.chroma_shift = {};
-        const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
-        std::vector<double>& extents = found->second;
-        if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
+        const auto [found, is_new] = known.try_emplace(without_shifts.number(), first_rows.size());
+        if (is_new) first_rows.push_back(i);
+        extents_of.push_back(found->second);
+    }
+    std::vector<std::vector<double>> extents(first_rows.size(), std::vector<double>(bins));
+    parallel_loop(std::size_t{0}, extents.size(), [&](std::size_t i) {
+        const Row row(rows.levels()[first_rows[i]], classes);
+        if (is_around_spheres || row.has_chroma() || row.has_texture()) {
             LargestExtents largest(
                 [&](double frequency, double eccentricity) { return row.visibility(see, frequency, eccentricity); },
                 screen, is_around_spheres);
-            for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
-        } else if (is_new) {
-            find_grey_extents(row.contrast, row.luminance_cdm2, see.luminance, eccentricities.degrees, extents);
+            for (std::size_t bin = 0; bin < bins; ++bin) extents[i][bin] = largest.at(eccentricities.at(bin));
+        } else {
+            find_grey_extents(row.contrast, row.luminance_cdm2, see.luminance, eccentricities.degrees, extents[i]);
         }
-        set_row(parts, i + 1, extents, screen,
+    });
+    parallel_loop(std::size_t{0}, extents_of.size(), [&](std::size_t i) {
+        const Row row(rows.levels()[i], classes);
+        set_row(parts, i + 1, extents[extents_of[i]], screen,
                 [&](std::size_t bin) { return row.shift_visibility(see, eccentricities.at(bin)); });
-    }
+    });
 }
 
 // Silhouettes may uncover anything in the scene.
@@ -386,8 +404,6 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     const Surround surround = rings.mean_shift.empty() ? Surround() : surround_of(tree, options);
     const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
     const Bins& bins = is_fine ? fine_bins : coarse_bins;
-    if (!tree.texture().empty() && options.chroma)
-        return invalid_argument("The colours of textures are not looked at: leave the chroma out, or the texture.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bins.count : 1;
@@ -410,7 +426,7 @@ Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree
     if (!sound) return sound.error();
     Rings rings{tree.ring_luminance(), {}};
     std::vector<ChromaRange> chroma;
-    if (options.chroma && tree.texture().empty()) {
+    if (tree.texture().empty()) {
         auto found = ring_chroma(tree);
         if (!found) return found.error();
         chroma = std::move(*found);
@@ -424,12 +440,10 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
-    if (options.chroma) {
-        if (cut_rings.chroma.empty() && tree.texture().empty() && has_chroma(tree))
-            return invalid_argument("The rings were bounded without their colours, which are to be looked at.");
-        rings.chroma = cut_rings.chroma;
-        rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
-    }
+    if (cut_rings.chroma.empty() && tree.texture().empty() && has_chroma(tree))
+        return invalid_argument("The rings were bounded without their colours, which count.");
+    rings.chroma = cut_rings.chroma;
+    rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     std::vector<float> lengths = safe_lengths(*sound, cut_rings);
     rings.facing = safe_facing(tree, cut_rings);
     rings.vertices = cut_rings.vertices;

@@ -2,6 +2,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <unseen/perception/internal/chroma.h>
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/light_bounds.h>
 
@@ -194,7 +195,10 @@ Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel&
         auto measured = fold_errors_of(all.sound_.back(), model);
         if (!measured) return measured.error();
         all.errors_.push_back(std::move(*measured));
+        const auto chroma = one.tree.texture().empty() ? ring_chroma(one.tree) : std::vector<ChromaRange>();
+        if (!chroma) return chroma.error();
         all.lit_.push_back({&all.sound_.back(), all.errors_.back().of_nodes, {}, albedo});
+        for (const ChromaRange& range : *chroma) all.lit_.back().colour_range.push_back(as_luminance(range));
         for (const vdtree::LightSource& light : one.lighting.lights)
             if (light.casts_shadow) all.lit_.back().casting.push_back(light);
     }

@@ -223,12 +223,12 @@ struct Vicinity {
 // Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
 class ContactFinder {
 public:
-    explicit ContactFinder(std::span<const SoundTree> trees)
+    ContactFinder(std::span<const SoundTree> trees, bool has_colours)
         : tree_(trees.front()), interior_(tree_.interior_count()), triangles_(tree_.triangles()),
           scale_(unit_scale(tree_.bounding_sphere().radius)), first_triangle_(tree_.first_triangle()),
           boxes_(interior_), turned_boxes_(interior_), mesh_(tree_),
           boxes_a_triangle_(std::max(most_looks, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
-        is_textured_ = !trees.front().texture().empty();
+        is_painted_ = has_colours || !trees.front().texture().empty();
         for (const SoundTree& tree : trees) {
             luminances_.push_back(tree.luminance().subspan(tree.interior_wedge_count()));
             ring_luminances_.push_back(tree.ring_luminance());
@@ -347,7 +347,7 @@ private:
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
     bool look_alike(Index a, Index b) const {
-        if (is_textured_) return false; // whatever their vertices do
+        if (is_painted_) return false; // whatever their vertices do
         const Triangle &s = triangles_[a], &t = triangles_[b];
         return std::all_of(luminances_.begin(), luminances_.end(), [&](std::span<const Unorm16> luminance) {
             return std::abs(mean(luminance, s) - mean(luminance, t)) <= alike_luminance;
@@ -431,7 +431,7 @@ private:
         const Corners c = corners(triangle);
         const glm::vec3 normal = normal_of(c);
         const float length = glm::length(normal);
-        looks.is_known = looks.is_known && length > 0 && !is_textured_ && luminances_.size() <= most_luminances;
+        looks.is_known = looks.is_known && length > 0 && !is_painted_ && luminances_.size() <= most_luminances;
         if (!looks.is_known) return;
         const bool is_first = looks.normals.lo.x > looks.normals.hi.x;
         looks.normals.include(normal / length);
@@ -578,7 +578,7 @@ private:
     std::vector<glm::vec3> positions_;                          // of places
     std::vector<std::span<const Unorm16>> luminances_;          // of leaves, by tree
     std::vector<std::span<const PackedRange>> ring_luminances_; // by interior node, likewise
-    bool is_textured_ = false;
+    bool is_painted_ = false;
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_;              // by interior node
     std::vector<TurnedBox> turned_boxes_; // likewise
@@ -592,8 +592,8 @@ private:
 
 } // namespace
 
-std::vector<Contact> find_contacts(std::span<const SoundTree> trees, MeasuringProgress& progress) {
-    return ContactFinder(trees).run(progress);
+std::vector<Contact> find_contacts(std::span<const SoundTree> trees, bool has_colours, MeasuringProgress& progress) {
+    return ContactFinder(trees, has_colours).run(progress);
 }
 
 } // namespace unseen::perception

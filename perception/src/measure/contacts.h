@@ -25,9 +25,11 @@ struct Contact {
 
 // By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a
 // triangle.
-// `trees`: one at least, the same but for their luminances; what looks alike does so in all of them.
+// `trees`: one at least, the same but for their luminances; what looks alike does so in all of them. With colours nothing
+// counts as alike.
 // Adds the triangles to what is done; where that says to stop, the answer is of no use.
-std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees, MeasuringProgress& progress);
+std::vector<Contact> find_contacts(std::span<const vdtree::SoundTree> trees, bool has_colours,
+                                   MeasuringProgress& progress);
 
 // The mesh over places: these have the numbers of their nodes less interior_count().
 class PlaceTriangles {

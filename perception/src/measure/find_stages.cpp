@@ -23,7 +23,7 @@ class OwnLight {
 public:
     static constexpr std::size_t table_count = 1;
 
-    OwnLight(const VertexTree& tree, const TexturedLight&) : luminance_(tree.luminance()) {}
+    explicit OwnLight(const VertexTree& tree) : luminance_(tree.luminance()) {}
 
     struct Seen {
         StagePicture picture;
@@ -51,13 +51,71 @@ private:
     std::span<const Unorm16> luminance_;
 };
 
+// The same in colour: a table for the luminance, and one for each direction of chroma.
+class OwnColours {
+public:
+    static constexpr std::size_t table_count = 3;
+
+    explicit OwnColours(std::span<const glm::vec3> rgb) : rgb_(rgb) {}
+
+    struct Seen {
+        std::array<StagePicture, table_count> pictures; // as_luminances()
+        StageBands bands;                               // of the luminance
+    };
+    Seen look(StagePainter& painter, std::span<const Triangle> triangles, const StageCamera&) const {
+        Seen seen{draw(painter, triangles), {}};
+        seen.bands = StageBands(seen.pictures[0]);
+        return seen;
+    }
+    void compare(const Seen& mesh, StagePainter& painter, std::span<const Triangle> folded, const StageCamera&,
+                 std::span<FoldStage> tables) const {
+        auto differences = draw(painter, folded);
+        for (std::size_t k = 0; k < table_count; ++k) {
+            differences[k].subtract(mesh.pictures[k]);
+            add_contrasts(mesh.bands, StageBands(differences[k]), {}, tables[k]);
+        }
+    }
+
+    // What the tables come to: contrasts of chroma count as such of luminance, unmasked.
+    static FoldStage together(std::span<const FoldStage> tables) {
+        FoldStage all = tables[0];
+        for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
+            for (std::size_t band = 0; band < FoldStage::band_count; ++band) {
+                const auto most = [&](const FoldStage& chroma) {
+                    return *std::ranges::max_element(chroma.contrast[k][band]);
+                };
+                float& contrast = all.contrast[k][band][0];
+                contrast = glm::length(glm::vec3(contrast, most(tables[1]), most(tables[2])));
+            }
+        return all;
+    }
+
+private:
+    std::array<StagePicture, table_count> draw(StagePainter& painter, std::span<const Triangle> triangles) const {
+        auto pictures = painter.draw<table_count>(triangles, [&](WedgeId wedge) {
+            const glm::vec3& rgb = rgb_[wedge];
+            return std::array{rgb.r, rgb.g, rgb.b};
+        });
+        for (std::size_t i = 0; i < pictures[0].light.values.size(); ++i) {
+            const auto light = [&](std::size_t k) -> float& { return pictures[k].light.values[i]; };
+            const glm::vec3 seen = as_luminances(glm::vec3(light(0), light(1), light(2)));
+            for (int k = 0; k < 3; ++k) light(static_cast<std::size_t>(k)) = seen[k];
+        }
+        for (std::size_t k = 1; k < table_count; ++k) // what is behind has no chroma
+            std::ranges::fill(pictures[k].cover.values, 0.0f);
+        return pictures;
+    }
+
+    std::span<const glm::vec3> rgb_; // by wedge, as drawn
+};
+
 // The same under single lights from all around, with the shares of ambient light of LitStages: a table for each.
 class SingleLights {
 public:
     static constexpr std::size_t table_count = LitStages::ambient_shares.size();
 
-    SingleLights(const VertexTree& tree, const TexturedLight& texture)
-        : normals_(tree.wedge_count()), has_albedo_(!tree.colours().empty() || texture.texture) {
+    SingleLights(const VertexTree& tree, bool is_textured)
+        : normals_(tree.wedge_count()), has_albedo_(!tree.colours().empty() || is_textured) {
         for (WedgeId wedge = 0; wedge < tree.wedge_count(); ++wedge)
             normals_[wedge] = {glm::vec3(tree.normals()[wedge]), albedo_of(tree, wedge)};
     }
@@ -137,9 +195,9 @@ private:
 template <class Light>
 class StageFinder {
 public:
-    StageFinder(const SoundTree& tree, const TexturedLight& texture, std::span<const FoldTexture> textures,
-                std::span<FoldError> errors, MeasuringProgress& progress)
-        : tree_(tree), light_(tree, texture), texture_(texture), textures_(textures), errors_(errors),
+    StageFinder(const SoundTree& tree, Light light, std::span<const TexturedLight> of_lights,
+                std::span<const FoldTexture> textures, std::span<FoldError> errors, MeasuringProgress& progress)
+        : tree_(tree), light_(std::move(light)), of_lights_(of_lights), textures_(textures), errors_(errors),
           progress_(progress), interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
@@ -245,7 +303,7 @@ private:
     void for_each_direction(F&& f) {
         parallel_loop(std::size_t{0}, direction_count, [&](std::size_t i) {
             if (progress_.is_cancelled()) return;
-            StagePainter painter(tree_, texture_, cameras_[i], surfaces_.local());
+            StagePainter painter(tree_, of_lights_, cameras_[i], surfaces_.local());
             f(i, painter);
             progress_.add(dearness_);
         });
@@ -253,7 +311,7 @@ private:
 
     const SoundTree& tree_;
     Light light_;
-    TexturedLight texture_;
+    std::span<const TexturedLight> of_lights_; // of all lights, or of each
     std::span<const FoldTexture> textures_;
     std::span<FoldError> errors_;
     MeasuringProgress& progress_;
@@ -278,17 +336,26 @@ double FoldStage::frequency(std::size_t band) {
     return nominal_frequency(band) * stage_side / static_cast<double>(stage_margin);
 }
 
-std::vector<FoldStage> find_stages(const SoundTree& tree, const TexturedLight& light,
-                                   std::span<const FoldTexture> textures, std::span<FoldError> errors,
-                                   MeasuringProgress& progress) {
+std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<const glm::vec3> rgb,
+                                   std::span<const TexturedLight> lights, std::span<const FoldTexture> textures,
+                                   std::span<FoldError> errors, MeasuringProgress& progress) {
     if (!has_stages(tree)) return {};
-    return StageFinder<OwnLight>(tree, light, textures, errors, progress).run();
+    if (rgb.empty()) return StageFinder(tree, OwnLight(tree), lights, textures, errors, progress).run();
+    const std::vector<FoldStage> tables = StageFinder(tree, OwnColours(rgb), lights, textures, errors, progress).run();
+    const std::size_t count = tables.size() / OwnColours::table_count;
+    std::vector<FoldStage> stages;
+    for (std::size_t stage = 0; stage < count; ++stage)
+        stages.push_back(
+            OwnColours::together(std::array{tables[stage], tables[count + stage], tables[2 * count + stage]}));
+    return stages;
 }
 
 LitStages find_lit_stages(const SoundTree& tree, const TexturedLight& texture, std::span<const FoldTexture> textures,
                           std::span<FoldError> errors, MeasuringProgress& progress) {
     if (!has_stages(tree)) return {};
-    return {StageFinder<SingleLights>(tree, texture, textures, errors, progress).run()};
+    return {StageFinder(tree, SingleLights(tree, texture.texture != nullptr), std::span(&texture, 1), textures, errors,
+                        progress)
+                .run()};
 }
 
 } // namespace unseen::perception

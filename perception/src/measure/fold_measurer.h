@@ -23,7 +23,9 @@ constexpr Index leaves_of_part = 4096; // of a subtree that one task measures
 //
 // Points of textured trees also have texture coordinates. What is compared is the texture's luminance there, times
 // theirs.
-template <std::size_t luminances, bool is_textured>
+//
+// Colours are three luminances of one tree (as_luminances()), which has its own decide: `deciding` is 1 then.
+template <std::size_t luminances, bool is_textured, std::size_t deciding = luminances>
 class Measurer {
     static constexpr std::size_t channels = luminances + (is_textured ? 2 : 0);
     using Point = LitPointOf<channels>;
@@ -35,8 +37,10 @@ class Measurer {
     using Texture = TextureChange<luminances>;
 
 public:
-    // `trees`: the same except for their luminances. `contacts`: of the trees.
-    Measurer(std::span<const SoundTree> trees, std::span<const TexturedLight> lights, std::span<MeasuredFolds> found,
+    // `trees`: as many as decide, the same except for their luminances. `luminance`: of a wedge, the i-th; with colours
+    // and a texture the primaries. `contacts`: of the trees.
+    Measurer(std::span<const SoundTree> trees, const FunctionRef<float(std::size_t, WedgeId)>& luminance,
+             std::span<const TexturedLight> lights, const TextureDetail* texture, std::span<MeasuredFolds> found,
              std::vector<Contact> contacts)
         : tree_(trees.front()), lights_(lights), found_(found), first_leaf_(tree_.first_leaf()),
           leaf_end_(tree_.leaf_end()), first_triangle_(tree_.first_triangle()), triangles_(tree_.triangles()),
@@ -46,13 +50,13 @@ public:
         for (WedgeId wedge = 0; wedge < tree_.wedge_count(); ++wedge) {
             Point& to = points_[wedge];
             to.position = tree_.positions()[wedge];
-            for (std::size_t i = 0; i < luminances; ++i) to.luminance[i] = trees[i].luminance()[wedge];
+            for (std::size_t i = 0; i < luminances; ++i) to.luminance[i] = luminance(i, wedge);
             if constexpr (is_textured) {
                 const glm::vec2 uv = tree_.uvs()[wedge];
                 to.luminance[Texture::u_channel] = uv.x, to.luminance[Texture::v_channel] = uv.y;
             }
         }
-        if constexpr (is_textured) texture_.emplace(tree_, lights_);
+        if constexpr (is_textured) texture_.emplace(tree_, lights_, *texture, deciding < luminances);
     }
 
     // False where it was cancelled.
@@ -147,7 +151,7 @@ private:
         std::array<FoldRecord, luminances> records; // of the luminances alone
         if constexpr (is_textured) found_[0].textures[node] = {};
         measure(node, Says::any, scratch, record, records, facing);
-        if constexpr (luminances > 1) {
+        if constexpr (deciding > 1) {
             scratch.shown_before.swap(scratch.ring.shown);
             measure(node, Says::all, scratch, record, records, facing);
         }
@@ -516,7 +520,7 @@ private:
     NodeId interior_;
     PlaceTriangles mesh_;
     BorderShifts border_;
-    FoldNeighbours<luminances> neighbours_;
+    FoldNeighbours<deciding> neighbours_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;

@@ -340,6 +340,7 @@ float FoldPictureOf<count>::largest_mean(const Cells& values) const {
 template class FoldPictureOf<1>;
 template class FoldPictureOf<3>;
 template class FoldPictureOf<4>;
+template class FoldPictureOf<5>;
 template class FoldPictureOf<6>;
 
 } // namespace unseen::perception

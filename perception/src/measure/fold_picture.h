@@ -88,6 +88,7 @@ using FoldPicture = FoldPictureOf<1>;
 extern template class FoldPictureOf<1>;
 extern template class FoldPictureOf<3>;
 extern template class FoldPictureOf<4>;
+extern template class FoldPictureOf<5>;
 extern template class FoldPictureOf<6>;
 
 } // namespace unseen::perception

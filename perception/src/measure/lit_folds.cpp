@@ -188,14 +188,15 @@ struct LitFolds::State {
     Result<void> look_at(const VertexTree& tree) {
         auto its_bounds = LightBounds::measure(tree);
         if (!its_bounds) return its_bounds.error();
-        auto its_texture = texture_detail_of(tree);
-        if (!its_texture) return its_texture.error();
-        bounds = std::move(*its_bounds), texture = std::move(*its_texture);
+        bounds = std::move(*its_bounds), texture = texture_detail_of(tree);
         return {};
     }
 };
 
 Result<LitFolds> LitFolds::measure(const VertexTree& tree, int threads, const Progress& progress) {
+    if (!knows_lit_texture(tree))
+        return unsupported("What folds change of a texture over vertices of several hues is not measured under lights: "
+                           "take another fold test, or the tree without its texture.");
     std::vector<Shading> shadings;
     for (int axis = 0; axis < 3; ++axis)
         shadings.push_back([&tree, axis](WedgeId wedge) {

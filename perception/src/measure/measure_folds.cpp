@@ -45,26 +45,27 @@ std::optional<glm::vec3> common_tint(const VertexTree& tree) {
     return tint ? *tint : glm::vec3(1);
 }
 
+bool is_of_one_colour(const TextureView& texture) {
+    return std::ranges::all_of(texture.texels, [&](const Texel& texel) { return texel == texture.texels.front(); });
+}
+
 } // namespace
 
-Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const VertexTree& tree) {
+std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
     const TextureView texture = tree.texture();
     if (texture.empty()) {
-        if (!has_detail(tree)) return std::shared_ptr<const TextureDetail>();
+        if (!has_detail(tree)) return nullptr;
         // Alone: a thread that waits here must not begin another measurement, which would wait for this.
         static const auto stand_in = tbb::this_task_arena::isolate(
             [] { return std::make_shared<const TextureDetail>(TextureDetail::stand_in(1)); });
         return stand_in;
     }
-    const auto tint = common_tint(tree);
-    if (!tint)
-        return unsupported("What folds change of a texture over vertices of several hues is not "
-                           "measured: take another fold test, or the tree without its texture.");
-    if (std::ranges::all_of(texture.texels, [&](const Texel& texel) { return texel == texture.texels.front(); })) {
-        const TextureDetail even({1, 1, texture.wrap_u, texture.wrap_v, texture.texels.first(1)}, *tint);
+    const glm::vec3 tint = common_tint(tree).value_or(glm::vec3(1));
+    if (is_of_one_colour(texture)) {
+        const TextureDetail even({1, 1, texture.wrap_u, texture.wrap_v, texture.texels.first(1)}, tint);
         return std::make_shared<const TextureDetail>(TextureDetail::stand_in(even.at(0, glm::vec2(0))));
     }
-    return std::make_shared<const TextureDetail>(texture, *tint);
+    return std::make_shared<const TextureDetail>(texture, tint);
 }
 
 bool has_detail(const VertexTree& tree) {
@@ -72,7 +73,7 @@ bool has_detail(const VertexTree& tree) {
     return !tree.texture().empty() || std::ranges::any_of(uvs, [&](const glm::vec2& uv) { return uv != uvs.front(); });
 }
 
-bool knows_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
+bool knows_lit_texture(const VertexTree& tree) { return tree.texture().empty() || common_tint(tree).has_value(); }
 
 bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldRecord>(record_name).empty(); }
 
@@ -92,6 +93,47 @@ Result<SoundTree> in_units(const VertexTree& tree, float scale, std::shared_ptr<
 
 Error cancelled_error() { return {ErrorCode::cancelled, "Measuring what folds change was cancelled."}; }
 
+// How a coloured tree is drawn.
+struct Colours {
+    std::vector<glm::vec3> rgb;                                     // by wedge; times the texture
+    std::vector<std::shared_ptr<const TextureDetail>> texture = {}; // by primary; none: no texture
+
+    // By primary where there is a texture, else one for all.
+    std::vector<TexturedLight> lights() const {
+        std::vector<TexturedLight> all;
+        for (const auto& primary : texture) all.push_back({primary.get(), 0});
+        if (all.empty()) all.emplace_back();
+        return all;
+    }
+};
+
+// Nothing of grey trees. `detail`: of the tree's texture, to which the colours are added.
+std::optional<Colours> colours_of(const VertexTree& tree, std::shared_ptr<const TextureDetail>& detail) {
+    if (!has_colours(tree)) return std::nullopt;
+    Colours of{std::vector<glm::vec3>(tree.wedge_count())};
+    const auto colours = tree.colours();
+    for (WedgeId wedge = 0; wedge < of.rgb.size(); ++wedge) {
+        const float luminance = tree.luminance()[wedge];
+        of.rgb[wedge] = colours.empty() ? glm::vec3(luminance) : drawn_colour(colours[wedge], luminance);
+    }
+    const TextureView texture = tree.texture();
+    if (!detail) return of;
+    if (texture.empty()) {
+        of.texture.assign(3, detail);
+    } else if (is_of_one_colour(texture)) {
+        for (int k = 0; k < 3; ++k)
+            of.texture.push_back(std::make_shared<const TextureDetail>(
+                TextureDetail::stand_in(linear_colour(texture.texels.front())[k])));
+    } else {
+        for (int k = 0; k < 3; ++k)
+            of.texture.push_back(std::make_shared<const TextureDetail>(TextureDetail::of_primary(texture, k)));
+        TextureDetail with_colours = *detail;
+        with_colours.include_colours(of.texture);
+        detail = std::make_shared<const TextureDetail>(std::move(with_colours));
+    }
+    return of;
+}
+
 // Measurements of trees that are the same but for their luminances, with what follows from each.
 struct Measured {
     std::vector<MeasuredFolds> found;           // by tree
@@ -99,16 +141,58 @@ struct Measured {
     std::vector<SoundTree> in_units;            // the trees in these
     std::shared_ptr<const TextureDetail> texture;
     std::vector<TexturedLight> lights; // by tree
+    std::optional<Colours> colours;    // of a single tree
 };
 
-template <std::size_t luminances, bool is_textured>
-bool measure_all(std::span<const SoundTree> trees, std::span<const TexturedLight> lights,
-                 std::span<MeasuredFolds> found, double up_to, MeasuringProgress& progress) {
+// What is measured of which trees; `found`: by tree, or by as_luminances() of a tree's colours.
+struct Measuring {
+    std::span<const SoundTree> trees;
+    std::span<const TexturedLight> lights; // by luminance
+    const TextureDetail* texture = nullptr;
+    const Colours* colours = nullptr;
+    std::span<MeasuredFolds> found;
+    double up_to; // the share of the whole that this is
+};
+
+// False where it was cancelled.
+template <std::size_t luminances, bool is_textured, std::size_t deciding = luminances>
+bool measure_all(const Measuring& m, MeasuringProgress& progress) {
     constexpr double contacts_done = 0.2; // of it
-    progress.begin(contacts_done * up_to, static_cast<double>(trees.front().triangles().size()));
-    std::vector<Contact> contacts = find_contacts(trees, progress);
-    progress.begin(up_to, trees.front().interior_count());
-    return Measurer<luminances, is_textured>(trees, lights, found, std::move(contacts)).run(progress);
+    progress.begin(contacts_done * m.up_to, static_cast<double>(m.trees.front().triangles().size()));
+    std::vector<Contact> contacts = find_contacts(m.trees, m.colours != nullptr, progress);
+    progress.begin(m.up_to, m.trees.front().interior_count());
+    const auto luminance = [&](std::size_t i, WedgeId wedge) -> float {
+        if (!m.colours) return m.trees[i].luminance()[wedge];
+        const glm::vec3 rgb = m.colours->rgb[wedge];
+        return (is_textured ? rgb : as_luminances(rgb))[static_cast<int>(i)];
+    };
+    return Measurer<luminances, is_textured, deciding>(m.trees, luminance, m.lights, m.texture, m.found,
+                                                       std::move(contacts))
+        .run(progress);
+}
+
+using MeasureAll = bool (*)(const Measuring&, MeasuringProgress&);
+MeasureAll measurer_of(std::size_t trees, bool is_textured, bool has_colours) {
+    if (has_colours) return is_textured ? measure_all<3, true, 1> : measure_all<3, false, 1>;
+    if (trees == 1) return is_textured ? measure_all<1, true> : measure_all<1, false>;
+    if (trees == 3) return measure_all<3, false>;
+    return is_textured ? measure_all<4, true> : measure_all<4, false>;
+}
+
+// Leaves one measurement of those of a tree's colours, of which the root of the sum of squares counts.
+void put_together(std::vector<MeasuredFolds>& found) {
+    for (std::size_t node = 0; node < found.front().folds.size(); ++node) {
+        FoldRecord& all = found[0].folds[node];
+        const auto together = [&](auto&& of) {
+            of(all) = glm::length(glm::vec3(of(all), of(found[1].folds[node]), of(found[2].folds[node])));
+        };
+        together([](FoldRecord& r) -> float& { return r.largest_luminance; });
+        together([](FoldRecord& r) -> float& { return r.mean_luminance; });
+        for (std::size_t size = 0; size < picture_sizes.size(); ++size)
+            for (std::size_t band = 0; band < picture_bands; ++band)
+                together([&](FoldRecord& r) -> float& { return r.amplitudes[size][band]; });
+    }
+    found.resize(1);
 }
 
 // Without shifts of the mean. `dark`: of textured trees, by tree, what their luminance is where the texture is black.
@@ -126,25 +210,28 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         all.in_units.push_back(std::move(*measured));
     }
     const NodeId nodes = trees.front().interior_count();
-    all.found.resize(trees.size());
+    all.texture = texture_detail_of(trees.front());
+    if (trees.size() == 1) all.colours = colours_of(trees.front(), all.texture);
+    all.found.resize(all.colours ? 3 : trees.size());
     for (MeasuredFolds& found : all.found) {
         found.folds.resize(nodes), found.facing.resize(nodes);
         if (is_textured) found.textures.resize(nodes);
     }
     all.errors.resize(trees.size());
-    auto texture = texture_detail_of(trees.front());
-    if (!texture) return texture.error();
-    all.texture = std::move(*texture);
     for (std::size_t i = 0; i < trees.size(); ++i) all.lights.push_back({all.texture.get(), dark[i]});
-    const auto measure_these = is_textured         ? (trees.size() == 1 ? measure_all<1, true> : measure_all<4, true>)
-                               : trees.size() == 1 ? measure_all<1, false>
-                               : trees.size() == 3 ? measure_all<3, false>
-                                                   : measure_all<4, false>;
+    const std::vector<TexturedLight> lights = all.colours ? all.colours->lights() : all.lights;
+    const Measuring measuring{.trees = all.in_units,
+                              .lights = lights,
+                              .texture = all.texture.get(),
+                              .colours = all.colours ? &*all.colours : nullptr,
+                              .found = all.found,
+                              .up_to = up_to};
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = measure_these(all.in_units, all.lights, all.found, up_to, progress);
+        is_whole = measurer_of(trees.size(), is_textured, all.colours.has_value())(measuring, progress);
         if (!is_whole) return;
+        if (all.colours) put_together(all.found);
         parallel_loop(std::size_t{0}, trees.size(), [&](std::size_t i) {
             const MeasuredFolds& found = all.found[i];
             all.errors[i] = nested_errors(all.in_units[i], found.folds, found.facing, found.textures, FoldModel());
@@ -226,8 +313,11 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
         find_luminance_bias(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
                             errors);
         copy_bias(errors, measured->found.front());
-        stages = find_stages(measured->in_units.front(), measured->lights.front(), measured->found.front().textures,
-                             errors, told);
+        const std::optional<Colours>& colours = measured->colours;
+        stages =
+            find_stages(measured->in_units.front(),
+                        colours ? std::span<const glm::vec3>(colours->rgb) : std::span<const glm::vec3>(),
+                        colours ? colours->lights() : measured->lights, measured->found.front().textures, errors, told);
     });
     if (told.is_cancelled()) return cancelled_error();
     const auto still = stages_without_motion(tree, measured->found, errors);

@@ -40,8 +40,8 @@ Result<void> add_luminance_bias(const vdtree::VertexTree& tree, const TextureDet
 bool has_detail(const vdtree::VertexTree& tree);
 
 // The detail of the tree's texture; what stands in for images where there are only coordinates, or the texture is of
-// one colour; null where there is nothing. Fails if knows_texture() is false.
-Result<std::shared_ptr<const TextureDetail>> texture_detail_of(const vdtree::VertexTree& tree);
+// one colour; null where there is nothing. Over vertices of several hues as over white ones.
+std::shared_ptr<const TextureDetail> texture_detail_of(const vdtree::VertexTree& tree);
 
 // Nothing where there is no tree.
 template <class T>
@@ -55,12 +55,12 @@ Result<vdtree::VertexTree> with_records(const vdtree::VertexTree& tree, Measured
                                         std::vector<std::uint8_t> stage_of, std::vector<FoldStage> stages);
 
 // Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no
-// extent. `light`, `textures`: with the tree's texture, where it has one, and what folds make of that. Cost: some
-// hundred pictures of up to half of the triangles; in parallel. Goes on to all of what is to be done; where that says
-// to stop, the answer is of no use.
-std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, const TexturedLight& light,
-                                   std::span<const FoldTexture> textures, std::span<FoldError> errors,
-                                   MeasuringProgress& progress);
+// extent. `rgb`: how wedges are drawn; none: in luminance alone. `lights`, `textures`: with the tree's texture, where it
+// has one, of the luminance or of each primary, and what folds make of that. Cost: some hundred pictures of up to half
+// of the triangles; in parallel. Goes on to all of what is to be done; where that says to stop, the answer is of no use.
+std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, std::span<const glm::vec3> rgb,
+                                   std::span<const TexturedLight> lights, std::span<const FoldTexture> textures,
+                                   std::span<FoldError> errors, MeasuringProgress& progress);
 
 // The same under any lights. `errors`: of folds under light from everywhere. `texture`: dark where the texture is.
 // Cost: three to four times as many pictures.

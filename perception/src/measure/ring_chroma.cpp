@@ -1,11 +1,13 @@
 #include <unseen/perception/internal/chroma.h>
 
 #include <algorithm>
+#include <optional>
 
 #include <glm/geometric.hpp>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
+#include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
@@ -22,6 +24,23 @@ constexpr float grey_slack = 1e-5f;
 constexpr double most_chroma = 100;
 
 } // namespace
+
+bool has_colours(const VertexTree& tree) {
+    constexpr int alike = 2; // codes
+    const auto is_grey = [](const Texel& t) {
+        const auto [least, most] = std::minmax({t[0], t[1], t[2]});
+        return most - least <= alike;
+    };
+    return has_chroma(tree) || !std::ranges::all_of(tree.texture().texels, is_grey);
+}
+
+glm::vec3 drawn_colour(const glm::vec4& colour, float luminance) {
+    const glm::dvec3 rgb(colour);
+    const double own = rec709_luminance(rgb);
+    if (!(own > 0)) return glm::vec3(luminance);
+    const glm::vec3 drawn(rgb * (static_cast<double>(luminance) / own));
+    return glm::clamp(drawn, -static_cast<float>(most_chroma), static_cast<float>(most_chroma));
+}
 
 glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance) {
     const glm::dvec3 rgb(colour);
@@ -42,6 +61,22 @@ bool has_chroma(const VertexTree& tree) {
         if (!(std::max(std::abs(chroma.x), std::abs(chroma.y)) <= grey_slack)) return true;
     }
     return false;
+}
+
+ChromaRange colour_reach(const VertexTree& tree) {
+    ChromaRange all;
+    const auto include = [&](glm::vec2 chroma) { all = unite(all, {chroma, chroma}); };
+    const auto colours = tree.colours();
+    for (std::size_t wedge = 0; wedge < colours.size(); ++wedge)
+        include(drawn_chroma(colours[wedge], tree.luminance()[wedge]));
+    const float brightest = tree.luminance_range().hi;
+    std::optional<Texel> last; // neighbours are often alike
+    for (const Texel& texel : tree.texture().texels) {
+        if (last == texel || (texel[0] == texel[1] && texel[0] == texel[2])) continue;
+        last = texel;
+        include(brightest * glm::vec2(opponent_chroma(glm::dvec3(linear_colour(texel)))));
+    }
+    return all;
 }
 
 Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {

@@ -206,7 +206,7 @@ private:
     std::vector<PreparedTriangle> triangles_;
 };
 
-// Neighbours are folded where any of the luminances says so, or where all of them do.
+// Neighbours are folded where any of the trees' luminances says so, or where all of them do.
 enum class Says { any, all };
 
 template <std::size_t luminances>

@@ -34,19 +34,22 @@ struct Shown : StageFootprint {
 
 // The texture of a footprint. Texels are no wider than the samples are apart: the cells' means smooth them.
 struct ShownTexture {
-    const TexturedLight& light;
+    std::span<const TexturedLight> lights; // one for all, or one for each
     std::size_t level;
     glm::vec2 of_a, by_b, by_c; // texture coordinates: of a, and how they grow with the shares of b and c
 
-    ShownTexture(const StageFootprint& t, const TexturedLight& texture, const std::array<glm::vec2, 3>& uv)
-        : light(texture), of_a(uv[0]), by_b(uv[1] - uv[0]), by_c(uv[2] - uv[0]) {
-        const glm::vec2 size = texture.texture->size(), along_x = (by_b * t.v_by.x + by_c * t.w_by.x) * size,
+    ShownTexture(const StageFootprint& t, std::span<const TexturedLight> textures, const std::array<glm::vec2, 3>& uv)
+        : lights(textures), of_a(uv[0]), by_b(uv[1] - uv[0]), by_c(uv[2] - uv[0]) {
+        const TextureDetail& texture = *textures.front().texture;
+        const glm::vec2 size = texture.size(), along_x = (by_b * t.v_by.x + by_c * t.w_by.x) * size,
                         along_y = (by_b * t.v_by.y + by_c * t.w_by.y) * size;
-        const std::size_t first_wider = texture.texture->level_of(
+        const std::size_t first_wider = texture.level_of(
             std::max({std::abs(along_x.x), std::abs(along_x.y), std::abs(along_y.x), std::abs(along_y.y)}));
         level = first_wider > 0 ? first_wider - 1 : 0;
     }
-    UNSEEN_INLINE float at(float v, float w) const { return light.texture->nearest(level, of_a + v * by_b + w * by_c); }
+    UNSEEN_INLINE float at(std::size_t light, float v, float w) const {
+        return lights[light].texture->nearest(level, of_a + v * by_b + w * by_c);
+    }
 };
 
 template <class Floats>
@@ -114,14 +117,15 @@ UNSEEN_INLINE void draw_row(const Shown<lights>& t, const ShownTexture* texture,
         const Floats old_height = floats_at<Floats>(height);
         const auto is_seen = (x >= from) & (x < to) & (h > old_height);
         Floats its_texture{};
-        if (texture)
-            for (std::size_t i = 0; i < width; ++i)
-                if (is_seen[i]) its_texture[i] = texture->at(v[i], w[i]);
         store<Floats>(is_seen ? h : old_height, height);
         for (std::size_t k = 0; k < lights; ++k) {
             float* const light = surfaces.light[k].data() + first;
+            const std::size_t of = texture && texture->lights.size() > 1 ? k : 0;
+            if (texture && k == of)
+                for (std::size_t i = 0; i < width; ++i)
+                    if (is_seen[i]) its_texture[i] = texture->at(of, v[i], w[i]);
             const Floats own = u * t.of_a[k] + v * t.of_b[k] + w * t.of_c[k],
-                         l = texture ? texture->light.with_texture(own, its_texture) : own;
+                         l = texture ? texture->lights[of].with_texture(own, its_texture) : own;
             store<Floats>(is_seen ? l : floats_at<Floats>(light), light);
         }
     }
@@ -261,10 +265,10 @@ void StageSurfaces::clear(std::size_t lights) {
     drawn = 0;
 }
 
-StagePainter::StagePainter(const VertexTree& tree, const TexturedLight& light, const StageCamera& camera,
+StagePainter::StagePainter(const VertexTree& tree, std::span<const TexturedLight> textures, const StageCamera& camera,
                            StageSurfaces& surfaces)
-    : light_(light), camera_(camera), positions_(tree.positions()), uvs_(tree.uvs()), closedness_(tree.closedness()),
-      surfaces_(surfaces) {}
+    : textures_(textures), camera_(camera), positions_(tree.positions()), uvs_(tree.uvs()),
+      closedness_(tree.closedness()), surfaces_(surfaces) {}
 
 template <std::size_t lights>
 std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> triangles,
@@ -278,8 +282,8 @@ std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> tr
         const Shown<lights> t{*place, luminance(corners[0]),      luminance(corners[1]), luminance(corners[2]),
                               number, covers ? &*covers : nullptr};
         std::optional<ShownTexture> texture;
-        if (light_.texture)
-            texture.emplace(t, light_, std::array{uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]});
+        if (textures_.front().texture)
+            texture.emplace(t, textures_, std::array{uvs_[corners[0]], uvs_[corners[1]], uvs_[corners[2]]});
         on_widest([&]<class Floats>()
                       UNSEEN_INLINE_LAMBDA { draw_rows<Floats>(t, texture ? &*texture : nullptr, surfaces_); });
         if (covers || surfaces_.drawn <= most_layers * samples * samples) continue;

@@ -76,7 +76,8 @@ private:
 // Draws into memory that is used again for other pictures.
 class StagePainter {
 public:
-    StagePainter(const vdtree::VertexTree& tree, const TexturedLight& light, const StageCamera& camera,
+    // `textures`: of all lights, or of each; refers to them.
+    StagePainter(const vdtree::VertexTree& tree, std::span<const TexturedLight> textures, const StageCamera& camera,
                  StageSurfaces& surfaces);
 
     // A picture under each light of triangles over wedges. `luminance`: of a wedge under each light, relative.
@@ -91,7 +92,7 @@ private:
     template <std::size_t lights>
     std::array<StagePicture, lights> cells() const;
 
-    const TexturedLight& light_;
+    std::span<const TexturedLight> textures_;
     const StageCamera& camera_;
     std::span<const glm::vec3> positions_;
     std::span<const glm::vec2> uvs_;

@@ -33,9 +33,11 @@ public:
     using FoldPicture = FoldPictureOf<channels>;
     using Point = LitPointOf<channels>;
 
-    // `lights`: by tree. Refers to both.
-    TextureChange(const vdtree::SoundTree& tree, std::span<const TexturedLight> lights)
-        : tree_(tree), lights_(lights), texture_(*lights.front().texture), densities_(tree, texture_) {
+    // `lights`: by luminance. `has_colours`: the luminances are the primaries, each with its own texture, and what is
+    // compared is as_luminances() of these. Refers to all but the last.
+    TextureChange(const vdtree::SoundTree& tree, std::span<const TexturedLight> lights, const TextureDetail& texture,
+                  bool has_colours)
+        : tree_(tree), lights_(lights), texture_(texture), has_colours_(has_colours), densities_(tree, texture_) {
         vdtree::TreeParts parts(links_of(*tree.data().geometry));
         parts.assign_triangles(tree.first_triangle(), tree.triangles());
         footprints_ = bound_footprints(*tree.data().geometry, parts);
@@ -71,9 +73,9 @@ public:
         const float t0 = texture_.at(here.level[0], {a[u_channel], a[v_channel]}),
                     t1 = texture_.at(here.level[0], {b[u_channel], b[v_channel]});
         const float weight = over_local_mean(here.middle, (t0 + t1) / 2);
-        for (std::size_t k = 0; k < luminances; ++k)
-            found.luminance[k] =
-                weight * std::abs(lights_[k].with_texture(a[k], t0) - lights_[k].with_texture(b[k], t1));
+        const auto was = shown(a.data(), {a[u_channel], a[v_channel]}, here.level[0], t0),
+                   is = shown(b.data(), {b[u_channel], b[v_channel]}, here.level[0], t1);
+        for (std::size_t k = 0; k < luminances; ++k) found.luminance[k] = weight * std::abs(was[k] - is[k]);
     }
 
     // Puts the texture on the mesh's pictures, once they are drawn.
@@ -148,6 +150,19 @@ private:
         return std::max(1.0f, (middle + FoldStage::black) / (local_mean + FoldStage::black));
     }
 
+    // What the texture leaves of a point's luminances. `texture`: its luminance there.
+    std::array<float, luminances> shown(const float* own, glm::vec2 uv, std::size_t level, float texture) const {
+        std::array<float, luminances> all;
+        for (std::size_t k = 0; k < luminances; ++k)
+            all[k] = lights_[k].with_texture(own[k], has_colours_ ? lights_[k].texture->at(level, uv) : texture);
+        if constexpr (luminances == 3)
+            if (has_colours_) {
+                const glm::vec3 seen = as_luminances(glm::vec3(all[0], all[1], all[2]));
+                all = {seen.x, seen.y, seen.z};
+            }
+        return all;
+    }
+
     float slide_between(float u0, float v0, float u1, float v1) const {
         const glm::vec2 size = texture_.size();
         const float slide = std::max(std::abs(u1 - u0) * size.x, std::abs(v1 - v0) * size.y);
@@ -161,9 +176,12 @@ private:
         for (std::size_t cell = 0; cell < of.height.size(); ++cell) {
             if (textures) (*textures)[cell] = 0;
             if (!FoldPicture::is_seen(of.height[cell])) continue;
-            const float texture = texture_.at(level, {of.luminance[u_channel][cell], of.luminance[v_channel][cell]});
-            for (std::size_t i = 0; i < luminances; ++i)
-                of.luminance[i][cell] = lights_[i].with_texture(of.luminance[i][cell], texture);
+            const glm::vec2 uv(of.luminance[u_channel][cell], of.luminance[v_channel][cell]);
+            const float texture = texture_.at(level, uv);
+            std::array<float, luminances> own;
+            for (std::size_t i = 0; i < luminances; ++i) own[i] = of.luminance[i][cell];
+            const auto seen = shown(own.data(), uv, level, texture);
+            for (std::size_t i = 0; i < luminances; ++i) of.luminance[i][cell] = seen[i];
             if (textures) (*textures)[cell] = texture;
         }
     }
@@ -174,6 +192,7 @@ private:
     const vdtree::SoundTree& tree_;
     std::span<const TexturedLight> lights_;
     const TextureDetail& texture_;
+    bool has_colours_;
     TextureDensities densities_;
     std::vector<vdtree::UvBox> footprints_; // by wedge
 };

@@ -25,15 +25,27 @@ std::uint32_t tiles_of(std::uint32_t texels) { return (texels + tile_side - 1) /
 
 TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
     : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
-    Level base{width_, height_, std::vector<float>(texture.texels.size()), {}};
     const glm::dvec3 of_tint(tint);
     const double own = rec709_luminance(of_tint);
+    set_levels([&](std::size_t i) {
+        const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
+        return own > 0 ? rec709_luminance(of_tint * texel) / own : linear_luminance(texture.texels[i]);
+    });
+    for (std::size_t level = 0; level < levels_.size(); ++level) find_contrasts(level);
+}
+
+TextureDetail TextureDetail::of_primary(const TextureView& texture, int primary) {
+    TextureDetail detail(texture.width);
+    detail.height_ = texture.height, detail.wrap_u_ = texture.wrap_u, detail.wrap_v_ = texture.wrap_v;
+    detail.set_levels([&](std::size_t i) { return linear_colour(texture.texels[i])[primary]; });
+    return detail;
+}
+
+template <class Value>
+void TextureDetail::set_levels(Value&& value) {
+    Level base{width_, height_, std::vector<float>(std::size_t{width_} * height_), {}};
     parallel_loop(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
-        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
-            const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
-            base.means[i] = static_cast<float>(own > 0 ? rec709_luminance(of_tint * texel) / own
-                                                       : linear_luminance(texture.texels[i]));
-        }
+        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) base.means[i] = static_cast<float>(value(i));
     });
     levels_.push_back(std::move(base));
     while (levels_.back().width > 1 || levels_.back().height > 1) {
@@ -51,7 +63,13 @@ TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
         });
         levels_.push_back(std::move(coarse));
     }
-    for (std::size_t level = 0; level < levels_.size(); ++level) find_contrasts(level);
+}
+
+void TextureDetail::include_colours(std::span<const std::shared_ptr<const TextureDetail>> primaries) {
+    for (std::size_t level = 0; level < levels_.size(); ++level) {
+        levels_[level].tiles.clear();
+        find_contrasts(level, primaries);
+    }
 }
 
 TextureDetail TextureDetail::stand_in(float mean) {
@@ -81,7 +99,8 @@ TextureDetail TextureDetail::stand_in(float mean) {
     return noise;
 }
 
-void TextureDetail::find_contrasts(std::size_t number) {
+void TextureDetail::find_contrasts(std::size_t number,
+                                   std::span<const std::shared_ptr<const TextureDetail>> primaries) {
     Level& level = levels_[number];
     const Level* const next = number + 1 < levels_.size() ? &levels_[number + 1] : nullptr;
     Tiles tiles{tiles_of(level.width), tiles_of(level.height), {}};
@@ -91,7 +110,18 @@ void TextureDetail::find_contrasts(std::size_t number) {
             for (std::uint32_t x = 0; x < level.width; ++x) {
                 if (!next) continue; // one texel: nothing varies
                 const float low = bilinear(*next, (x + 0.5) / level.width, (y + 0.5) / level.height);
-                const float detail = std::abs(level.means[std::size_t{y} * level.width + x] - low);
+                const std::size_t texel = std::size_t{y} * level.width + x;
+                float detail = std::abs(level.means[texel] - low);
+                if (!primaries.empty()) {
+                    glm::vec3 by;
+                    for (int k = 0; k < 3; ++k) {
+                        const auto& levels = primaries[static_cast<std::size_t>(k)]->levels_;
+                        by[k] = levels[number].means[texel] -
+                                bilinear(levels[number + 1], (x + 0.5) / level.width, (y + 0.5) / level.height);
+                    }
+                    const glm::vec3 seen = as_luminances(by);
+                    detail = glm::length(glm::vec3(detail, seen.y, seen.z));
+                }
                 float& largest = tiles.largest[std::size_t{row} * tiles.width + x / tile_side];
                 largest = std::max(largest, detail / (low + FoldStage::black));
             }

@@ -2,6 +2,7 @@
 // which level around a place, what it makes of vertices, and how densely it lies on the surface.
 #pragma once
 
+#include <unseen/perception/internal/chroma.h>
 #include <unseen/vdtree/internal/simd.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/vertex_tree.h>
@@ -15,6 +16,9 @@ public:
     // Takes a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count).
     // Cost: some passes over the texels; 6 bytes of memory for each.
     explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
+
+    // Likewise, what the texture shows of one primary: 0 red, 1 green, 2 blue. Without contrasts.
+    static TextureDetail of_primary(const vdtree::TextureView& texture, int primary);
 
     // In place of images that are not known, such as normal maps: noise of this mean, of measurement::usual_contrast in
     // each octave. Cost: some passes over its texels.
@@ -34,6 +38,9 @@ public:
     // about a display's black.
     float contrast(std::size_t level, const vdtree::UvBox& box) const;
 
+    // Raises the contrasts by what the primaries of the same texture differ in colour.
+    void include_colours(std::span<const std::shared_ptr<const TextureDetail>> primaries);
+
 private:
     struct Tiles { // of some texels a side, the largest contrast in each
         std::uint32_t width, height;
@@ -49,7 +56,9 @@ private:
     };
 
     explicit TextureDetail(std::uint32_t side) : width_(side), height_(side), wrap_u_(), wrap_v_() {}
-    void find_contrasts(std::size_t level);
+    template <class Value>
+    void set_levels(Value&& value); // value(texel): of the finest
+    void find_contrasts(std::size_t level, std::span<const std::shared_ptr<const TextureDetail>> primaries = {});
     float nearest_outside(const Level& level, float x, float y) const;
     float bilinear(const Level& level, double u, double v) const;
     static std::size_t runs_of(float lo, float hi, std::uint32_t size, vdtree::Wrap wrap, Run (&runs)[2]);

@@ -20,6 +20,9 @@ struct SceneLuminance {
     float brightest = 1;
     // What the model as a whole is seen against; default: anything in the scene.
     std::optional<vdtree::LuminanceRange> behind = {};
+    // How far apart the colours in it are, as a difference of luminance that is seen as well (colour_reach()); what the
+    // tree itself shows counts in any case.
+    float colour = 0;
     bool operator==(const SceneLuminance&) const = default;
 };
 
@@ -61,12 +64,7 @@ struct FoldTestOptions {
     // In the window, from the top left; may lie outside. Default: foveal everywhere.
     std::optional<glm::dvec2> gaze_px = {};
     std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: of default_person
-    // The Luebke-Hallen tests also look at colour, if the tree has any. They fold where
-    //   sqrt((c S)^2 + (c_rg S_rg)^2 + (c_yv S_yv)^2) <= 1,
-    // with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. Cost:
-    // one more pass over the tree.
-    bool chroma = false;
-    FoldModel model = {}; // factors of the test by errors
+    FoldModel model = {};                     // factors of the test by errors
 };
 
 // All tests are in distance form. A criterion depends on the field, the window, the options, and on whether there is a
@@ -86,10 +84,14 @@ struct FoldTestOptions {
 //
 // Contrast is rounded up to a 48th of an octave, luminance to sixteenths of the display's range, eccentricity down to
 // quarters of a degree; the magnification is the window's largest. So a fold costs no less than above, and a cut keeps at
-// most about one per cent more triangles. With chroma, classes are coarser.
+// most about one per cent more triangles.
 //
-// Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze. Also
-// fails if chroma is asked for and the tree has a texture, whose colours are not known; so does the next test.
+// Where vertices have colours and there is no texture, both Luebke-Hallen tests fold where
+//   sqrt((c S)^2 + (c_rg S_rg)^2 + (c_yv S_yv)^2) <= 1,
+// with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. Classes are
+// coarser then. The colours of textures are not looked at.
+//
+// Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
 

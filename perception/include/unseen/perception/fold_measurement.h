@@ -20,15 +20,18 @@ namespace unseen::perception {
 // A criterion decides what the numbers mean for an eye. This is a measurement, not a bound over all cuts: neighbours may
 // be folded in other ways, and there are few cells and points.
 //
-// Fails if check() does, and if knows_texture() is false. Cost: a second, and some 25 us a node, two to four times as
+// Where anything has a colour (vertices or texels), red-green and yellow-violet differences are measured beside luminance, and
+// what is kept is what they come to together: chroma counts as so much luminance as is seen as well, by fixed ratios.
+//
+// Fails if check() does. Cost: a second, and some 25 us a node, two to four times as
 // much with texture coordinates; in parallel. No step is quadratic in the triangles around a vertex or in overlapping triangles.
 // The result does not depend on the threads (0: all cores). Progress can cancel.
 Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0,
                                          const Progress& progress = {});
 
-// False if the tree has a texture over vertices of several hues: they give one texel different luminances, which is not
-// measured. Cost: a pass over the nodes of a tree with colours and a texture.
-bool knows_texture(const vdtree::VertexTree& tree);
+// Whether what folds change can be measured under lights: false if the tree has a texture over vertices of several hues,
+// which give one texel different luminances. Cost: a pass over the nodes of a tree with colours and a texture.
+bool knows_lit_texture(const vdtree::VertexTree& tree);
 
 // Whether a tree comes from measure_folds(). Values from files are checked when a criterion is made.
 bool has_fold_measurement(const vdtree::VertexTree& tree);

@@ -111,8 +111,7 @@ struct LoadOptions {
     std::optional<float> crease = {};     // degrees, for meshes; see vdtree::BuildOptions
     std::vector<Protection> protect = {}; // of meshes; in scenes borders and materials
     double unit_metres = 1;               // world units (metres) in a mesh unit; above 0. For Scene::load()
-    // For meshes: measure what folds change (see measured()), if the tree has at most two million folds and the test
-    // `error` can handle its texture (perception::knows_texture()).
+    // For meshes: measure what folds change (see measured()), if the tree has at most two million folds.
     bool measures = true;
     bool conserves_light = false; // for meshes: the light of a measured tree, even if nothing is measured
     CacheOptions cache = {};      // for trees of meshes and for measurements

@@ -90,7 +90,6 @@ enum class Purpose {
 struct Request {
     Goal goal = {};
     std::optional<FoldTest> fold_test = {};  // default: one that suits the scene and the goal, see Plan
-    bool chroma = false;                     // changes of colour count, too, not only those of luminance
     std::optional<double> milliseconds = {}; // time limit: the best cut found in it; 0 or more
     float hysteresis = 1.1f; // for budgets in followers: the largest cost may exceed the least by this factor, 1..2
     Purpose purpose = Purpose::mesh;

@@ -1,8 +1,11 @@
 // Colour beside luminance, in the two opponent directions in which eyes see it.
 #pragma once
 
+#include <cmath>
+
 #include <glm/common.hpp>
 
+#include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/vertex_tree.h>
 
 namespace unseen::perception {
@@ -17,6 +20,19 @@ namespace unseen::perception {
 constexpr glm::dvec2 opponent_chroma(glm::dvec3 rgb) {
     return {0.12104624328257559 * rgb.r - 0.08561811545777649 * rgb.g - 0.0354281278247991 * rgb.b,
             -0.20453379289306542 * rgb.r - 0.5968319963708706 * rgb.g + 0.801365789263936 * rgb.b};
+}
+
+// How many times as well as a difference of luminance the same difference of chroma is seen, at most where folds are
+// judged: castleCSF's sensitivities from 2 to 8 cpd and 5 to 100 cd/m2, within 15 degrees of the gaze. Above, at lower
+// luminances and farther out the ratio may be larger; the judge shows what that comes to (docs/evidence.md).
+inline constexpr glm::dvec2 chroma_over_luminance(2, 0.5);
+
+// Linear RGB as three numbers of which the root of the sum of squares counts as luminance does: the luminance, and what
+// the chroma is as good as.
+template <class T>
+constexpr glm::vec<3, T> as_luminances(const glm::vec<3, T>& rgb) {
+    const glm::dvec2 chroma = chroma_over_luminance * opponent_chroma(glm::dvec3(rgb));
+    return {rec709_luminance(rgb), static_cast<T>(chroma.x), static_cast<T>(chroma.y)};
 }
 
 // The range in both directions, by component.
@@ -35,8 +51,23 @@ bool has_chroma(const vdtree::VertexTree& tree);
 // pays nothing. Fails where VertexTree::check() does.
 Result<std::vector<ChromaRange>> ring_chroma(const vdtree::VertexTree& tree);
 
-// How a vertex is drawn: its colour scaled to its luminance.
+// Whether anything that is drawn has a colour: vertices, or texels whose codes differ by more than compression makes of
+// greys. Cost: a pass over both at most.
+bool has_colours(const vdtree::VertexTree& tree);
+
+// How a vertex is drawn: its colour scaled to its luminance; grey where the colour has none.
+glm::vec3 drawn_colour(const glm::vec4& colour, float luminance);
 glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance);
+
+// As a difference of luminance that is seen as well.
+inline float as_luminance(const ChromaRange& range) {
+    const glm::vec2 difference = glm::vec2(chroma_over_luminance) * (range.hi - range.lo);
+    return std::sqrt(difference.x * difference.x + difference.y * difference.y);
+}
+
+// The chromas of all that a tree draws, and of grey. Textures count as on the brightest vertex. Cost: a pass over the
+// vertices and texels.
+ChromaRange colour_reach(const vdtree::VertexTree& tree);
 
 inline ChromaRange unite(const ChromaRange& a, const ChromaRange& b) {
     return {glm::min(a.lo, b.lo), glm::max(a.hi, b.hi)};
