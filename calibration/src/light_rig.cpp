@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 
@@ -274,6 +275,20 @@ vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, co
         lighting.lights.push_back(source);
     }
     return lighting;
+}
+
+LightRig::Stretch LightRig::stretch_at(double seconds) const {
+    constexpr double most_degrees = 15, parts_of_way = 8;
+    double length = std::numeric_limits<double>::infinity();
+    for (const Light& light : lights_) {
+        if (light.degrees_per_second != 0) length = std::min(length, most_degrees / std::abs(light.degrees_per_second));
+        for (std::size_t i = 1; i < light.keys.size(); ++i)
+            length = std::min(length, (light.keys[i].seconds - light.keys[i - 1].seconds) / parts_of_way);
+    }
+    if (!(length > 0) || !std::isfinite(length)) return {0, seconds, seconds};
+    constexpr double most_stretches = 1e15; // counted exactly
+    const double number = std::clamp(std::floor(seconds / length), -most_stretches, most_stretches);
+    return {static_cast<std::int64_t>(number), number * length, (number + 1) * length};
 }
 
 std::string LightRig::description() const {

@@ -562,7 +562,11 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
     write_text(path("turning.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1],
                 "intensity": 0.8, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 10}}]})");
     EXPECT_THAT(fold_test(simplify({"--lights", "turning.json"})),
-                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know lights that move")));
+                AllOf(StartsWith("error:"), HasSubstr("from whichever side the lights come")));
+    write_text(path("shadows.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1],
+                "intensity": 0.8, "shadow": true, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 10}}]})");
+    EXPECT_THAT(fold_test(simplify({"--lights", "shadows.json"})),
+                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("shadows of lights that move")));
 }
 
 // The ball in red and green of one luminance, with an alpha for all vertices.

@@ -22,6 +22,14 @@ bool has_lit_errors(const Sight& sight) {
     return sight.cache.lit_folds || perception::has_lit_folds(sight.object.tree);
 }
 
+// Why the test `error` cannot look at lights that move; null where it can, or where they stand still.
+const char* why_lights_are_not_known(const Sight& sight) {
+    if (!sight.lighting || sight.lights->stands_still()) return nullptr;
+    if (!sight.stretch) return "the test error does not know lights that go with the camera";
+    if (casts_shadows(sight)) return "the test error does not know shadows of lights that move";
+    return nullptr;
+}
+
 struct Choice {
     FoldTest test = FoldTest::error;
     std::string_view why = {};
@@ -30,8 +38,7 @@ struct Choice {
 // Chooses a perceptual test that handles this scene.
 Choice suitable_test(Sight& sight, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
-    if (sight.lighting && !sight.lights->stands_still())
-        return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
+    if (const char* const why = why_lights_are_not_known(sight)) return {FoldTest::luebke_hallen_safe, why};
     if (sight.lighting && sight.lighting->specular > 0)
         return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
     if (sight.lighting && !knows_lit_texture(sight))
@@ -50,11 +57,15 @@ Choice suitable_test(Sight& sight, bool may_measure) {
 // Whether a test knows what it would have to look at.
 Result<void> check_knowledge(Sight& sight, FoldTest test, bool shown) {
     if (!is_perceptual(test)) return {};
-    if (sight.lighting && test == FoldTest::error && (!sight.lights->stands_still() || sight.lighting->specular > 0))
+    if (sight.lighting && test == FoldTest::error && sight.lighting->specular > 0)
         return invalid_field(
-            "{request.fold_test = }{} knows only lights of {scene.lights} that stand still and make no "
-            "highlights: use {request.fold_test = }luebke-hallen-safe.",
+            "{request.fold_test = }{} knows only lights of {scene.lights} that make no highlights: use "
+            "{request.fold_test = }luebke-hallen-safe.",
             {name_of(test)});
+    if (const char* const why = why_lights_are_not_known(sight); why && test == FoldTest::error)
+        return invalid_field("{request.fold_test = }{} cannot be taken under {scene.lights}, for {}: use "
+                             "{request.fold_test = }luebke-hallen-safe.",
+                             {name_of(test), why});
     if (sight.lighting && shown && test != FoldTest::error)
         return invalid_field("{request.shown} and {scene.lights} go together with {request.fold_test = }error alone.");
     if (sight.lighting && test == FoldTest::error && !knows_lit_texture(sight))

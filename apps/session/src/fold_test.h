@@ -61,7 +61,8 @@ struct Key {
     double pixels = 0; // of the others than perceptual tests; and of these alone:
     std::optional<double> farthest_gaze_px = {};
     perception::SceneLuminance scene = {0, 0};
-    std::shared_ptr<const vdtree::Lighting> still_lights = {}; // of the test by errors
+    std::shared_ptr<const vdtree::Lighting> still_lights = {};         // of the test by errors, as the next
+    std::shared_ptr<const std::vector<vdtree::Lighting>> stretch = {}; // of lights that move
     bool is_lit = false;
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     vdtree::View lens = {};

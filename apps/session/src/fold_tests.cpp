@@ -59,16 +59,20 @@ Criterion make_error(Sight& sight, const Decision& decision, const Key& key) {
     };
     const vdtree::VertexTree& tree = sight.object.tree;
     if (!sight.lighting) return by_errors(tree);
-    const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
-    if (!lit) return lit.error();
-    if (!casts_shadows(sight)) return by_errors(*lit);
-    std::vector<perception::TreeAsLit> all;
-    all.push_back({lit->share(), *sight.lighting});
-    for (vdtree::Lighting& left : without_hidden(*sight.lighting)) {
-        const auto darker = sight.cache.lit_folds->under(tree, left);
-        if (!darker) return darker.error();
-        all.push_back({darker->share(), std::move(left)});
+    std::vector<vdtree::Lighting> lightings; // of which the worst counts
+    if (sight.stretch) {
+        lightings = *sight.stretch;
+    } else {
+        lightings = without_hidden(*sight.lighting);
+        lightings.insert(lightings.begin(), *sight.lighting);
     }
+    std::vector<perception::TreeAsLit> all;
+    for (vdtree::Lighting& lighting : lightings) {
+        auto lit = sight.cache.lit_folds->under(tree, lighting);
+        if (!lit) return lit.error();
+        all.push_back({std::move(*lit), std::move(lighting)});
+    }
+    if (all.size() == 1) return by_errors(all.front().tree);
     return by_errors(std::span<const perception::TreeAsLit>(all));
 }
 
@@ -166,7 +170,8 @@ Key key_of(const Sight& sight, const Decision& decision) {
     }
     key.scene = sight.luminance;
     key.is_lit = sight.lighting != nullptr;
-    if (decision.test == FoldTest::error) key.still_lights = sight.lighting;
+    if (decision.test == FoldTest::error && sight.stretch) key.stretch = sight.stretch;
+    else if (decision.test == FoldTest::error) key.still_lights = sight.lighting;
     key.csf = sight.csf;
     if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
     return key;
@@ -179,7 +184,7 @@ perception::FoldTestOptions test_options(const Sight& sight, const Key& key) {
 }
 
 std::shared_ptr<const KeptCriterion>& last_criterion(Sight& sight, const Key& key) {
-    return key.still_lights ? sight.lit_criterion : sight.cache.criterion;
+    return key.still_lights || key.stretch ? sight.lit_criterion : sight.cache.criterion;
 }
 
 } // namespace unseen::session

@@ -130,8 +130,8 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
-      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()),
-      shown_criteria_(scene.objects.size()), scene_shadows_{scene, caches} {
+      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_stretches_(scene.objects.size()),
+      lit_criteria_(scene.objects.size()), shown_criteria_(scene.objects.size()), scene_shadows_{scene, caches} {
     share_caches();
     constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
     std::uint64_t nodes = 0;
@@ -182,6 +182,23 @@ Result<SharedLighting> Session::State::lighting(const vdtree::View& view, std::s
     return SharedLighting(std::move(shared));
 }
 
+Session::State::LitStretch* Session::State::stretch_of(const vdtree::View& view, std::size_t object) {
+    constexpr std::size_t most_kept = 64; // of an object: a few megabytes for 100,000 nodes each
+    if (!scene.lights->moves() || scene.lights->follows_camera()) return nullptr;
+    const calibration::LightRig::Stretch stretch = scene.lights->stretch_at(seconds);
+    auto& known = lit_stretches_[object];
+    if (known.size() >= most_kept && !known.contains(stretch.number)) known.clear();
+    LitStretch& own = known[stretch.number];
+    if (!own.lightings) {
+        std::vector<vdtree::Lighting> lightings;
+        for (const double at : {stretch.begin, (stretch.begin + stretch.end) / 2, stretch.end})
+            lightings.push_back(
+                scene.lights->at(at, scene.objects[object].tree, view, scene.objects[object].placement));
+        own.lightings = std::make_shared<const std::vector<vdtree::Lighting>>(std::move(lightings));
+    }
+    return &own;
+}
+
 // Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be
 // another one.
 perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>& sights) const {
@@ -194,9 +211,15 @@ perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>
         colours = perception::unite(colours, *own_colours);
         perception::SceneLuminance own{tree.luminance_range().lo, tree.luminance_range().hi,
                                        vdtree::LuminanceRange{background, background}};
-        if (sight.lighting)
-            own = perception::lit_scene(tree, *sight.cache.light_bounds, *sight.lighting,
-                                        vdtree::eye_in_tree(tree, sight.view, sight.object.placement), background);
+        const auto include_lit = [&](const vdtree::Lighting& lighting) {
+            const auto lit =
+                perception::lit_scene(tree, *sight.cache.light_bounds, lighting,
+                                      vdtree::eye_in_tree(tree, sight.view, sight.object.placement), background);
+            own.darkest = std::min(own.darkest, lit.darkest), own.brightest = std::max(own.brightest, lit.brightest);
+        };
+        if (sight.lighting) own = {background, background};
+        if (sight.stretch) std::ranges::for_each(*sight.stretch, include_lit); // the same all along it
+        else if (sight.lighting) include_lit(*sight.lighting);
         all.darkest = std::min(all.darkest, own.darkest);
         all.brightest = std::max(all.brightest, own.brightest);
         if (sights.size() == 1 && scene.backdrop.empty()) all.behind = own.behind;
@@ -277,14 +300,16 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view, Shadow
         if (view.orthographic_height && *lit && vdtree::shadow_lights(**lit) > 0)
             return unsupported("Where shadows are seen is not known of orthographic views: switch them off, or look "
                                "at the scene in perspective.");
+        LitStretch* const stretch = *lit ? stretch_of(view, i) : nullptr;
         if (*lit && !caches[i]->light_bounds) {
             auto bounds = vdtree::LightBounds::measure(scene.objects[i].tree);
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], i, *caches[i], lit_criteria_[i], shown_criteria_[i], scene_shadows_, memory,
-                          observer, view, scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_,
-                          background, is_crowded_});
+        sights.push_back({scene.objects[i], i, *caches[i], stretch ? stretch->criterion : lit_criteria_[i],
+                          shown_criteria_[i], scene_shadows_, memory, observer, view,
+                          scene.lights ? &*scene.lights : nullptr, std::move(*lit),
+                          stretch ? stretch->lightings : nullptr, &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
     if (const auto looked = look_at_backdrop(view); !looked) return looked.error();
@@ -310,6 +335,7 @@ Result<void> Session::State::measure(std::size_t object) {
         scene.objects[i].tree = with_errors->share();
         caches[i].reset();
         lit_criteria_[i].reset();
+        lit_stretches_[i].clear();
         shown_criteria_[i].reset();
         ++tree_count[i];
     }

@@ -1,6 +1,8 @@
 // What a session and its followers share.
 #pragma once
 
+#include <map>
+
 #include "fold_test.h"
 
 namespace unseen::session {
@@ -54,8 +56,16 @@ private:
     std::optional<Moving> moving_;
     std::shared_ptr<const perception::CsfTable> widened_of_;
     std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
-    std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
-    std::vector<std::shared_ptr<const ShownCriteria>> shown_criteria_;  // by object
+    // Lights that move with time, at the beginning, in the middle and at the end of a stretch of it
+    // (LightRig::stretch_at()): the test by errors folds what is invisible under all three.
+    struct LitStretch {
+        std::shared_ptr<const std::vector<vdtree::Lighting>> lightings;
+        std::shared_ptr<const KeptCriterion> criterion;
+    };
+    LitStretch* stretch_of(const vdtree::View& view, std::size_t object); // null where lights stand still
+    std::vector<std::map<std::int64_t, LitStretch>> lit_stretches_;       // by object; by number
+    std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;      // by object
+    std::vector<std::shared_ptr<const ShownCriteria>> shown_criteria_;    // by object
     SceneShadows scene_shadows_;
     bool is_crowded_ = false;
     std::vector<vdtree::Plane> window_;                   // of the last look

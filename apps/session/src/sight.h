@@ -68,18 +68,19 @@ struct Sight {
     const Object& object;
     std::size_t number; // of the object
     ObjectCache& cache;
-    std::shared_ptr<const KeptCriterion>& lit_criterion;  // the object's own, where lights that stand still light it
+    std::shared_ptr<const KeptCriterion>& lit_criterion;  // the object's own, of the test by errors under lights
     std::shared_ptr<const ShownCriteria>& shown_criteria; // the object's own, by what pictures show
     SceneShadows& scene_shadows;
     ShadowMemory& memory;
     const Observer& observer;
     const vdtree::View& view;
-    const calibration::LightRig* lights;              // null: the tree's own light
-    std::shared_ptr<const vdtree::Lighting> lighting; // theirs
-    const std::vector<vdtree::Plane>* window;         // the frustum's planes around the eye, in the world
-    float background;                                 // relative luminance
-    bool is_crowded;                                  // too many nodes to look at all of them under lights
-    perception::SceneLuminance luminance = {};        // of the whole scene
+    const calibration::LightRig* lights;                          // null: the tree's own light
+    std::shared_ptr<const vdtree::Lighting> lighting;             // theirs
+    std::shared_ptr<const std::vector<vdtree::Lighting>> stretch; // see LitStretch; null where lights stand still
+    const std::vector<vdtree::Plane>* window;                     // the frustum's planes around the eye, in the world
+    float background;                                             // relative luminance
+    bool is_crowded;                                              // too many nodes to look at all of them under lights
+    perception::SceneLuminance luminance = {};                    // of the whole scene
     // For the gaze's margin; no gaze where the margin is so wide that everything may be looked at.
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<glm::dvec2> gaze_px = {};

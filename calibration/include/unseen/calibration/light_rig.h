@@ -46,10 +46,19 @@ public:
     vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                         const vdtree::Similarity& placement) const;
 
+    // A stretch of time within which lights move little: none turns around its orbit by more than 15 degrees, or passes more
+    // than an eighth of the way between two keyframes. Stretches follow each other without gaps.
+    struct Stretch {
+        std::int64_t number = 0;
+        double begin = 0, end = 0; // seconds
+    };
+    Stretch stretch_at(double seconds) const; // all of time if nothing moves
+
     std::size_t light_count() const noexcept { return lights_.size(); }
     std::vector<std::size_t> casting() const; // the numbers of lights that cast shadows
 
     bool moves() const noexcept { return moves_; } // with time
+    bool follows_camera() const noexcept { return follows_camera_; }
     // Whether the lights are the same at all times and from everywhere; highlights still follow the eye.
     bool stands_still() const noexcept { return !moves_ && !follows_camera_; }
     std::string description() const; // for people: "1 directional and 2 point lights, ambient 0.1"

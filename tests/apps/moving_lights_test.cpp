@@ -1,0 +1,86 @@
+// Lights that move: the test by errors folds for a stretch of time, and nothing is seen within it.
+#include <fstream>
+
+#include <unseen/session_gpu/picture_judge.h>
+
+#include "built.h"
+#include "measured.h"
+#include "shapes.h"
+#include "temp_folder.h"
+#include "testing.h"
+
+namespace unseen::session::moving_lights_test {
+
+class MovingLights : public testing::Test {
+protected:
+    // Under the lights of a file with this text.
+    Session session_under(const std::string& text) {
+        const auto file = folder_.path() / "lights.json";
+        std::ofstream(file) << text;
+        Scene scene = Scene::of(support::measured(support::built(shapes::bumpy_sphere(5, 0.03))));
+        scene.lights = *calibration::LightRig::read(file);
+        return *Session::create(std::move(scene));
+    }
+    static vdtree::View view_of(const Session& session) {
+        vdtree::View window = session.default_view();
+        window.fov_y_degrees *= 192.0 / window.height;
+        window.width = window.height = 192;
+        return session.frame({0.2, 0.3, 1}, 0.4, window);
+    }
+    void expect_invisible(Session& session, std::initializer_list<double> times) {
+        const vdtree::View view = view_of(session);
+        for (const double seconds : times) {
+            session.set_time(seconds);
+            const auto made = require(session.simplify(view, {.purpose = Purpose::picture}));
+            EXPECT_EQ(made->fold_tests.front(), FoldTest::error);
+            EXPECT_LT(made->stats.triangles, made->source_triangles);
+            auto judge = require(PictureJudge::create(context_, session, view, 64));
+            const auto verdict = require(judge->judge(made->cuts));
+            EXPECT_LT(std::max(verdict->v, verdict->second_v), 1) << seconds;
+        }
+    }
+
+    support::TempFolder folder_;
+    render::Context context_ = *render::Context::headless();
+};
+
+constexpr const char* orbiting = R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [0.4, 0.7, 0.6],
+    "intensity": 0.8, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}}]})";
+constexpr const char* still = R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [0.4, 0.7, 0.6],
+    "intensity": 0.8}]})";
+
+TEST_F(MovingLights, ShowNothingAtAnyTime) {
+    Session session = session_under(orbiting);
+    expect_invisible(session, {0, 0.7, 1.9, 3.3, 4.8});
+}
+
+TEST_F(MovingLights, ShowNothingOnTheirWay) {
+    Session session = session_under(R"({"ambient": 0.05, "lights": [
+        {"type": "point", "position": [3, 0, 3], "intensity": 0.8, "distance": 4,
+         "keyframes": [{"time_s": 0, "position": [3, 0, 3]}, {"time_s": 2, "position": [-3, 1, 2]}]}]})");
+    expect_invisible(session, {0, 0.6, 1.5, 2});
+}
+
+TEST_F(MovingLights, KeepLittleMoreThanLightsThatStandStill) {
+    Session moving = session_under(orbiting), at_rest = session_under(still);
+    const vdtree::View view = view_of(moving);
+    const Request request{.purpose = Purpose::picture};
+    const auto now = require(moving.simplify(view, request)), one = require(at_rest.simplify(view, request));
+    EXPECT_GT(now->stats.triangles, 0.95 * one->stats.triangles);
+    EXPECT_LT(now->stats.triangles, 1.3 * one->stats.triangles);
+    moving.set_time(0.2); // 12 degrees: the same cut
+    EXPECT_EQ(require(moving.simplify(view, request))->stats.triangles, now->stats.triangles);
+    moving.set_time(1);
+    EXPECT_NE(require(moving.simplify(view, request))->stats.triangles, now->stats.triangles);
+    moving.set_time(6); // once around
+    EXPECT_NEAR(require(moving.simplify(view, request))->stats.triangles, now->stats.triangles,
+                0.01 * now->stats.triangles);
+}
+
+TEST_F(MovingLights, ThatGoWithTheCameraTakeTheSafeTest) {
+    Session session = session_under(R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.6}]})");
+    const auto made = require(session.simplify(view_of(session), {}));
+    EXPECT_EQ(made->fold_tests.front(), FoldTest::luebke_hallen_safe);
+}
+
+} // namespace unseen::session::moving_lights_test
