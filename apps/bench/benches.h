@@ -70,7 +70,10 @@ BenchReport bench_fit(const FitOptions& options);
 
 // How models of contrast sensitivity, and observers, compare with people's thresholds (inputs: their table; if empty the
 // checkout's); and the fits to these.
-BenchReport bench_people(const BenchOptions& options);
+struct PeopleOptions : BenchOptions {
+    bool channels = false; // instead: what the judges make of gratings in luminance and in each direction of colour
+};
+BenchReport bench_people(const PeopleOptions& options);
 
 // What masking and occlusion save in scenes, what shows of it, and what discrete levels of detail make of the same. Each
 // scene from its camera, with its lights, judged against the full scene.

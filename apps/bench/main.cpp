@@ -275,8 +275,12 @@ std::vector<Command> verbs(CLI::App& app) {
                        verb.add_flag("--quick", o.quick, "Few views of small meshes: rough figures");
                    }),
         bench_verb(app, "people", "How observers and models of sight compare with people's thresholds, and their fit",
-                   "Examples:\n  unseen-bench people\n  unseen-bench people --table mine.csv --json -", bench_people,
-                   [](CLI::App& verb, BenchOptions& o) {
+                   "Examples:\n  unseen-bench people\n  unseen-bench people --channels\n"
+                   "  unseen-bench people --table mine.csv --json -",
+                   bench_people,
+                   [](CLI::App& verb, PeopleOptions& o) {
+                       verb.add_flag("--channels", o.channels,
+                                     "Instead: what judges see of gratings at thresholds of luminance and of colour");
                        add_value(verb, "--table", o.inputs, CLI::Validator(CLI::ExistingFile).description(""),
                                  "FILE.csv", "The thresholds (default: data/people in the checkout)")
                            ->expected(1);

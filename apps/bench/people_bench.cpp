@@ -1,9 +1,16 @@
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <numbers>
 #include <optional>
+
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include <unseen/calibration/internal/people.h>
 #include <unseen/perception/csf.h>
+#include <unseen/perception/internal/chroma.h>
+#include <unseen/perception/judge.h>
 
 #include "bench_tools.h"
 #include "benches.h"
@@ -141,9 +148,105 @@ BenchTable table_of_fits(const People& people) {
     return table;
 }
 
+// ---- colour
+
+// Linear RGB of a luminance and an opponent chroma.
+glm::dvec3 rgb_of(double luminance, glm::dvec2 chroma) {
+    glm::dmat3 channels; // by primary
+    for (int k = 0; k < 3; ++k) {
+        glm::dvec3 primary(0);
+        primary[k] = 1;
+        channels[k] = glm::dvec3(rec709_luminance(primary), perception::opponent_chroma(primary));
+    }
+    return glm::inverse(channels) * glm::dvec3(luminance, chroma);
+}
+
+struct Gabor {
+    double freq_cpd, cdm2, contrast;
+    int direction; // 0: luminance, 1: red-green, 2: yellow-violet
+};
+constexpr double radius_cycles = 1.5; // of the envelope's standard deviation, as of patch_area()
+
+perception::Image draw(const Gabor& g, int side, double ppd) {
+    perception::Image image{side, side, 3, {}};
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            const double right = (x - side / 2) / ppd, down = (y - side / 2) / ppd, sigma = radius_cycles / g.freq_cpd;
+            const double change = g.cdm2 * g.contrast * std::cos(2 * std::numbers::pi * g.freq_cpd * right) *
+                                  std::exp(-(right * right + down * down) / (2 * sigma * sigma));
+            glm::dvec3 by(0);
+            by[g.direction] = change;
+            const glm::dvec3 rgb = rgb_of(g.cdm2 + by[0], {by[1], by[2]});
+            for (int k = 0; k < 3; ++k) image.values.push_back(static_cast<float>(rgb[k]));
+        }
+    return image;
+}
+
+// What the judges of the median person make of gratings at the threshold that castleCSF has for them.
+BenchTable table_of_channels() {
+    BenchTable table{
+        "V of gratings at castleCSF's thresholds, by the judges for the median person: 0.5 to 8 cpd, 5 to 100 "
+        "cd/m2, 0 and 10 degrees aside",
+        {{"direction", "direction"},
+         {"judge", "judge"},
+         {"gratings", "count"},
+         {"median V", "median"},
+         {"least", "least"},
+         {"largest", "largest"},
+         {"within 3 dB", "share_within_3_db"}}};
+    constexpr CsfModel branches[] = {CsfModel::castle, CsfModel::castle_red_green, CsfModel::castle_yellow_violet};
+    constexpr const char* names[] = {"luminance", "red-green, of one luminance", "yellow-violet, of one luminance"};
+    const perception::Display display;
+    const double ppd = perception::pixels_per_degree(display).value();
+    for (int direction = 0; direction < 3; ++direction)
+        for (const bool is_second : {false, true}) {
+            std::vector<double> all;
+            for (const double freq : {0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.5, 8.0})
+                for (const double cdm2 : {5.0, 20.0, 100.0})
+                    for (const double aside : {0.0, 10.0}) {
+                        const int side = std::max(256, static_cast<int>(5 * radius_cycles / freq * ppd) / 2 * 2);
+                        Stimulus s;
+                        s.frequency = perception::CyclesPerDegree(freq);
+                        s.luminance = perception::Luminance(cdm2);
+                        s.eccentricity = perception::Degrees(aside);
+                        s.area = perception::patch_area(s.frequency);
+                        const double contrast = 1 / perception::sensitivity(branches[direction], s);
+                        constexpr double most[] = {1, 0.1, 0.8}; // that colours of a display have
+                        if (contrast > most[direction]) continue;
+                        std::optional<glm::dvec2> gaze;
+                        if (aside > 0)
+                            gaze = glm::dvec2(side / 2 + std::tan(aside * std::numbers::pi / 180) *
+                                                             display.distance.value() / display.pixel_pitch.value(),
+                                              side / 2);
+                        const perception::JudgeOptions options =
+                            is_second ? perception::second_judge_options(perception::median_person, display, gaze)
+                                      : perception::JudgeOptions{.display = display,
+                                                                 .gaze_px = gaze,
+                                                                 .gain = perception::median_person.gain};
+                        all.push_back(require(perception::judge_modern(
+                                                  draw({freq, cdm2, 0, direction}, side, ppd),
+                                                  draw({freq, cdm2, contrast, direction}, side, ppd), options))
+                                          .max_ratio);
+                    }
+            std::ranges::sort(all);
+            const double three_decibels = std::pow(10.0, 3.0 / 20);
+            const auto within =
+                std::ranges::count_if(all, [&](double v) { return v > 1 / three_decibels && v < three_decibels; });
+            table.rows.push_back({std::string(names[direction]),
+                                  std::string(is_second ? "second" : "modern"),
+                                  {std::to_string(all.size()), all.size()},
+                                  number(all[all.size() / 2], 3),
+                                  number(all.front(), 3),
+                                  number(all.back(), 3),
+                                  percent(static_cast<double>(within) / static_cast<double>(all.size()), 3)});
+        }
+    return table;
+}
+
 } // namespace
 
-BenchReport bench_people(const BenchOptions& options) {
+BenchReport bench_people(const PeopleOptions& options) {
+    if (options.channels) return {{table_of_channels()}};
     const std::string file = options.inputs.empty() ? find_in_checkout("data/people/achromatic_thresholds.csv").string()
                                                     : options.inputs.front();
     const People people = calibration::within_domain(require(calibration::read_sensitivities(file)));

@@ -194,6 +194,7 @@ Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::Buil
     ProgressBar bar("building");
     options.progress = std::ref(bar);
     options.dropped_before = read.dropped_triangles;
+    options.prelit |= read.is_unlit;
     return build ? build(read.mesh.view(), options) : vdtree::build_tree(read.mesh.view(), options);
 }
 

@@ -569,10 +569,10 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
                 AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("shadows of lights that move")));
 }
 
-// The ball in red and green of one luminance, with an alpha for all vertices.
+// The ball in red and green of one luminance, or in a grey of it, with an alpha for all vertices.
 class PaintedBallTest : public SimplifyTest {
 protected:
-    void paint(float alpha) {
+    void paint(float alpha, bool is_grey = false) {
         std::istringstream grey(read_text(write_ball("ball.obj")));
         std::string painted;
         int vertex = 0;
@@ -581,7 +581,10 @@ protected:
             if (line.rfind("v ", 0) == 0) {
                 ++vertex;
                 // sRGB of linear (0.44, 0.2586, 0.24) and (0.16, 0.3297, 0.36): both of the luminance 0.296
-                line += (is_red ? " 0.6944 0.5455 0.5271 " : " 0.4366 0.6095 0.6343 ") + std::to_string(alpha);
+                line += (is_grey  ? " 0.5806 0.5806 0.5806 "
+                         : is_red ? " 0.6944 0.5455 0.5271 "
+                                  : " 0.4366 0.6095 0.6343 ") +
+                        std::to_string(alpha);
             }
             painted += line + "\n";
         }
@@ -592,7 +595,8 @@ protected:
 
 TEST_F(PaintedBallTest, ColourKeepsWhatLuminanceFolds) {
     const std::vector<std::string> tests = {"error", "luebke-hallen", "luebke-hallen-safe"};
-    std::vector<int> grey; // the ball as it was
+    paint(1, true);
+    std::vector<int> grey;
     for (const std::string& test : tests) {
         const Json report = simplify({"--fold-test", test});
         EXPECT_EQ(effect_named(report, "colour")["on"], false);
@@ -607,10 +611,10 @@ TEST_F(PaintedBallTest, ColourKeepsWhatLuminanceFolds) {
 }
 
 TEST_F(PaintedBallTest, KeepsWhatTheSceneMayShowThrough) {
-    paint(1);
+    paint(1, true);
     const Json opaque = simplify({});
     EXPECT_EQ(effect_named(opaque, "translucency")["on"], false);
-    paint(0.5f);
+    paint(0.5f, true);
     const Json translucent = simplify({});
     EXPECT_EQ(effect_named(translucent, "translucency")["on"], true);
     EXPECT_GT(translucent["triangles"].get<int>(), opaque["triangles"].get<int>() * 5 / 4);

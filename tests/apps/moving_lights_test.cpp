@@ -23,9 +23,9 @@ protected:
     }
     static vdtree::View view_of(const Session& session) {
         vdtree::View window = session.default_view();
-        window.fov_y_degrees *= 192.0 / window.height;
-        window.width = window.height = 192;
-        return session.frame({0.2, 0.3, 1}, 0.4, window);
+        window.fov_y_degrees *= 128.0 / window.height;
+        window.width = window.height = 128;
+        return session.frame({0.2, 0.3, 1}, 0.6, window);
     }
     void expect_invisible(Session& session, std::initializer_list<double> times) {
         const vdtree::View view = view_of(session);
@@ -51,14 +51,14 @@ constexpr const char* still = R"({"ambient": 0.1, "lights": [{"type": "direction
 
 TEST_F(MovingLights, ShowNothingAtAnyTime) {
     Session session = session_under(orbiting);
-    expect_invisible(session, {0, 0.7, 1.9, 3.3, 4.8});
+    expect_invisible(session, {0, 1.9, 4.8});
 }
 
 TEST_F(MovingLights, ShowNothingOnTheirWay) {
     Session session = session_under(R"({"ambient": 0.05, "lights": [
         {"type": "point", "position": [3, 0, 3], "intensity": 0.8, "distance": 4,
          "keyframes": [{"time_s": 0, "position": [3, 0, 3]}, {"time_s": 2, "position": [-3, 1, 2]}]}]})");
-    expect_invisible(session, {0, 0.6, 1.5, 2});
+    expect_invisible(session, {0, 1.5, 2});
 }
 
 TEST_F(MovingLights, KeepLittleMoreThanLightsThatStandStill) {

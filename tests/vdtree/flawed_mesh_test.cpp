@@ -216,10 +216,10 @@ const std::vector<Case>& cases() {
         {"what nobody draws",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "", R"(
              {"normalTexture":{"index":0},"emissiveFactor":[0,0,0],"alphaMode":"BLEND","extensions":{
-              "KHR_materials_ior":{"ior":1.5},"KHR_materials_unlit":{}}})")}},
+              "KHR_materials_ior":{"ior":1.5},"KHR_materials_clearcoat":{}}})")}},
          "a.glb",
          1,
-         {"of KHR_materials_unlit, normal maps and translucency by the alpha of images is not drawn"},
+         {"of KHR_materials_clearcoat, normal maps and translucency by the alpha of images is not drawn"},
          picture},
         {"a cut-off that is no number",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",
@@ -280,6 +280,19 @@ TEST(FlawedMesh, CanBeWrittenAgain) {
             }
             fs::remove_all(folder / "out");
         }
+    }
+}
+
+// Materials that no light changes make a mesh whose colours are its light.
+TEST(FlawedMesh, IsUnlitWhereAllMaterialsAre) {
+    for (const bool is_unlit : {false, true}) {
+        const support::TempFolder folder;
+        write(folder.path(),
+              {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",
+                             is_unlit ? R"({"extensions":{"KHR_materials_unlit":{}}})" : "{}")}});
+        const auto read = require(meshio::read_mesh(folder / "a.glb"));
+        EXPECT_EQ(read->is_unlit, is_unlit);
+        EXPECT_TRUE(read->warnings.empty()) << in_lines(read->warnings);
     }
 }
 

@@ -78,7 +78,7 @@ Result<vdtree::VertexTree> build(const fs::path& file, const LoadOptions& option
     vdtree::BuildOptions building;
     building.progress = options.messages.progress;
     building.dropped_before = read->dropped_triangles;
-    building.prelit = options.prelit;
+    building.prelit = options.prelit || read->is_unlit;
     building.crease = options.crease;
     building.border_weight = border_weight(options.protect);
     auto tree = vdtree::build_tree(read->mesh.view(), building);

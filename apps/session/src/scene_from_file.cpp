@@ -89,7 +89,7 @@ private:
         const bool is_measured = !is_lit_ && part.folds;
         vdtree::BuildOptions building;
         building.dropped_before = (*read)->dropped_triangles;
-        building.prelit = options_.prelit;
+        building.prelit = options_.prelit || (*read)->is_unlit;
         building.crease = options_.crease;
         building.border_weight = border_weight(options_.protect);
         const std::string key = mesh_cache_key((*read)->mesh, building, is_measured && options_.measures,

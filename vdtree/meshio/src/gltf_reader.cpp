@@ -123,6 +123,7 @@ public:
         const json& of_file = array_of(document_, "materials")[index];
         where_ = numbered("material", index);
         material.undrawn = undrawn(of_file);
+        material.is_unlit = material.undrawn.erase("KHR_materials_unlit") > 0;
         try {
             const json* surface = optional_object(of_file, "pbrMetallicRoughness");
             if (surface == nullptr) return material;
@@ -606,7 +607,7 @@ ReadResult File::read_all() {
     result.document->files = impl_->images->read_all(lost);
     impl_->scene->read_materials(*impl_->materials, result, lost);
     if (impl_->source.options.images) warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
-    warn_of_undrawn(result.materials, result.mesh.ranges, result.warnings);
+    warn_of_undrawn(result);
     result.warnings.insert(result.warnings.end(), impl_->warnings.begin(), impl_->warnings.end());
     result.document->json = to_text(without_geometry(impl_->document, result.document->files, result.warnings));
     return result;
@@ -618,7 +619,7 @@ ReadResult File::read_mesh(std::size_t mesh, const glm::dmat3& stretch) {
     LostImages lost;
     impl_->scene->read_materials(*impl_->materials, result, lost);
     warn_of_lost_images(lost, result.mesh.ranges, result.warnings);
-    warn_of_undrawn(result.materials, result.mesh.ranges, result.warnings);
+    warn_of_undrawn(result);
     return result;
 }
 

@@ -95,18 +95,27 @@ void warn_of_missing_uvs(std::uint64_t triangles, ReadResult& result) {
         (result.mesh.uvs.empty() ? "; the colour of the material is shown alone." : ", and shows what is at 0, 0."));
 }
 
-void warn_of_undrawn(std::span<const Material> materials, std::span<const MeshRange> ranges,
-                     std::vector<Message>& warnings) {
-    std::set<std::string> used, undrawn;
-    for (const MeshRange& range : ranges)
-        if (range.kind == MeshRange::Kind::material && range.triangle_count > 0) used.insert(range.name);
-    for (const Material& material : materials)
-        if (used.contains(material.name)) undrawn.insert(material.undrawn.begin(), material.undrawn.end());
+void warn_of_undrawn(ReadResult& result) {
+    std::map<std::string, std::uint64_t> used; // triangles of materials
+    for (const MeshRange& range : result.mesh.ranges)
+        if (range.kind == MeshRange::Kind::material && range.triangle_count > 0)
+            used[range.name] += range.triangle_count;
+    std::set<std::string> undrawn;
+    std::uint64_t unlit = 0; // triangles
+    for (const Material& material : result.materials) {
+        const auto found = used.find(material.name);
+        if (found == used.end()) continue;
+        undrawn.insert(material.undrawn.begin(), material.undrawn.end());
+        if (material.is_unlit) unlit += found->second;
+    }
+    result.is_unlit = unlit > 0 && unlit == result.mesh.triangles.size();
+    if (unlit > 0 && !result.is_unlit) undrawn.insert("KHR_materials_unlit beside lit ones");
     if (undrawn.empty()) return;
     std::string all;
     for (auto what = undrawn.begin(); what != undrawn.end(); ++what)
         all += (what == undrawn.begin() ? "" : std::next(what) == undrawn.end() ? " and " : ", ") + *what;
-    warnings.push_back("what materials have of " + all + " is not drawn: what is said of visibility does not know it.");
+    result.warnings.push_back("what materials have of " + all +
+                              " is not drawn: what is said of visibility does not know it.");
 }
 
 void LostImages::add(const Message& why) {

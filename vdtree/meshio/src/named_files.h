@@ -49,9 +49,8 @@ struct LostImages {
 // Warns of triangles of textured materials that have no texture coordinates.
 void warn_of_missing_uvs(std::uint64_t triangles, ReadResult& result);
 
-// Warns of what is not drawn of the materials that triangles have.
-void warn_of_undrawn(std::span<const Material> materials, std::span<const MeshRange> ranges,
-                     std::vector<Message>& warnings);
+// Notes whether all is unlit, and warns of what is not drawn of the materials that triangles have.
+void warn_of_undrawn(ReadResult& result);
 
 // Warns of lost images, with the number of triangles that are drawn without.
 void warn_of_lost_images(const LostImages& lost, std::span<const MeshRange> ranges, std::vector<Message>& warnings);

@@ -399,7 +399,7 @@ private:
             return;
         }
         warn_of_lost_images(library_.lost, ranges(), result_.warnings);
-        warn_of_undrawn(result_.materials, ranges(), result_.warnings);
+        warn_of_undrawn(result_);
         std::set<std::string> textured;
         for (const Material& material : result_.materials)
             if (material.has_image()) textured.insert(material.name);

@@ -144,9 +144,9 @@ perception::Image on_display(int width, int height, int channels, std::span<cons
                              const perception::Display& display) {
     perception::Image image{width, height, channels, {}};
     image.values.reserve(relative.size());
-    for (const float value : relative)
-        image.values.push_back(
-            static_cast<float>(perception::to_luminance(display, static_cast<double>(value)).value()));
+    for (const float value : relative) // no display shows more than its peak
+        image.values.push_back(static_cast<float>(
+            perception::to_luminance(display, std::clamp(static_cast<double>(value), 0.0, 1.0)).value()));
     return image;
 }
 

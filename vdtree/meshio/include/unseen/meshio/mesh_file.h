@@ -61,6 +61,7 @@ struct Material {
     UvMap uv_map = {}; // from the vertices' texture coordinates to those of the image
     // Texels of the image whose alpha is less are not there; none: alpha does not count. Above 1: none of them is.
     std::optional<float> alpha_cutoff = {};
+    bool is_unlit = false; // KHR_materials_unlit: it looks as it is, whatever the light
     // What else the file says of how it looks, which nothing here draws or judges: "normal maps", "emission", ...
     std::set<std::string> undrawn = {};
 
@@ -76,6 +77,7 @@ struct ReadResult {
     std::vector<Material> materials = {}; // OBJ and glTF
     // From glTF, OBJ with objects or materials (without vertex_parts), and PLY and VTP with values of vertices.
     std::optional<SourceDocument> document = {};
+    bool is_unlit = false;           // all triangles have such materials: build with BuildOptions::prelit
     bool uvs_from_top = false;       // v grows downward in images (glTF), not upward (OBJ, PLY)
     std::vector<Message> notes = {}; // what is good to know, one sentence each
     BadParts bad = {};               // what was left out
