@@ -118,7 +118,7 @@ Command render_command(CLI::App& app, Setup& setup) {
     CLI::App* verb = app.add_subcommand("render", "Draw a simplification of a model or a scene for a view");
     add_model_option(*verb, a->model);
     add_value(*verb, "-o,--output", a->out, ending_in({".png", ".pfm", ".exr"}), "OUT.png|.pfm|.exr",
-              "PNG for people; PFM or EXR for judging: luminance in cd/m2")
+              "PNG for people; PFM or EXR for judging: cd/m2, as RGB where anything has a colour")
         ->required();
     add_samples_option(*verb, a->draw.samples, "16; PFM and EXR, which are judged: 64");
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");

@@ -29,7 +29,7 @@ protected:
         words.insert(words.end(), {"--json", "-"});
         const Json report = succeed(words).json();
         EXPECT_THAT(keys(report), UnorderedElementsAre("visible_at", "different_pixels", "visible_pixels", "pixels",
-                                                       "max_ratio", "ssim", "device"));
+                                                       "max_ratio", "ssim", "judges_colour", "device"));
         EXPECT_TRUE(report["visible_pixels"].is_number_unsigned()) << report;
         EXPECT_EQ(report["pixels"], 128 * 128) << report;
         return report;

@@ -17,7 +17,7 @@ protected:
     Session session_under(const std::string& text) {
         const auto file = folder_.path() / "lights.json";
         std::ofstream(file) << text;
-        Scene scene = Scene::of(support::measured(support::built(shapes::bumpy_sphere(5, 0.03))));
+        Scene scene = Scene::of(support::measured(support::built(shapes::bumpy_sphere(4, 0.05))));
         scene.lights = *calibration::LightRig::read(file);
         return *Session::create(std::move(scene));
     }
@@ -25,7 +25,7 @@ protected:
         vdtree::View window = session.default_view();
         window.fov_y_degrees *= 128.0 / window.height;
         window.width = window.height = 128;
-        return session.frame({0.2, 0.3, 1}, 0.6, window);
+        return session.frame({0.2, 0.3, 1}, 0.3, window);
     }
     void expect_invisible(Session& session, std::initializer_list<double> times) {
         const vdtree::View view = view_of(session);

@@ -63,7 +63,8 @@ protected:
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         if (report) *report = outcome.json();
         const auto picture = require(read_image(path("p.pfm")));
-        return std::pair(picture->image.at(32, 24), picture->image.at(32, 40));
+        const Image luminance = unseen::perception::to_luminance(*picture, {});
+        return std::pair(luminance.at(32, 24), luminance.at(32, 40));
     }
     std::string complaint(const Words& words) const {
         const Outcome outcome = run(words);

@@ -73,7 +73,7 @@ function expect_what_it_had(source, cut, percent) {
                 const all = sets[set].map(uv => uv[k]).sort((a, b) => a - b);
                 return {low: all[0], high: all.at(-1)};
             });
-            const room = 0.02 * (had.high - had.low);
+            const room = (percent >= 10 ? 0.02 : 0.03) * (had.high - had.low);
             here(has.low >= had.low - room && has.high <= had.high + room,
                  `${set} from ${has.low} to ${has.high}, not ${had.low} to ${had.high}`);
         }
