@@ -188,7 +188,8 @@ TEST(JudgeModern, SeesIsoluminantGaborsAtTheirThreshold) {
                                                                          << ' ' << radius_cycles << ' ' << eccentricity;
                         EXPECT_LT(judged->max_ratio, three_decibels) << direction << ' ' << freq << ' ' << luminance
                                                                      << ' ' << radius_cycles << ' ' << eccentricity;
-                        options.csf = second.csf, options.beta = second.beta;
+                        options.csf = second.csf, options.beta = second.beta, options.gain = second.gain;
+                        options.colour_gain = second.colour_gain;
                         EXPECT_NEAR(require(judge_modern(grey, test, options))->max_ratio / judged->max_ratio, 1, 0.15);
                     }
         ASSERT_GE(all.size(), 30u);
@@ -571,7 +572,10 @@ TEST(JudgeModern, RefusesBadInput) {
     JudgeOptions options;
     options.beta = std::numeric_limits<double>::quiet_NaN();
     EXPECT_FALSE(judge_modern(good, good, options));
-    for (const double gain : {0.0, -1.0, 1e4, std::nan("")}) EXPECT_FALSE(judge_modern(good, good, {.gain = gain}));
+    for (const double gain : {0.0, -1.0, 1e4, std::nan("")}) {
+        EXPECT_FALSE(judge_modern(good, good, {.gain = gain}));
+        EXPECT_FALSE(judge_modern(good, good, {.colour_gain = gain}));
+    }
     options = {};
     options.gaze_px = glm::dvec2(std::numeric_limits<double>::infinity(), 0);
     EXPECT_FALSE(judge_modern(good, good, options));

@@ -342,6 +342,8 @@ Result<void> check(const JudgeOptions& options) {
                                                  " is sensitivity to colour, not to luminance contrast");
     if (!(options.gain >= least_gain && options.gain <= largest_gain))
         return judge_argument_error("judge", "the observer's gain must lie between 0.001 and 1000");
+    if (options.colour_gain && !(*options.colour_gain >= least_gain && *options.colour_gain <= largest_gain))
+        return judge_argument_error("judge", "the observer's gain for colours must lie between 0.001 and 1000");
     if (!(options.beta >= least_beta && options.beta <= largest_beta))
         return judge_argument_error("judge", "beta must lie between 1 and 8");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y)))

@@ -184,7 +184,8 @@ public:
         if (channel == Channel::luminance) return;
         rest_of_chroma_ = plane_of(image, channel);
         conditions_.model = channel == Channel::red_green ? CsfModel::castle_red_green : CsfModel::castle_yellow_violet;
-        if (options.csf_table) conditions_.gain = default_person.gain; // a viewer's table is of luminance alone
+        // A viewer's table is of luminance alone.
+        conditions_.gain = options.colour_gain.value_or(options.csf_table ? default_person.gain : options.gain);
         conditions_.table = nullptr;
     }
 
@@ -399,8 +400,12 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
 
 JudgeOptions second_judge_options(const Person& person, const Display& display,
                                   const std::optional<glm::dvec2>& gaze_px) {
-    return {
-        .display = display, .gaze_px = gaze_px, .csf = CsfModel::barten_fitted, .gain = person.barten_gain, .beta = 2};
+    return {.display = display,
+            .gaze_px = gaze_px,
+            .csf = CsfModel::barten_fitted,
+            .gain = person.barten_gain,
+            .colour_gain = person.gain,
+            .beta = 2};
 }
 
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {

@@ -16,7 +16,8 @@ struct JudgeOptions {
     CsfModel csf = CsfModel::castle;                // must be achromatic; at the display's distance
     std::shared_ptr<const CsfTable> csf_table = {}; // a viewer's own, used instead of the model
     double gain = default_person.gain;              // of sensitivity, 0.001 to 1000; ignored with a table
-    double beta = 3.5;                              // Minkowski exponent over the bands; V = 1 is 75% detection
+    std::optional<double> colour_gain = {}; // of castleCSF's branches of colour; default: gain, or with a table 2
+    double beta = 3.5;                      // Minkowski exponent over the bands; V = 1 is 75% detection
 };
 
 struct Judgement {
