@@ -161,9 +161,9 @@ ReferenceBand split_reference(Plane& luminance, Plane& chroma, int level, bool i
         band.contrast = chroma.values.empty() ? std::move(parts.fine) : split(chroma).fine;
     }
     for (std::size_t i = 0; i < band.luminance.values.size(); ++i) {
-        float& luminance = band.luminance.values[i];
-        luminance = std::max(luminance, floor_cdm2);
-        band.contrast.values[i] /= luminance;
+        float& local = band.luminance.values[i];
+        local = std::max(local, floor_cdm2);
+        band.contrast.values[i] /= local;
     }
     return band;
 }
