@@ -465,6 +465,8 @@ Result<void> run_viewer(render::Context& window, session::Session& session, sess
                         const ViewerOptions& options) {
     session::Request request = options.what.request_for(session.triangle_count());
     request.purpose = session::Purpose::picture;
+    const bool lights_move = session.scene().lights && session.scene().lights->moves();
+    request.may_measure = request.fold_test || !lights_move; // else the viewer takes a test that needs none
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
     auto renderer = session::SceneRenderer::create(window, session);
     if (!renderer) return renderer.error();

@@ -77,6 +77,13 @@ TEST_F(MovingLights, KeepLittleMoreThanLightsThatStandStill) {
                 0.01 * now->stats.triangles);
 }
 
+// A stretch takes a good part of a second for 100,000 triangles.
+TEST_F(MovingLights, TakeTheSafeTestWhereNobodyWaits) {
+    Session session = session_under(orbiting);
+    const auto made = require(session.simplify(view_of(session), {.may_measure = false}));
+    EXPECT_EQ(made->fold_tests.front(), FoldTest::luebke_hallen_safe);
+}
+
 TEST_F(MovingLights, ThatGoWithTheCameraTakeTheSafeTest) {
     Session session = session_under(R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.6}]})");
     const auto made = require(session.simplify(view_of(session), {}));

@@ -39,6 +39,10 @@ struct Choice {
 Choice suitable_test(Sight& sight, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
     if (const char* const why = why_lights_are_not_known(sight)) return {FoldTest::luebke_hallen_safe, why};
+    if (sight.stretch && !may_measure)
+        return {
+            FoldTest::luebke_hallen_safe,
+            "the test error takes a moment for each stretch of time in which lights move, and nobody waits for that"};
     if (sight.lighting && sight.lighting->specular > 0)
         return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
     if (sight.lighting && !knows_lit_texture(sight))

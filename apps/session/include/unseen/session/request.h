@@ -107,7 +107,8 @@ struct Request {
     // Keep outlines whose shadows would move visibly. False: the cut is for the eye alone; its shadows may reveal it.
     bool keeps_shadows = true;
     // Measure the errors of folds if the test needs them and the tree lacks them, which takes up to a minute. False:
-    // use errors only if they are there, as after Session::prepare().
+    // use errors only if they are there, as after Session::prepare(), and not under lights that move, for which a second
+    // passes from time to time.
     bool may_measure = true;
     // Fill in Report::effects. Cost: some 20 us an object; turn it off for flights through scenes of many objects.
     bool reasons = true;
