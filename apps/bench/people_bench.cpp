@@ -4,9 +4,6 @@
 #include <numbers>
 #include <optional>
 
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-
 #include <unseen/calibration/internal/people.h>
 #include <unseen/perception/csf.h>
 #include <unseen/perception/internal/chroma.h>
@@ -150,17 +147,6 @@ BenchTable table_of_fits(const People& people) {
 
 // ---- colour
 
-// Linear RGB of a luminance and an opponent chroma.
-glm::dvec3 rgb_of(double luminance, glm::dvec2 chroma) {
-    glm::dmat3 channels; // by primary
-    for (int k = 0; k < 3; ++k) {
-        glm::dvec3 primary(0);
-        primary[k] = 1;
-        channels[k] = glm::dvec3(rec709_luminance(primary), perception::opponent_chroma(primary));
-    }
-    return glm::inverse(channels) * glm::dvec3(luminance, chroma);
-}
-
 struct Gabor {
     double freq_cpd, cdm2, contrast;
     int direction; // 0: luminance, 1: red-green, 2: yellow-violet
@@ -176,7 +162,7 @@ perception::Image draw(const Gabor& g, int side, double ppd) {
                                   std::exp(-(right * right + down * down) / (2 * sigma * sigma));
             glm::dvec3 by(0);
             by[g.direction] = change;
-            const glm::dvec3 rgb = rgb_of(g.cdm2 + by[0], {by[1], by[2]});
+            const glm::dvec3 rgb = perception::rgb_of(g.cdm2 + by[0], {by[1], by[2]});
             for (int k = 0; k < 3; ++k) image.values.push_back(static_cast<float>(rgb[k]));
         }
     return image;

@@ -3,11 +3,7 @@
 // it judges for the median person, who is castleCSF. People: tests/calibration/people_test.cpp.
 #include <unseen/perception/judge.h>
 
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-
 #include <unseen/perception/internal/chroma.h>
-#include <unseen/vdtree/colour.h>
 
 #include "testing.h"
 
@@ -43,17 +39,6 @@ Image draw(const Gabor& g, int side) {
         for (int x = 0; x < side; ++x)
             image.at(x, y) = static_cast<float>(g.luminance * (1 + modulation(g, side, x, y)));
     return image;
-}
-
-// Linear RGB of this luminance and opponent chroma.
-glm::dvec3 rgb_of(double luminance, glm::dvec2 chroma) {
-    glm::dmat3 channels; // by primary
-    for (int k = 0; k < 3; ++k) {
-        glm::dvec3 primary(0);
-        primary[k] = 1;
-        channels[k] = glm::dvec3(rec709_luminance(primary), opponent_chroma(primary));
-    }
-    return glm::inverse(channels) * glm::dvec3(luminance, chroma);
 }
 
 // The same in a direction of colour (0: red-green, 1: yellow-violet), of one luminance.

@@ -262,11 +262,11 @@ double spread_of_vertices(const vdtree::SoundTree& tree, NodeId node) {
 // Makes the patterns of single nodes.
 class PatternFinder {
 public:
-    PatternFinder(const vdtree::SoundTree& tree, const FoldTestOptions& options, const CsfTable& csf,
+    PatternFinder(const vdtree::SoundTree& tree, float own_colours, const FoldTestOptions& options, const CsfTable& csf,
                   double highest_cpd, SwitchDistances& switch_distances)
         : tree_(tree), levels_(options.display), switch_distances_(switch_distances),
           darkest_(levels_.in_cdm2(options.scene.darkest)), brightest_(levels_.in_cdm2(options.scene.brightest)),
-          colour_(levels_.difference_in_cdm2(std::max(options.scene.colour, as_luminance(colour_reach(tree))))),
+          colour_(levels_.difference_in_cdm2(std::max(options.scene.colour, own_colours))),
           object_radius_(tree.support_spheres()[vdtree::VertexTree::root()].radius) {
         const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
         whole_ = levels_.luminance_level(levels_.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
@@ -368,7 +368,7 @@ private:
 std::optional<ShownFolds> find_shown(std::span<const LitErrors> as_lit, const FoldTestOptions& options,
                                      const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances) {
     const vdtree::SoundTree& tree = *as_lit.front().tree;
-    const PatternFinder patterns(tree, options, csf, highest_cpd, switch_distances);
+    const PatternFinder patterns(tree, as_lit.front().colour_reach, options, csf, highest_cpd, switch_distances);
     ShownFolds shown{std::vector<ShownFold>(tree.interior_count()), std::vector<ShownFold>(tree.interior_count())};
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         ShownFold patch = patterns.patch(as_lit.front(), node), strip = patterns.strip(as_lit.front(), node);

@@ -198,6 +198,8 @@ Result<LitTrees> LitTrees::of(std::span<const TreeAsLit> trees, const FoldModel&
         const auto chroma = one.tree.texture().empty() ? ring_chroma(one.tree) : std::vector<ChromaRange>();
         if (!chroma) return chroma.error();
         all.lit_.push_back({&all.sound_.back(), all.errors_.back().of_nodes, {}, albedo});
+        if (all.lit_.size() == 1)
+            all.lit_.back().colour_reach = as_luminance(colour_reach(one.tree)); // the first decides
         for (const ChromaRange& range : *chroma) all.lit_.back().colour_range.push_back(as_luminance(range));
         for (const vdtree::LightSource& light : one.lighting.lights)
             if (light.casts_shadow) all.lit_.back().casting.push_back(light);

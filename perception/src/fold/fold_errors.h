@@ -50,6 +50,7 @@ struct LitErrors {
     std::span<const FoldError> errors;
     std::vector<vdtree::LightSource> casting = {}; // lights that cast shadows
     double largest_albedo = 1;
+    float colour_reach = 0;               // how far apart the colours of the tree and grey are, as luminance
     std::vector<float> colour_range = {}; // of rings, by interior node, as luminance; none: grey, or of a texture alone
 
     // The largest step of relative luminance at the edge of a shadow; 0 without shadows.

@@ -471,14 +471,14 @@ Result<CutRings> bound_cut_rings(const VertexTree& tree, bool with_chroma) {
         if (!found) return found.error();
         chroma = std::move(*found);
     }
+    const bool has_colours = !chroma.empty(); // of textured trees nothing counts as alike in any case
     CutRings rings = is_textured      ? RingBounder<TexturedVertices>(*sound, {}).run()
                      : chroma.empty() ? RingBounder<GreyVertices>(*sound, {}).run()
                                       : RingBounder<ColouredVertices>(*sound, std::move(chroma)).run();
     // What comes as near as a quarter of a triangle is in the way of any fold.
     const Progress nobody;
     MeasuringProgress progress(nobody);
-    const std::vector<Contact> contacts =
-        find_contacts(std::span(&*sound, 1), with_chroma && has_chroma(tree), progress);
+    const std::vector<Contact> contacts = find_contacts(std::span(&*sound, 1), has_colours, progress);
     if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
         rings.meets_another.resize(contacts.size());
         std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));

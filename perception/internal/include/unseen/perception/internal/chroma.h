@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include <glm/common.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/vertex_tree.h>
@@ -22,9 +24,20 @@ constexpr glm::dvec2 opponent_chroma(glm::dvec3 rgb) {
             -0.20453379289306542 * rgb.r - 0.5968319963708706 * rgb.g + 0.801365789263936 * rgb.b};
 }
 
-// How many times as well as a difference of luminance the same difference of chroma is seen, at most where folds are
-// judged: castleCSF's sensitivities from 2 to 8 cpd and 5 to 100 cd/m2, within 15 degrees of the gaze. Above, at lower
-// luminances and farther out the ratio may be larger; the judge shows what that comes to (docs/evidence.md).
+// The linear RGB that has this luminance and this chroma.
+inline glm::dvec3 rgb_of(double luminance, glm::dvec2 chroma) {
+    glm::dmat3 channels; // by primary
+    for (int k = 0; k < 3; ++k) {
+        glm::dvec3 primary(0);
+        primary[k] = 1;
+        channels[k] = glm::dvec3(rec709_luminance(primary), opponent_chroma(primary));
+    }
+    return glm::inverse(channels) * glm::dvec3(luminance, chroma);
+}
+
+// A difference of chroma is seen at most this many times as well as the same difference of luminance. These are the
+// ratios of castleCSF's sensitivities from 2 to 8 cpd and 5 to 100 cd/m2, within 15 degrees of the gaze. At higher
+// frequencies, lower luminances and farther out they may be larger; judges show what that comes to (docs/evidence.md).
 inline constexpr glm::dvec2 chroma_over_luminance(2, 0.5);
 
 // Linear RGB as three numbers of which the root of the sum of squares counts as luminance does: the luminance, and what
