@@ -8,7 +8,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/picture_judge.h>
 #include <unseen/session_gpu/tradeoff.h>
 
@@ -137,8 +136,8 @@ private:
     }
 };
 
-// Masked cuts, levels, and meshoptimizer's, beside measure_tradeoff()'s own: the same columns.
-void add_others(AccuracySubject& subject, int samples, const TreeBytes& bytes, AccuracyPoints& points) {
+// Levels and meshoptimizer's cuts, beside measure_tradeoff()'s own: the same columns.
+void add_others(AccuracySubject& subject, int samples, AccuracyPoints& points) {
     auto judge = require(session::PictureJudge::create(subject.context, subject.session, subject.view, samples));
     const auto add = [&](const std::string& name, session::SceneRenderer& renderer,
                          const std::vector<vdtree::Cut>& cuts, double preparation_s, double of_triangle,
@@ -164,13 +163,6 @@ void add_others(AccuracySubject& subject, int samples, const TreeBytes& bytes, A
     const session::Request request{.purpose = session::Purpose::picture};
     const auto imperceptible = require(subject.session.simplify(subject.view, request));
     const double prepared_s = subject.build_s + subject.measure_s;
-    const session::Scene& scene = subject.session.scene();
-    if (scene.objects.size() > 1 || !scene.backdrop.empty())
-        add("imperceptible, masked, by this picture", judge.renderer(),
-            require(session::simplify_as_seen(subject.session, subject.context, subject.view, request,
-                                              {.folds_hidden = true, .masking = session::Masking::scene}))
-                .cuts,
-            prepared_s, bytes.measured, "this view alone");
     const Levels levels(subject);
     const double count = imperceptible.stats.triangles;
     for (const auto& [name, bias] : {std::pair{"discrete levels, where nobody sees them", 1.0},
@@ -209,7 +201,7 @@ AccuracyPoints fold_points(AccuracySubject& subject) {
                           .note = p.is_of_view ? "this view alone" : "",
                           .is_default = p.name == "imperceptible"});
     }
-    add_others(subject, measured.samples, bytes, points);
+    add_others(subject, measured.samples, points);
     return points;
 }
 

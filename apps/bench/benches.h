@@ -75,8 +75,8 @@ struct PeopleOptions : BenchOptions {
 };
 BenchReport bench_people(const PeopleOptions& options);
 
-// What masking and occlusion save in scenes, what shows of it, and what discrete levels of detail make of the same. Each
-// scene from its camera, with its lights, judged against the full scene.
+// What occlusion saves in scenes, what shows of it, and what discrete levels of detail make of the same. Each scene from
+// its camera, with its lights, judged against the full scene.
 struct ScenesOptions : BenchOptions {  // inputs: glTF files; if empty the four of `unseen make scene`
     std::uint64_t triangles = 500'000; // of each of these, about
     int window_px = 512;
@@ -95,7 +95,6 @@ struct SelectionOptions : BenchOptions {
     int judged_every = 10;                // frames of which one is drawn and judged; levels follow all of them
     std::array<int, 2> size = {640, 360}; // pixels
     int samples = 4;                      // a pixel
-    bool has_masked_tree = false;         // one more row, seconds a frame
     // By which levels are selected, each for itself, if no selections are given.
     std::vector<session::SelectionQuality> qualities = {session::SelectionQuality::ssim};
     double spacing = 0;  // of the search's grid, as in session::PrecomputeOptions

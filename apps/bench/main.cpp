@@ -180,7 +180,6 @@ void add_selection_options(CLI::App& verb, SelectionOptions& o) {
     add_value(verb, "--size", o.size, whole(16, 8192), "W H",
               "Of the frames (default: 640 360; the thesis has 1920 1080)");
     add_value(verb, "--samples", o.samples, whole(1, 256), "N", "A pixel (default: 4)");
-    verb.add_flag("--masked-tree", o.has_masked_tree, "The tree's budget with masking, too: seconds a frame");
     verb.add_flag("--quick", o.quick, "Few frames, one sample a pixel");
     verb.callback([&o, qualities] {
         for (const auto* files : {&o.scenes, &o.selections, &o.statues})
@@ -285,8 +284,7 @@ std::vector<Command> verbs(CLI::App& app) {
                                  "FILE.csv", "The thresholds (default: data/people in the checkout)")
                            ->expected(1);
                    }),
-        bench_verb(app, "scenes",
-                   "What masking and occlusion save in scenes, and what discrete levels of detail make of the same",
+        bench_verb(app, "scenes", "What occlusion saves in scenes, and what discrete levels of detail make of the same",
                    "Examples:\n  unseen-bench scenes --quick\n"
                    "  unseen-bench scenes mine.glb --window 1024 --json scenes.json",
                    bench_scenes, add_scenes_options),

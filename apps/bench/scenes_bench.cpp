@@ -98,12 +98,9 @@ Row without_visible_pixels(double low, double high, int steps, Tried&& tried) {
 }
 
 std::vector<Row> rows_of(JudgedScene& scene) {
-    using session::Masking;
     std::vector<Row> rows;
     rows.push_back(scene.as_seen("tree", {.folds_hidden = false}));
-    rows.push_back(scene.as_seen("tree, masked", {.folds_hidden = false, .masking = Masking::scene}));
     rows.push_back(scene.as_seen("tree, without what the picture hides", {}));
-    rows.push_back(scene.as_seen("tree, masked, without what the picture hides", {.masking = Masking::scene}));
     const double least = rows.back().triangles;
     const auto hiding = [&](double threshold) {
         return scene.as_seen("tree, without what the picture hides, where nothing shows", {}, threshold);
@@ -257,15 +254,14 @@ BenchReport bench_scenes(const ScenesOptions& options) {
     BenchReport report;
     std::vector<Walk> walks;
     BenchTable passes{"What is drawn for a cut, and why",
-                      {{"scene"}, {"effect"}, {}, {"why"}, {"drawings"}, {"passes"}, {"textures, MB"}, {"ms"}}};
+                      {{"scene"}, {"effect"}, {}, {"why"}, {"drawings"}, {"textures, MB"}, {"ms"}}};
     for (const std::string& file : files) {
         JudgedScene scene(context, file, options);
         const std::vector<Row> rows = rows_of(scene);
         report.tables.push_back(table_of(scene, rows));
-        constexpr std::size_t most_asked_for = 3; // of the tree, with everything
-        for (const session::Effect& e : rows[most_asked_for].passes)
+        constexpr std::size_t by_picture = 1; // of the tree, without what the picture hides
+        for (const session::Effect& e : rows[by_picture].passes)
             passes.rows.push_back({scene.name, e.name, e.on ? "on" : "off", e.why, std::to_string(e.surface_passes),
-                                   std::to_string(e.full_screen_passes),
                                    number(static_cast<double>(e.texture_bytes) / 1e6, 3), number(e.milliseconds, 3)});
         walks.push_back(walk(scene, options.quick ? 6 : 24));
     }

@@ -12,7 +12,6 @@
 
 #include <unseen/perception/judge.h>
 #include <unseen/session/internal/selections.h>
-#include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/internal/level_pictures.h>
 #include <unseen/session_gpu/precompute_selections.h>
 #include <unseen/session_gpu/scene_renderer.h>
@@ -85,7 +84,6 @@ struct Method {
     Way way;
     std::string name;
     std::function<Levels(const vdtree::View&)> choose = {}; // not set: the tree's cuts
-    bool is_masked = false;                                 // those
     Levels last = {};                                       // of the frame before
     std::vector<FrameFigures> frames = {};                  // those that were judged
     double triangles = 0, changes = 0, count = 0;           // of all frames, sums
@@ -189,16 +187,14 @@ std::vector<Method> methods_of(const Scene& scene, const std::vector<session::Se
                                return scene.switched_within(v, by_distance, budget);
                            }});
     methods.push_back({Way::tree, "the tree's budget"});
-    if (options.has_masked_tree)
-        methods.push_back({.way = Way::other, .name = "the tree's budget, masked", .is_masked = true});
     return methods;
 }
 
 class Flight {
 public:
     Flight(const render::Context& context, Scene& scene, const SelectionOptions& options)
-        : context_(context), scene_(scene), options_(options),
-          renderer_(require(session::SceneRenderer::create(context, scene.session))) {}
+        : scene_(scene), options_(options), renderer_(require(session::SceneRenderer::create(context, scene.session))) {
+    }
 
     void run(std::vector<Method>& methods, const std::vector<vdtree::View>& views) {
         for (std::size_t number = 0; number < views.size(); ++number) {
@@ -235,7 +231,7 @@ private:
             method.most_changes = std::max(method.most_changes, changes);
             if (is_judged) frame = require(scene_.pictures.draw_frame(view, levels, options_.samples));
         } else {
-            const auto cuts = cuts_of(view, method.is_masked);
+            const auto cuts = cuts_of(view);
             triangles = cuts.stats.triangles;
             frame = require(renderer_.draw(session::drawn_cuts(cuts.cuts), view,
                                            {.samples = options_.samples, .background = scene_.session.background()}));
@@ -251,16 +247,13 @@ private:
              require(perception::ssim(codes_, session::code_image(*frame, display)))});
     }
 
-    session::Simplification cuts_of(const vdtree::View& view, bool masks) {
+    session::Simplification cuts_of(const vdtree::View& view) {
         const session::Request request{.goal = session::Goal::budget(static_cast<vdtree::Index>(options_.budget)),
                                        .purpose = session::Purpose::picture,
                                        .reasons = false};
-        if (!masks) return require(scene_.session.simplify(view, request));
-        return require(session::simplify_as_seen(scene_.session, context_, view, request,
-                                                 {.folds_hidden = false, .masking = session::Masking::scene}));
+        return require(scene_.session.simplify(view, request));
     }
 
-    const render::Context& context_;
     Scene& scene_;
     const SelectionOptions& options_;
     session::SceneRenderer renderer_;

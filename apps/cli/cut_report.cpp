@@ -85,7 +85,6 @@ Json passes_to_json(std::span<const session::Effect> passes) {
                         {"on", e.on},
                         {"why", e.why},
                         {"surface_passes", e.surface_passes},
-                        {"full_screen_passes", e.full_screen_passes},
                         {"texture_bytes", e.texture_bytes},
                         {"ms", e.milliseconds}});
     return list;

@@ -17,7 +17,6 @@ constexpr OptionName option_names[] = {
     {"observer.csf = ", "--csf "},
     {"request.fold_test", "--fold-test"},
     {"request.keeps_shadows", "--shadows"},
-    {"request.masking", "--masking scene"},
     {"request.shown", "--visibility picture"},
     {"request.goal.triangles", "--triangles"},
     {"request.goal.pixels", "--pixels"},

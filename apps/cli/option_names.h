@@ -7,7 +7,7 @@
 
 namespace unseen::app {
 
-// "request.masking and scene.lights exclude each other" -> "--masking scene and --lights exclude each other".
+// "request.shown and scene.lights exclude each other" -> "--visibility picture and --lights exclude each other".
 std::string with_option_names(const Message& message);
 
 } // namespace unseen::app

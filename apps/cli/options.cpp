@@ -412,17 +412,6 @@ void add_hiding_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules)
         "meshes in pictures from all sides (sum, default), or the largest cost of a fold (largest)");
 }
 
-void add_masking_option(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {
-    add_choice<bool, bool>(verb, "--masking", o.masks, {{"none", false}, {"scene", true}},
-                           "scene: patterns of the scene mask what folds change: bars before a statue, leaves, and the "
-                           "statue's own (default: none)");
-    rules.push_back({"--masking scene",
-                     Rule::excludes,
-                     {"--full", "--pixels", "--fold-test luebke-hallen", "--fold-test luebke-hallen-safe",
-                      "--fold-test extent", "--fold-test displacement"},
-                     "only --fold-test error knows what masks"});
-}
-
 void add_check_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules) {
     verb.add_flag(
         "--checked", o.is_checked,
@@ -442,7 +431,6 @@ void add_check_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules)
                      Rule::excludes,
                      {"--fold-test extent", "--fold-test displacement"},
                      "they do not order folds by what is seen of them"});
-    rules.push_back({"--checked", Rule::excludes, {"--masking scene"}, "the judges see by themselves what masks"});
     rules.push_back({"--checked", Rule::excludes, {"--orthographic", "--visibility spheres"}, "it goes by pictures"});
 }
 

@@ -104,7 +104,6 @@ struct WhatOptions {
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> velocity_deg_s; // of everything, on the retina
     Hiding hiding = Hiding::spheres;
-    bool masks = false;      // the scene masks what folds change
     bool is_checked = false; // by pictures; with
     double check_cell = 0;   // degrees
     double check_seconds = 120;
@@ -124,7 +123,6 @@ void add_what_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& r
 void add_hiding_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // A quality by name, or the cost up to which folds are made: session::Goal::cost.
 void add_quality_option(CLI::App& verb, Goal& goal);
-void add_masking_option(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 void add_check_options(CLI::App& verb, WhatOptions& options, std::vector<Rule>& rules);
 // Gazes that move, beside WHAT, for verbs with frames in time. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse, std::vector<Rule>& rules);

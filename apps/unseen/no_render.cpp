@@ -32,10 +32,10 @@ Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { r
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context*) {
-    if (what.hiding == Hiding::spheres && !what.masks && !what.is_checked) return session.simplify(view, request);
+    if (what.hiding == Hiding::spheres && !what.is_checked) return session.simplify(view, request);
     return Error{ErrorCode::unsupported,
-                 "--visibility picture, --masking scene and --checked are not in this build, for it was made without "
-                 "OpenGL; configure it with -DUNSEEN_BUILD_RENDER=ON."};
+                 "--visibility picture and --checked are not in this build, for it was made without OpenGL; configure "
+                 "it with -DUNSEEN_BUILD_RENDER=ON."};
 }
 
 Result<Verdict> compare_on_gpu(const perception::Image&, const perception::Image&, const perception::JudgeOptions&) {

@@ -33,7 +33,7 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
                                             const render::Context* context) {
     const bool is_summed =
         session::goes_by_sum(request) && request.purpose == session::Purpose::picture && !view.orthographic_height;
-    const bool is_by_picture = what.hiding == Hiding::picture || what.masks || is_summed || what.is_checked;
+    const bool is_by_picture = what.hiding == Hiding::picture || is_summed || what.is_checked;
     const bool is_by_sides = !is_by_picture && session::goes_by_sum(request) && !request.milliseconds &&
                              request.goal.kind == session::Goal::Kind::budget;
     if (!is_by_picture && !is_by_sides) return session.simplify(view, request);
@@ -49,10 +49,7 @@ Result<session::Simplification> simplify_by(const WhatOptions& what, session::Se
     }
     if (what.is_checked) return checked(what, session, view, request, *context);
     if (is_by_sides) return session::simplify_from_all_sides(session, *context, view, request);
-    session::AsSeenOptions options;
-    options.folds_hidden = what.hiding == Hiding::picture || is_summed;
-    options.masking = what.masks ? session::Masking::scene : session::Masking::none;
-    return session::simplify_as_seen(session, *context, view, request, options);
+    return session::simplify_as_seen(session, *context, view, request);
 }
 
 Result<Verdict> compare_on_gpu(const perception::Image& reference, const perception::Image& test,

@@ -135,7 +135,6 @@ Command render_command(CLI::App& app, Setup& setup) {
     add_hiding_option(*verb, a->what, rules);
     CLI::Option* visibility = verb->get_option("--visibility");
     visibility->description(visibility->get_description() + "; default: picture, in orthographic views spheres");
-    add_masking_option(*verb, a->what, rules);
     add_check_options(*verb, a->what, rules);
     add_choice<GazeSource, GazeSource>(*verb, "--gaze-mode", a->gaze.source, {{"head", GazeSource::head}},
                                        "head: no tracker; the viewer looks within 15 degrees of the middle");
@@ -153,7 +152,7 @@ Command render_command(CLI::App& app, Setup& setup) {
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
                  "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
                  "  unseen render part.stl -o front.png --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
-                 "  unseen render museum.glb -o museum.png --masking scene --json -\n"
+                 "  unseen render museum.glb -o museum.png --json -\n"
                  "  unseen render dragon.vdt -o lit.png --lights lights.json --setup lab.json");
     return {verb, [a] { return run(*a); }, std::move(rules)};
 }

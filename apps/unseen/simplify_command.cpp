@@ -111,7 +111,6 @@ Command simplify_command(CLI::App& app, Setup& setup) {
     std::vector<Rule> rules;
     add_what_options(*verb, a->what, rules);
     add_hiding_option(*verb, a->what, rules);
-    add_masking_option(*verb, a->what, rules);
     add_check_options(*verb, a->what, rules);
     setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
     verb->footer(

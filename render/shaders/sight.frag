@@ -1,5 +1,4 @@
-// How one band of the reference is seen: the weights of differences; with THRESHOLDS, the least step that is visible; with
-// MASKERS, by how many thresholds it masks.
+// How one band of the reference is seen: the weights of differences; with THRESHOLDS, the least step that is visible.
 // With GAZE by eccentricity.
 layout(binding = 0) uniform sampler2D luminances;
 layout(binding = 1) uniform sampler2D contrasts;
@@ -16,10 +15,8 @@ layout(location = 7) uniform ivec2 window;
 layout(location = 8) uniform uint level;
 #endif
 
-#if defined(THRESHOLDS)
+#ifdef THRESHOLDS
 layout(location = 0) out vec4 steps;
-#elif defined(MASKERS)
-layout(location = 0) out vec4 maskers;
 #else
 layout(location = 0) out vec4 own;
 layout(location = 1) out vec4 smoothed;
@@ -78,9 +75,6 @@ void main() {
         float sensitivity = exact_exp2(node.x);
         // Maskers work where they are: their contrasts count in thresholds of patches.
         float masker = abs(node.y * contrast[i] + node.z * around[i]) * sensitivity * of_patch;
-#ifdef MASKERS
-        maskers[i] = 4 * at.x + i < size.x ? min(masker, masking.w) : 0.0; // nothing is outside
-#else
         float raised = 1.0 + exact_exp2(masking.x * exact_log2(clamp(masker, masking.z, masking.w)));
         float elevation = exact_exp2(exact_log2(raised) / masking.y);
 #ifdef THRESHOLDS
@@ -89,7 +83,6 @@ void main() {
         float to_thresholds = (sensitivity / (luminance[i] * elevation));
         own[i] = to_thresholds * node.y;
         smoothed[i] = to_thresholds * node.z;
-#endif
 #endif
     }
 }

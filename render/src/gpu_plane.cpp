@@ -166,11 +166,11 @@ void PlanePasses::bind(unsigned unit, unsigned texture) {
 }
 
 void PlanePasses::draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels,
-                       std::initializer_list<unsigned> textures, int first_row) {
+                       std::initializer_list<unsigned> textures) {
     unsigned unit = 0;
     for (const unsigned texture : textures) bind(unit++, texture);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to.framebuffer());
-    glViewport(0, first_row, texels.x, texels.y);
+    glViewport(0, 0, texels.x, texels.y);
     programs_.draw_full_screen(program);
     ++count_;
 }

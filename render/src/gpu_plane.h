@@ -74,9 +74,8 @@ public:
     PlanePasses(const PlanePasses&) = delete;
     PlanePasses& operator=(const PlanePasses&) = delete;
 
-    // Binds the textures from unit 0 on, and computes `texels` of the planes from the given row on.
-    void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures,
-              int first_row = 0);
+    // Binds the textures from unit 0 on, and computes `texels` of the planes.
+    void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures);
     void bind(unsigned unit, unsigned texture);
     int count() const noexcept { return count_; } // of draws
 

@@ -136,10 +136,4 @@ Result<std::span<const glm::vec4>> SampleSum::mean() {
     return std::span<const glm::vec4>(pixels);
 }
 
-LuminanceTexture SampleSum::mean_luminance() const noexcept {
-    constexpr int luminance = 3;
-    const float share = 1 / static_cast<float>(std::max(impl_->count, 1));
-    return {impl_->sum.colour_texture(), width(), height(), luminance, share, impl_->background};
-}
-
 } // namespace unseen::render

@@ -21,10 +21,6 @@ constexpr std::size_t few_bands = 8;               // of its variant for usual s
 constexpr std::size_t most_taps = 12;              // of blur.frag
 constexpr int group_columns = 64, group_rows = 16; // of examine.comp
 
-constexpr int largest_cell_px = 64;
-// A Gaussian of 1.5 samples: as far as one part of a pattern is seen with another, about.
-constexpr std::array<float, 5> pooling_kernel = {0.26656f, 0.21344f, 0.10959f, 0.03608f, 0.00761f};
-
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
 
 glm::vec4 taps(const JudgeTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
@@ -163,12 +159,11 @@ struct VisibilityPasses::Impl {
         GpuPlanes visibility;
         Buffer found_in_test, found_visible;
     };
-    enum class Sight { weights, thresholds, maskers };
+    enum class Sight { weights, thresholds };
     // What mapping and weighing need meanwhile.
     struct Scratch {
         GpuPlanes split, across, odd, even; // luminance and contrast; levels of the reference
         std::vector<GpuPlanes> steps;       // thresholds by band
-        std::array<GpuPlanes, 3> maskers;   // as they are, pooled along rows, and pooled
         GpuPlanes packed;
     };
 
@@ -199,7 +194,6 @@ struct VisibilityPasses::Impl {
         is_judged = is_weighed = false;
         keeps_scratch = true;
         present_maps.clear();
-        if (elevations) elevations->is_of_reference = false;
         return copy_reference(picture);
     }
 
@@ -244,12 +238,7 @@ struct VisibilityPasses::Impl {
         programs.find(reduce_rows, "reduce rows", shaders::reduce_frag, {"ALONG_ROWS"});
         programs.find(split_reference, "split reference", shaders::split_frag, {"REFERENCE"});
         programs.find(split_base, "split base", shaders::split_frag, {"REFERENCE", "BASE"});
-        if (sight == Sight::maskers) {
-            if (tables.gaze) programs.find(mask, "mask by gaze", shaders::sight_frag, {"MASKERS", "GAZE"});
-            else programs.find(mask, "mask", shaders::sight_frag, {"MASKERS"});
-            programs.find(elevate, "least elevation", shaders::least_elevation_frag);
-            find_blurs(programs, 1);
-        } else if (sight == Sight::thresholds) {
+        if (sight == Sight::thresholds) {
             if (tables.gaze) programs.find(step, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
             else programs.find(step, "step", shaders::sight_frag, {"THRESHOLDS"});
             if (tables.bands.size() <= few_bands)
@@ -260,14 +249,14 @@ struct VisibilityPasses::Impl {
         return programs.result();
     }
 
-    void find_blurs(PlanePrograms& programs, std::size_t count) {
+    void find_blurs(PlanePrograms& programs) {
         struct Blur {
             std::string_view rows, columns, reach;
         };
         constexpr Blur blurs[] = {{"blur rows by 4", "blur columns by 4", "REACH_1"},
                                   {"blur rows by 8", "blur columns by 8", "REACH_2"},
                                   {"blur rows by 11", "blur columns by 11", "REACH_3"}};
-        for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t i = 0; i < blur_rows.size(); ++i) {
             programs.find(blur_rows[i], blurs[i].rows, shaders::blur_frag, {"ALONG_ROWS", blurs[i].reach});
             programs.find(blur_columns[i], blurs[i].columns, shaders::blur_frag, {blurs[i].reach});
         }
@@ -311,7 +300,7 @@ struct VisibilityPasses::Impl {
     }
 
     void see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight, const GpuPlanes& to) {
-        const Program& program = sight == Sight::thresholds ? *step : sight == Sight::maskers ? *mask : *weigh;
+        const Program& program = sight == Sight::thresholds ? *step : *weigh;
         const Band& band = bands[level];
         program.set(0, band.size);
         program.set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
@@ -345,7 +334,7 @@ struct VisibilityPasses::Impl {
         programs.find(split_difference, "split difference", shaders::split_frag);
         programs.find(square, "energy", shaders::energy_frag);
         programs.find(halve, "halve", shaders::halve_frag);
-        find_blurs(programs, blur_rows.size());
+        find_blurs(programs);
         if (tables.beta == 3.5f) programs.find(raise, "power 3.5", shaders::power_frag, {"EXPONENT_3_5"});
         else if (tables.beta == 2) programs.find(raise, "power 2", shaders::power_frag, {"EXPONENT_2"});
         else programs.find(raise, "power", shaders::power_frag);
@@ -497,43 +486,6 @@ struct VisibilityPasses::Impl {
         passes.draw(*unpack, to, size, {packed.texture()});
     }
 
-    Result<void> map_elevations(int cell_px) {
-        if (cell_px < 1 || cell_px > largest_cell_px)
-            return judge_error("cells of elevations have 1 to " + std::to_string(largest_cell_px) +
-                               " pixels a side, not " + std::to_string(cell_px));
-        if (elevations && elevations->cell_px == cell_px && elevations->is_of_reference) return {};
-        if (auto ok = find_programs(Sight::maskers); !ok) return ok;
-        const glm::ivec2 cells = (size + cell_px - 1) / cell_px;
-        const auto band_count = static_cast<int>(bands.size());
-        if (cells.y * band_count > largest_target_side())
-            return unsupported("judge: the elevations of " + std::to_string(band_count) + " bands in " +
-                               size_text(cells.x, cells.y) +
-                               " cells are larger than this GPU's textures; take larger cells");
-        if (auto ok = need_scratch(); !ok) return ok;
-        for (GpuPlanes& planes : scratch->maskers)
-            if (auto ok = planes.need(size, 1, PlaneFormat::full, "maskers"); !ok) return ok;
-        GpuPlanes grid;
-        if (auto ok = grid.need({cells.x, cells.y * band_count}, 1, PlaneFormat::single, "elevations"); !ok) return ok;
-        PlanePasses passes(context.impl().programs);
-        auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) {
-            const glm::ivec2 here = bands[level].size;
-            see(passes, level, of_reference, Sight::maskers, scratch->maskers[0]);
-            blur(passes, scratch->maskers[0].texture(), here, pooling_kernel, scratch->maskers[1], scratch->maskers[2]);
-            const int first_row = static_cast<int>(level) * cells.y;
-            elevate->set(0, here);
-            elevate->set(1,
-                         glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
-            elevate->set(2, glm::ivec2(cell_px, static_cast<int>(level)));
-            elevate->set(3, glm::ivec2(0, first_row));
-            passes.draw(*elevate, grid, cells, {scratch->maskers[2].texture()}, first_row);
-        });
-        if (!done) return done;
-        passes_done += passes.count();
-        end_scratch();
-        elevations = Elevations{cell_px, cells, std::move(grid), true};
-        return {};
-    }
-
     Result<void> map_thresholds(int number) {
         if (present_maps.contains(number)) return {};
         if (auto ok = find_programs(Sight::thresholds); !ok) return ok;
@@ -561,13 +513,11 @@ struct VisibilityPasses::Impl {
     std::uint64_t texture_bytes() const {
         std::uint64_t bytes = reference.bytes() + maps.bytes();
         for (const Band& band : bands) bytes += band.weights.bytes();
-        if (elevations) bytes += elevations->planes.bytes();
         if (scratch) {
             for (const GpuPlanes* planes :
                  {&scratch->split, &scratch->across, &scratch->odd, &scratch->even, &scratch->packed})
                 bytes += planes->bytes();
             for (const GpuPlanes& planes : scratch->steps) bytes += planes.bytes();
-            for (const GpuPlanes& planes : scratch->maskers) bytes += planes.bytes();
         }
         if (!judging) return bytes;
         for (const GpuPlanes* planes :
@@ -592,18 +542,11 @@ struct VisibilityPasses::Impl {
     ThresholdMaps maps;
     std::set<int> present_maps; // those that are of the present reference
     mutable int passes_done = 0;
-    struct Elevations {
-        int cell_px;
-        glm::ivec2 cells;
-        GpuPlanes planes; // one band below the other
-        bool is_of_reference;
-    };
-    std::optional<Elevations> elevations;
 
     const Program *copy = nullptr, *subtract = nullptr, *reduce_rows = nullptr, *reduce_columns = nullptr,
                   *split_reference = nullptr, *split_base = nullptr, *split_difference = nullptr, *weigh = nullptr,
                   *step = nullptr, *square = nullptr, *halve = nullptr, *raise = nullptr, *pool_powers = nullptr,
-                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr, *mask = nullptr, *elevate = nullptr;
+                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr;
     std::array<const Program*, 3> blur_rows = {}, blur_columns = {};
     ContextGuard guard;
 };
@@ -652,20 +595,6 @@ Result<std::vector<float>> VisibilityPasses::read_thresholds(int number) const {
 }
 
 unsigned VisibilityPasses::thresholds_texture(int number) const noexcept { return impl_->maps.texture(number); }
-
-Result<void> VisibilityPasses::map_elevations(int cell_px) {
-    return in_context(impl_->context, "Mapping elevations", [&] { return impl_->map_elevations(cell_px); });
-}
-
-Result<ElevationGrid> VisibilityPasses::read_elevations() const {
-    if (!impl_->elevations || !impl_->elevations->is_of_reference)
-        return judge_error("there is no map of elevations yet");
-    const Impl::Elevations& from = *impl_->elevations;
-    const glm::ivec2 texels(from.cells.x, from.cells.y * static_cast<int>(impl_->bands.size()));
-    return in_context(impl_->context, "Reading elevations", [&] {
-        return ElevationGrid{from.cell_px, from.cells.x, from.cells.y, read_floats(from.planes.texture(), texels)};
-    });
-}
 
 int VisibilityPasses::full_screen_passes() const noexcept { return impl_->passes_done; }
 

@@ -1,9 +1,12 @@
 // What a picture hides folds, and nobody sees it: by drawings of scenes whose parts lie behind others.
 #include <unseen/session_gpu/as_seen.h>
 
+#include <unseen/calibration/light_rig.h>
 #include <unseen/perception/judge.h>
 #include <unseen/render/internal/frame.h>
 #include <unseen/render/renderer.h>
+#include <unseen/session/load.h>
+#include <unseen/session_gpu/scene_renderer.h>
 
 #include "built.h"
 #include "measured.h"
@@ -213,6 +216,128 @@ TEST_F(AsSeen, PicturesAreOfTheirOwnViewAlone) {
     EXPECT_THAT(error_in(session.simplify(view, request)), HasSubstr("request.shown is of several views"));
     request.purpose = Purpose::mesh; // looked at from all of them
     EXPECT_TRUE(session.simplify(view, request));
+}
+
+// Upright dark bars before what stands in the middle, across the view, so many a unit of length, half of it open.
+VertexTree bars(double bars_per_unit, bool is_prelit) {
+    Mesh mesh;
+    for (double x = -1.6; x < 1.6; x += 1 / bars_per_unit)
+        mesh = shapes::together(mesh, shapes::placed(shapes::cube(1), 1 / (4 * bars_per_unit), {x, 0, 1.5}));
+    for (glm::dvec3& p : mesh.positions) p.y = p.y > 0 ? 1.6 : -1.6;
+    mesh.colours.assign(mesh.positions.size(), {0.02F, 0.02F, 0.02F, 1});
+    return support::built(mesh, {.prelit = is_prelit});
+}
+
+constexpr int side = 256;
+
+vdtree::View from_afar() {
+    vdtree::View view;
+    view.eye = {0, 0, 18};
+    view.width = view.height = side;
+    view.fov_y_degrees = perception::physical_field({}, side).value();
+    return view;
+}
+
+TEST_F(AsSeen, WhatIsBehindBarsOfTheBackdropFolds) {
+    Mesh ball = shapes::icosphere(6); // rough, so that it keeps many triangles
+    std::mt19937_64 random(11);
+    for (glm::dvec3& p : ball.positions) p *= shapes::random_between(random, 0.998, 1.002);
+    Scene scene = Scene::of(support::measured(support::built(ball), 0));
+    scene.backdrop.push_back({bars(1, true)});
+    Session session = *Session::create(std::move(scene));
+    const auto made = [&](bool folds_hidden) {
+        return require(simplify_as_seen(session, context_, from_afar(), {}, {.folds_hidden = folds_hidden}));
+    };
+    const auto hidden = made(true);
+    EXPECT_LT(hidden->stats.triangles, 0.8 * made(false)->stats.triangles);
+    auto renderer = require(SceneRenderer::create(context_, session));
+    const auto picture = [&](const vdtree::Cut& cut) {
+        const DrawnCut drawn[] = {{&cut}};
+        return luminance_image(
+            *require(renderer->draw(drawn, from_afar(), {.samples = 16, .background = session.background()})), {});
+    };
+    vdtree::Cut whole(session.tree());
+    whole.unfold_all();
+    const auto judged = require(perception::judge_modern(picture(whole), picture(hidden->cuts[0]), {}));
+    EXPECT_EQ(judged->visible_pixels, 0u) << judged->max_ratio;
+}
+
+class PassesTest : public AsSeen {
+protected:
+    // Two balls, one far behind the other, behind bars; lit by a sun, which casts shadows or none, if wanted.
+    static Session session_of(std::optional<bool> casts) {
+        static const VertexTree ball =
+            *measured_under_lights(support::measured(support::built(shapes::bumpy_sphere(4, 0.01)))); // once for all
+        Scene scene = Scene::of(ball.share());
+        scene.objects.push_back({ball.share(), {.translation = {1, 0, -60}}, "far"});
+        scene.backdrop.push_back({bars(12, !casts.has_value())});
+        if (casts) {
+            vdtree::LightSource sun;
+            sun.direction = glm::normalize(glm::dvec3(0.3, 0.5, 1));
+            sun.intensity = 0.7;
+            sun.casts_shadow = *casts;
+            scene.lights = *calibration::LightRig::of({.lights = {sun}, .ambient = 0.2}, "a sun");
+        }
+        return *Session::create(std::move(scene));
+    }
+    std::vector<Effect> passes(Session& session, const Request& request = {}, bool folds_hidden = true) {
+        const auto made = require(
+            simplify_as_seen(session, context_, from_afar(), request, {.folds_hidden = folds_hidden, .samples = 4}));
+        for (const Effect& effect : made->passes) {
+            EXPECT_FALSE(effect.why.empty()) << effect.name;
+            const bool was_drawn = effect.surface_passes > 0;
+            EXPECT_EQ(was_drawn, effect.on) << effect.name;
+            EXPECT_EQ(was_drawn, effect.texture_bytes > 0) << effect.name;
+            EXPECT_EQ(was_drawn, effect.milliseconds > 0) << effect.name;
+        }
+        return made->passes;
+    }
+    static const Effect& of(const std::vector<Effect>& passes, const char* name) {
+        return *std::ranges::find(passes, name, &Effect::name);
+    }
+};
+
+TEST_F(PassesTest, OfOcclusionAreThoseOfItsDepths) {
+    Session session = session_of({});
+    const auto all = passes(session);
+    EXPECT_EQ(of(all, "occlusion").surface_passes, 4);
+    EXPECT_EQ(of(all, "occlusion").texture_bytes, 4u * side * side);
+    EXPECT_FALSE(of(all, "shadows").on);
+}
+
+TEST_F(PassesTest, AreNoneWhereNothingIsAskedFor) {
+    Session session = session_of(true);
+    EXPECT_THAT(passes(session, {}, false), ::testing::IsEmpty());
+}
+
+TEST_F(PassesTest, AreOffWherePicturesTellNothing) {
+    Session session = session_of(true);
+    const auto all = passes(session, {.goal = Goal::full()});
+    for (const char* off : {"occlusion", "shadows"}) {
+        EXPECT_FALSE(of(all, off).on) << off;
+        EXPECT_THAT(of(all, off).why, HasSubstr("nothing is folded")) << off;
+    }
+}
+
+TEST_F(PassesTest, OfShadowsAreThereWhereALightCastsSome) {
+    Session dark = session_of(false), cast = session_of(true);
+    const auto without = passes(dark), with = passes(cast);
+    EXPECT_FALSE(of(without, "shadows").on);
+    EXPECT_EQ(of(with, "shadows").surface_passes, 1);
+    EXPECT_TRUE(of(with, "occlusion").on);
+}
+
+TEST_F(PassesTest, AreDrawnOnceForACameraThatStandsStill) {
+    Session session = session_of(true);
+    const Request request{.purpose = Purpose::picture};
+    const auto made = require(session.simplify(from_afar(), request));
+    auto renderer = require(SceneRenderer::create(context_, session));
+    for (int frame = 0; frame < 3; ++frame)
+        ASSERT_TRUE(renderer->draw(drawn_cuts(made->cuts), from_afar(), {.samples = 1}));
+    EXPECT_EQ(renderer->shadows()->redraws, 1u);
+    Follower follower(session);
+    ASSERT_TRUE(follower.follow(from_afar(), request));
+    EXPECT_EQ(follower.follow(from_afar(), request)->stats.node_tests, 0u);
 }
 
 } // namespace unseen::session::as_seen_test

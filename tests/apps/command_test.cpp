@@ -703,12 +703,7 @@ TEST_F(SimplifyTest, ASingleTriangleIsValid) {
     EXPECT_EQ(outcome.json()["triangles"], 1);
 }
 
-TEST_F(SimplifyTest, TakesNoOptionThatDoesNothing) {
-    for (const Words& other : {Words{"--fold-test", "luebke-hallen"}, {"--pixels", "2"}, {"--full"}}) {
-        const Outcome refused = run(joined({"simplify", "ball.vdt", "-o", "x.ply", "--masking", "scene"}, other));
-        EXPECT_NE(refused.status, 0);
-        EXPECT_THAT(refused.err, HasSubstr("only --fold-test error knows what masks"));
-    }
+TEST_F(SimplifyTest, FoldsWhatIsHiddenWhereAskedTo) {
     const auto triangles = [&](Words more) {
         return run(joined({"simplify", "ball.vdt", "-o", "x.ply", "--json", "-"}, more)).json()["triangles"].get<int>();
     };

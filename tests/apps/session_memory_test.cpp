@@ -24,7 +24,7 @@ struct Question {
     std::optional<session::Gaze> gaze;
     perception::DegreesPerSecond velocity{0};
     double seconds = 0;
-    bool is_shown = false, is_masked = false; // pictures of the view and of no other
+    bool is_shown = false; // a picture of the view and of no other
 };
 
 // Makes the change of a number, and returns how many there are. A new field of any of these structs does not compile here
@@ -45,8 +45,8 @@ int change(Question& q, int number) {
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 
-    auto& [goal, fold_test, milliseconds, hysteresis, purpose, order, shown, masking, keeps_shadows, may_measure,
-           reasons] = q.request;
+    auto& [goal, fold_test, milliseconds, hysteresis, purpose, order, shown, keeps_shadows, may_measure, reasons] =
+        q.request;
     set(goal, Goal::full());
     set(goal, Goal::budget(400));
     set(goal, Goal::budget(400, true));
@@ -62,8 +62,7 @@ int change(Question& q, int number) {
     set(may_measure, false);
     set(reasons, false);
     set(q.is_shown, true);
-    set(q.is_masked, true);
-    static_cast<void>(shown), static_cast<void>(masking); // made of the view when it is known
+    static_cast<void>(shown); // made of the view when it is known
 
     const session::Observer whole;
     [[maybe_unused]] const auto& [display, person, csf, gaze, velocity] = whole; // the first three stay with a session
@@ -76,19 +75,12 @@ int change(Question& q, int number) {
     return count;
 }
 
-session::Request with_pictures(const Question& q, const Session& session) {
+session::Request with_picture(const Question& q) {
     session::Request request = q.request;
     const auto pixels = static_cast<std::size_t>(q.view.width) * static_cast<std::size_t>(q.view.height);
     if (q.is_shown) { // a wall through the middle
         const auto shown = vdtree::DepthPicture::create(q.view, std::vector<float>(pixels, 4));
         if (shown) request.shown = {*shown};
-    }
-    if (q.is_masked) {
-        perception::MaskingPicture::Elevations e{32, (q.view.width + 31) / 32, (q.view.height + 31) / 32, {}, {}};
-        e.bands.emplace_back(8);
-        e.elevation.assign(static_cast<std::size_t>(e.columns) * static_cast<std::size_t>(e.rows), 4);
-        const auto masking = perception::MaskingPicture::create(q.view, {&e, 1});
-        if (masking) request.masking.assign(session.scene().objects.size(), *masking);
     }
     return request;
 }
@@ -104,7 +96,7 @@ Answer ask(Session& session, const Question& q) {
     session.set_gaze(q.gaze);
     session.set_velocity(q.velocity);
     session.set_time(q.seconds);
-    const auto made = session.simplify(q.view, with_pictures(q, session));
+    const auto made = session.simplify(q.view, with_picture(q));
     if (!made) return {{}, made.error().message};
     Answer answer;
     for (const vdtree::Cut& cut : made->cuts) {

@@ -21,7 +21,7 @@ using vdtree::VertexTree;
 Result<vdtree::DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
                                                const vdtree::View& view, const FoldTestOptions& options) {
     const LitErrors own{&tree, errors};
-    return vdtree::DistanceCriterion::create(tree, criterion_parts({&own, 1}, {}, view, options, {}));
+    return vdtree::DistanceCriterion::create(tree, criterion_parts({&own, 1}, {}, view, options));
 }
 
 // A noisy height field of n x n quads, each vertex of a grey of its own.

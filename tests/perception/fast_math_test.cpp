@@ -35,7 +35,7 @@ TEST(FastMath, IsExactWhereItCanBe) {
 }
 
 TEST(FastMath, ElevatesThresholdsAsDalySays) {
-    constexpr double of_elevation = 1e-5; // as masking.h says
+    constexpr double of_elevation = 1e-5; // as modern_masking.h says
     EXPECT_EQ(fast_daly_elevation(0), 1);
     for (int i = 0; i <= 1000; ++i) {
         const double masker = std::pow(10, -6 + 15e-3 * i);

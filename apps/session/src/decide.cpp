@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/internal/motion.h>
 #include <unseen/vdtree/internal/errors.h>
 
 #include "fold_test.h"
@@ -82,13 +81,9 @@ Result<void> check_knowledge(Sight& sight, FoldTest test, bool shown) {
 
 } // namespace
 
-Result<Decision> decide(Sight& sight, const Request& request, std::size_t object) {
+Result<Decision> decide(Sight& sight, const Request& request) {
     if (request.purpose == Purpose::picture && !request.shown.empty() && request.shown[0].view() != sight.view)
         return invalid_field("{request.shown} is of another view.");
-    if (!request.masking.empty() && object >= request.masking.size())
-        return invalid_field("{request.masking} has fewer pictures than the scene has objects.");
-    if (!request.masking.empty() && request.masking[object].view() != sight.view)
-        return invalid_field("{request.masking} is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
@@ -103,15 +98,7 @@ Result<Decision> decide(Sight& sight, const Request& request, std::size_t object
         return invalid_field(
             "{request.fold_test = }error goes by errors that the tree does not hold: allow {request.may_measure}, or "
             "call {session::measured()}.");
-    const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
-    return Decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
-}
-
-const char* why_unmasked(const Sight& sight) {
-    if (sight.observer.gaze && sight.observer.gaze->margin_deg > 0) return "the gaze is not known for sure";
-    if (sight.observer.velocity > perception::least_velocity) return "what moves over the retina masks otherwise";
-    if (is_translucent(sight)) return "what is behind the object may show through it";
-    return nullptr;
+    return Decision{request, choice.test, choice.why, measures};
 }
 
 } // namespace unseen::session

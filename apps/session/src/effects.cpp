@@ -243,16 +243,6 @@ Reason summed(const Cutting& c) {
                 " adds up to the least, as far as nothing sticks out"};
 }
 
-Reason masking(const Cutting& c) {
-    if (c.decision.masking)
-        return {true, "folds are tested against thresholds that the scene around the object raises in this view, by " +
-                          std::to_string(c.decision.masking->bands().size()) + " bands of frequency"};
-    if (c.decision.request.masking.empty())
-        return {false, Message::of("without {request.masking} nothing masks what folds change")};
-    if (c.decision.test != FoldTest::error) return {false, "the fold test " + c.test() + " does not know it"};
-    return {false, why_unmasked(c.sight)};
-}
-
 Reason time_limit(const Cutting& c) {
     if (!c.decision.request.milliseconds) return {false, "none is given"};
     return {true, !c.facts               ? "it ends the cut; the worst folds are undone first"
@@ -290,7 +280,6 @@ constexpr EffectRow rows_of_folds[] = {
     {"back-face folding", Needs::picture, from_elsewhere, back_face_folding},
     {"hidden folding", Needs::pictures, from_elsewhere, hidden_folding},
     {"sum of errors", Needs::pictures, "what adds up is seen in a picture alone", summed},
-    {"masking", Needs::nothing, "", masking},
     {"time limit", Needs::nothing, "", time_limit},
 };
 

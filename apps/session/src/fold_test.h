@@ -7,7 +7,7 @@ namespace unseen::session {
 
 // Decides for one object of the scene. Fails if the request asks for a test that does not know what there is to
 // see.
-Result<Decision> decide(Sight& sight, const Request& request, std::size_t object);
+Result<Decision> decide(Sight& sight, const Request& request);
 
 // By contrast sensitivity, and for a goal that folds.
 bool is_perceptual(const Decision& decision);
@@ -33,8 +33,6 @@ bool is_out_of_sight(Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
 // Shadows of what is not seen.
 inline constexpr const char* may_cast = "what is not seen may cast shadows that are";
-// Why what a scene masks does not count for an object; null where it may.
-const char* why_unmasked(const Sight& sight);
 bool knows_shown(const Sight& sight, const Decision& decision);  // how much of each part pictures show
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 // Why a budget or a quality goes by the largest cost and not by the sum of errors; null where it goes by the sum.
@@ -90,7 +88,7 @@ Key key_of(const Sight& sight, const Decision& decision);
 perception::FoldTestOptions test_options(const Sight& sight, const Key& key);
 
 // See fold_tests.cpp, where each test makes its own.
-Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Decision& decision, const Key& key);
+Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Key& key);
 
 // The last one that the object was asked for. Objects with one tree share it, but not under lights.
 std::shared_ptr<const KeptCriterion>& last_criterion(Sight& sight, const Key& key);

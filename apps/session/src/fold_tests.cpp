@@ -15,16 +15,16 @@ using Criterion = Result<vdtree::DistanceCriterion>;
 struct Row {
     FoldTestFacts facts;
     std::string (*looks_at)(const Sight& sight);
-    Criterion (*make)(Sight& sight, const Decision& decision, const Key& key);
+    Criterion (*make)(Sight& sight, const Key& key);
 };
 
-Criterion make_luebke_hallen(Sight& sight, const Decision&, const Key& key) {
+Criterion make_luebke_hallen(Sight& sight, const Key& key) {
     const perception::FoldTestOptions options = test_options(sight, key);
     return sight.lighting ? perception::lit_distances(sight.object.tree, sight.cache.light_bounds, sight.view, options)
                           : perception::luebke_hallen_distances(sight.object.tree, sight.view, options);
 }
 
-Criterion make_luebke_hallen_safe(Sight& sight, const Decision&, const Key& key) {
+Criterion make_luebke_hallen_safe(Sight& sight, const Key& key) {
     const perception::FoldTestOptions options = test_options(sight, key);
     const vdtree::VertexTree& tree = sight.object.tree;
     const auto rings = cut_rings(sight.object, sight.cache);
@@ -50,15 +50,10 @@ std::vector<vdtree::Lighting> without_hidden(const vdtree::Lighting& lighting) {
     return all;
 }
 
-Criterion make_error(Sight& sight, const Decision& decision, const Key& key) {
+Criterion make_error(Sight& sight, const Key& key) {
     const perception::FoldTestOptions options = test_options(sight, key);
-    const auto by_errors = [&](const auto& of) {
-        return decision.masking ? perception::masked_error_distances(of, sight.object.placement, *decision.masking,
-                                                                     sight.view, options)
-                                : perception::error_distances(of, sight.view, options);
-    };
     const vdtree::VertexTree& tree = sight.object.tree;
-    if (!sight.lighting) return by_errors(tree);
+    if (!sight.lighting) return perception::error_distances(tree, sight.view, options);
     std::vector<vdtree::Lighting> lightings; // of which the worst counts
     if (sight.stretch) {
         lightings = *sight.stretch;
@@ -72,15 +67,15 @@ Criterion make_error(Sight& sight, const Decision& decision, const Key& key) {
         if (!lit) return lit.error();
         all.push_back({std::move(*lit), std::move(lighting)});
     }
-    if (all.size() == 1) return by_errors(all.front().tree);
-    return by_errors(std::span<const perception::TreeAsLit>(all));
+    if (all.size() == 1) return perception::error_distances(all.front().tree, sight.view, options);
+    return perception::error_distances(all, sight.view, options);
 }
 
-Criterion make_extent(Sight& sight, const Decision&, const Key& key) {
+Criterion make_extent(Sight& sight, const Key& key) {
     return vdtree::extent_criterion(sight.object.tree, sight.view, key.pixels);
 }
 
-Criterion make_displacement(Sight& sight, const Decision&, const Key& key) {
+Criterion make_displacement(Sight& sight, const Key& key) {
     return vdtree::displacement_criterion(sight.object.tree, sight.view, key.pixels);
 }
 
@@ -132,8 +127,8 @@ std::string name_of(FoldTest test) { return std::string(facts_of(test).name); }
 
 std::string what_it_looks_at(const Sight& sight, FoldTest test) { return row_of(test).looks_at(sight); }
 
-Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Decision& decision, const Key& key) {
-    return row_of(decision.test).make(sight, decision, key);
+Result<vdtree::DistanceCriterion> make_criterion(Sight& sight, const Key& key) {
+    return row_of(key.test).make(sight, key);
 }
 
 // ---- what criteria depend on

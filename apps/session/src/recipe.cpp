@@ -220,18 +220,14 @@ Result<void> fold_by_what_is_shown(Sight& sight, const Decision& decision,
 
 Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
-    // What a view masks is of that view alone.
-    std::shared_ptr<const KeptCriterion>& last = last_criterion(sight, key);
-    std::shared_ptr<const KeptCriterion> masked;
-    if (decision.masking || !last || !(last->key == key)) {
-        auto made = make_criterion(sight, decision, key);
+    std::shared_ptr<const KeptCriterion>& kept = last_criterion(sight, key);
+    if (!kept || !(kept->key == key)) {
+        auto made = make_criterion(sight, key);
         if (!made) return made.error();
         auto edges = edges_of(sight, decision, key);
         if (!edges) return edges.error();
-        (decision.masking ? masked : last) =
-            std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
+        kept = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
     }
-    const auto& kept = decision.masking ? masked : last;
     CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
     if (!knows_shown(sight, decision)) {
         if (!kept->edges || !decision.request.keeps_shadows) return recipe;

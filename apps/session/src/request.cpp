@@ -63,8 +63,6 @@ bool goes_by_sum(const Request& r) noexcept {
 Result<void> validate(const Request& r) {
     if (r.shown.size() > 1 && r.purpose == Purpose::picture)
         return invalid_field("{request.shown} is of several views: set {request.purpose} = mesh.");
-    if (!r.masking.empty() && r.purpose != Purpose::picture)
-        return invalid_field("{request.masking} is of pictures: set {request.purpose} = picture.");
     if (const auto goal = validate_goal(r); !goal) return goal;
     if (r.milliseconds && !(*r.milliseconds >= 0 && std::isfinite(*r.milliseconds)))
         return invalid_field("{request.milliseconds} must be 0 or more, and finite.");

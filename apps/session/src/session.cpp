@@ -358,7 +358,7 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
     if (!sights) return sights.error();
     std::vector<Decision> decisions;
     for (std::size_t i = 0; i < sights->size(); ++i) {
-        auto decision = decide((*sights)[i], request, i);
+        auto decision = decide((*sights)[i], request);
         if (!decision) return decision.error();
         decisions.push_back(std::move(*decision));
     }
@@ -445,7 +445,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
     ShadowMemory none;
     auto sights = state_->look(view, none);
     if (!sights) return sights.error();
-    const auto decision = decide((*sights)[object], request, object);
+    const auto decision = decide((*sights)[object], request);
     if (!decision) return decision.error();
     return plan_of((*sights)[object], *decision);
 }

@@ -92,9 +92,8 @@ inline ShadowState& shadow_of(Sight& sight) { return sight.memory.of_objects[sig
 struct Decision {
     const Request& request;
     FoldTest test;
-    std::string_view why;                                // not the default
-    bool measures = false;                               // the tree lacks the errors of its folds
-    const perception::MaskingPicture* masking = nullptr; // of what the scene masks of the object; null: nothing is
+    std::string_view why;  // not the default
+    bool measures = false; // the tree lacks the errors of its folds
 };
 
 // Around all that fold tests look at: vertices, proxies, rings. Larger than that of the triangles.

@@ -19,8 +19,8 @@ class SwitchDistances {
 public:
     // `added`: rows that add() will ask for.
     SwitchDistances(const PatternLevels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
-                    const Surround& surround, const BandElevation& masking, std::size_t bins, std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround), masking_(masking),
+                    const Surround& surround, std::size_t bins, std::size_t added)
+        : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround),
           bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
           discs_(pattern_luminance_count), eyes_(pattern_luminance_count) {
         begin();
@@ -87,7 +87,7 @@ private:
             const Dimming dimming(bands_, surround_, cdm2, screen_.highest_cpd, model_);
             for (std::size_t b = 0; b < bins_; ++b)
                 eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, cdm2, screen_, bands_, dimming,
-                                  masking_, model_);
+                                  model_);
         }
         return eyes[bin];
     }
@@ -164,7 +164,6 @@ private:
     const CsfTable& csf_;
     const FoldModel& model_;
     const Surround surround_;
-    const BandElevation& masking_;
     const PatternBands bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
@@ -439,8 +438,7 @@ void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> er
 } // namespace
 
 DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std::span<const FoldStage> measured_stages,
-                                         const vdtree::View& view, const FoldTestOptions& options,
-                                         const BandElevation& masking) {
+                                         const vdtree::View& view, const FoldTestOptions& options) {
     const vdtree::SoundTree& tree = *as_lit.front().tree;
     const std::span<const FoldError> errors = as_lit.front().errors;
     const NodeId nodes = tree.interior_count();
@@ -458,7 +456,7 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const Surround surround = surround_of(tree, options);
-    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking, parts.eccentricity_bins,
+    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, parts.eccentricity_bins,
                                      measured_stages.size());
     std::optional<ShownFolds> shown;
     while (!(shown = find_shown(as_lit, options, csf, screen.highest_cpd, switch_distances)))
@@ -473,7 +471,7 @@ DistanceCriterion::Parts criterion_parts(std::span<const LitErrors> as_lit, std:
             behind.scene.behind->hi = std::max(behind.scene.behind->hi, own.hi);
         }
     const std::vector<float> distances =
-        stage_distances(tree, measured_stages, screen, behind, masking, parts.eccentricity_bins);
+        stage_distances(tree, measured_stages, screen, behind, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<ShownFold> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
@@ -507,8 +505,7 @@ Result<DistanceCriterion> error_distances(std::span<const TreeAsLit> as_lit, con
     if (const auto valid = validate(options.model); !valid) return valid.error();
     const auto trees = LitTrees::of(as_lit, options.model);
     if (!trees) return trees.error();
-    return DistanceCriterion::create(trees->tree(),
-                                     criterion_parts(trees->as_lit(), trees->stages(), view, options, {}));
+    return DistanceCriterion::create(trees->tree(), criterion_parts(trees->as_lit(), trees->stages(), view, options));
 }
 
 } // namespace unseen::perception

@@ -157,7 +157,7 @@ struct Dimming {
 class PatternEye {
 public:
     PatternEye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen,
-               const PatternBands& bands, const Dimming& dimming, const BandElevation& masking, const FoldModel& model)
+               const PatternBands& bands, const Dimming& dimming, const FoldModel& model)
         : screen_(screen), model_(model) {
         // To contrasts over the pattern's own luminance, by octaves that the mean around it is less: [octaves][band].
         Sensitivities sensitivities(dimming.most + 1);
@@ -165,9 +165,8 @@ public:
             for (std::size_t band = 0; band < bands.lowest_cpd.size(); ++band) {
                 const double less = std::exp2(static_cast<double>(octaves));
                 const double cpd = bands.lowest_cpd[band];
-                const double here = less / masking.at(cpd) *
-                                    csf.monotone_sensitivity(CyclesPerDegree(cpd), Degrees(eccentricity_deg),
-                                                             Luminance(luminance_cdm2 / less));
+                const double here = less * csf.monotone_sensitivity(CyclesPerDegree(cpd), Degrees(eccentricity_deg),
+                                                                    Luminance(luminance_cdm2 / less));
                 sensitivities[octaves].push_back(octaves > 0 ? std::max(here, sensitivities[octaves - 1][band]) : here);
             }
         const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));

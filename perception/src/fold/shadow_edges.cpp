@@ -36,7 +36,7 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
             const double cdm2 = levels.luminance(luminance);
             const Surround none{cdm2, 1}; // strips are not dimmed
             const Dimming dimming(bands, none, cdm2, screen.highest_cpd, options.model);
-            eye = eyes.emplace(luminance, PatternEye(csf, 0, cdm2, screen, bands, dimming, {}, options.model)).first;
+            eye = eyes.emplace(luminance, PatternEye(csf, 0, cdm2, screen, bands, dimming, options.model)).first;
         }
         const int contrast = levels.contrast_level(levels.difference_in_cdm2(own), mean);
         const double needed_widths =

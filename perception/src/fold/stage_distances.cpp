@@ -24,8 +24,7 @@ using Bands = std::array<Band, finer_bands + FoldStage::band_count>;
 class Eye {
 public:
     // Sees the brightest of the mesh, and what is behind it.
-    Eye(const CsfTable& csf, double eccentricity_deg, Luminance mesh, Luminance behind, double highest_cpd,
-        const BandElevation& masking) {
+    Eye(const CsfTable& csf, double eccentricity_deg, Luminance mesh, Luminance behind, double highest_cpd) {
         for (std::size_t i = 0; i < angle_count; ++i) {
             for (std::size_t b = 0; b < bands_[i].size(); ++b) {
                 const double octaves_finer = b < finer_bands ? static_cast<double>(finer_bands - b) : 0;
@@ -40,12 +39,9 @@ public:
                     share_on_display(cpd / highest_cpd) *
                     summation_gain(CyclesPerDegree(at), disc(angle(i)), csf.samples().summation) *
                     csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), Luminance(luminance));
-                // What masks from without contains the mesh's own contrast, so the larger of the two counts.
-                const double from_without = masking.at(at);
                 for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) {
                     const double mask = b < finer_bands ? 0 : static_cast<double>(FoldStage::masks[row]);
-                    bands_[i][b][row] = std::exp2(octaves_finer) * sensitivity /
-                                        std::max(daly_elevation(mask * sensitivity), from_without);
+                    bands_[i][b][row] = std::exp2(octaves_finer) * sensitivity / daly_elevation(mask * sensitivity);
                 }
             }
         }
@@ -95,8 +91,7 @@ private:
 } // namespace
 
 std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages,
-                                   const Screen& screen, const FoldTestOptions& options, const BandElevation& masking,
-                                   std::size_t bins) {
+                                   const Screen& screen, const FoldTestOptions& options, std::size_t bins) {
     const vdtree::LuminanceRange behind =
         options.scene.behind.value_or(vdtree::LuminanceRange{options.scene.darkest, options.scene.brightest});
     std::size_t first = 0,
@@ -115,8 +110,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
 
     std::vector<float> distances(stages.size() * bins);
     for (std::size_t bin = 0; bin < bins && !stages.empty(); ++bin) {
-        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, brightest_behind, screen.highest_cpd,
-                      masking);
+        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, brightest_behind, screen.highest_cpd);
         for (std::size_t stage = 0; stage < stages.size(); ++stage) {
             const double on_screen = eye.largest_angle(stages[stage], first, last, contrast_factor);
             const double seen = on_screen / screen.largest_magnification / degrees_per_radian;

@@ -455,7 +455,7 @@ Result<JudgeTables> judge_tables(int width, int height, float darkest_cdm2, floa
         tables.first_eccentricity = band.first_eccentricity();
         tables.luminances = static_cast<int>(band.luminances());
         tables.eccentricities = static_cast<int>(band.eccentricities());
-        tables.bands.push_back({nominal_frequency(conditions.ppd, level), static_cast<float>(band.of_patch()),
+        tables.bands.push_back({static_cast<float>(band.of_patch()),
                                 SummationWindow(summation_area_in_samples(conditions, level)).gaussians(),
                                 band.nodes()});
     }

@@ -6,7 +6,6 @@
 
 #include <unseen/vdtree/internal/errors.h>
 #include <unseen/vdtree/internal/footprint.h>
-#include <unseen/vdtree/internal/parallel.h>
 
 namespace unseen::vdtree {
 
@@ -27,28 +26,6 @@ Footprint Projector::operator()(glm::dvec3 point) const noexcept {
     const double x = axis_px_.x + scale * glm::dot(from_eye, camera_.right);
     const double y = axis_px_.y - scale * glm::dot(from_eye, camera_.up);
     return {x, y, x, y, along};
-}
-
-Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view) {
-    if (const auto valid = validate_perspective(view, "What parts cover of a window"); !valid) return valid.error();
-    const auto sound = SoundTree::of(tree);
-    if (!sound) return sound.error();
-    const NodeId interior = tree.interior_count();
-    const Projector project(view);
-    std::vector<Footprint> footprints(tree.node_count());
-    parallel_loop(NodeId{0}, tree.node_count(), [&](NodeId node) {
-        footprints[node] = project(placement.to_world(tree.origin() + glm::dvec3(tree.position(node))));
-    });
-    // Places: all triangles that touch them. From their own positions, not from what has grown.
-    std::vector<Footprint> places(footprints.begin() + interior, footprints.end());
-    for (const Triangle& triangle : sound->triangles())
-        for (const Index corner : triangle)
-            for (const Index other : triangle)
-                places[tree.place_of_leaf(corner) - interior].add(footprints[tree.place_of_leaf(other)]);
-    std::copy(places.begin(), places.end(), footprints.begin() + interior);
-    for (NodeId node = tree.node_count(); node-- > 1;) footprints[sound->parents()[node]].add(footprints[node]);
-    footprints.resize(interior);
-    return footprints;
 }
 
 namespace {

@@ -76,7 +76,6 @@ public:
           most_v_(request_.goal.cost) {
         request_.purpose = options.cell_degrees > 0 ? Purpose::mesh : Purpose::picture;
         request_.shown.clear();
-        request_.masking.clear();
         facts_.most_v = most_v_, facts_.cell_degrees = options.cell_degrees;
     }
 

@@ -22,7 +22,6 @@
 // Fold tests, and what is measured for them.
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
-#include <unseen/perception/masking.h>
 
 // Pictures, and judges of them.
 #include <unseen/perception/image.h>

@@ -35,9 +35,6 @@ public:
     // the next call.
     Result<std::span<const glm::vec4>> mean();
 
-    // The mean relative luminance of the samples so far, on the GPU.
-    LuminanceTexture mean_luminance() const noexcept;
-
 private:
     struct Impl;
     explicit SampleSum(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -8,7 +8,7 @@
 
 namespace unseen::vdtree {
 
-struct Footprint; // the part of a window that a node covers
+struct Footprint; // the part of a window that points cover
 
 // Copies are cheap and share their data; any number of threads may ask at once.
 class DepthPicture {

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include <unseen/perception/masking.h>
 #include <unseen/vdtree/depth_picture.h>
 #include <unseen/vdtree/mesh.h>
 #include <unseen/vdtree/result.h>
@@ -101,9 +100,6 @@ struct Request {
     // folds for being hidden, so that the mesh may be looked at from elsewhere. <unseen/session_gpu/as_seen.h> draws them.
     // Under lights only the test `error` uses them.
     std::vector<vdtree::DepthPicture> shown = {};
-    // For pictures: how much the scene masks each object in this very view; by object, or empty. Used by the test
-    // `error`, if the gaze is known exactly and nothing moves over the retina.
-    std::vector<perception::MaskingPicture> masking = {};
     // Keep outlines whose shadows would move visibly. False: the cut is for the eye alone; its shadows may reveal it.
     bool keeps_shadows = true;
     // Measure the errors of folds if the test needs them and the tree lacks them, which takes up to a minute. False:

@@ -13,6 +13,7 @@
 // It needs no command line and no OpenGL, and prints nothing: Messages receive notes and warnings.
 #pragma once
 
+#include <unseen/perception/criterion.h>
 #include <unseen/session/follower.h>
 #include <unseen/session/gaze_player.h>
 #include <unseen/session/level_chain.h>

@@ -12,10 +12,10 @@ struct Effect {
     bool on = false;
     Message why = {};
     // Only for passes, and only if they ran:
-    int surface_passes = 0, full_screen_passes = 0; // drawings of the scene, with one sample each; of planes
-    std::uint64_t texture_bytes = 0;                // on the GPU, the most at a time
-    double milliseconds = 0;                        // wall-clock time
-    std::size_t object = 0;                         // of the scene
+    int surface_passes = 0;          // drawings of the scene, with one sample each
+    std::uint64_t texture_bytes = 0; // on the GPU, the most at a time
+    double milliseconds = 0;         // wall-clock time
+    std::size_t object = 0;          // of the scene
 };
 
 // For one object. The default fold test is `error`, if the tree has the errors of its folds or they may be measured.

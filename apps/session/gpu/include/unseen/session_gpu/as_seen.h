@@ -6,29 +6,17 @@
 
 namespace unseen::session {
 
-// What may mask the changes that folds make.
-enum class Masking {
-    none,
-    scene, // in each band, the less of what the rest of the scene masks and what the picture masks
-};
-
 struct AsSeenOptions {
     bool folds_hidden = true; // fold everything that lies behind what the picture shows
-    Masking masking = Masking::none;
-    int samples = 16; // N-rooks points a pixel, 1 to 256; nodes that none of them shows are hidden
-    int layers = 5;   // of depth, 1 to 16; objects are masked by other layers than their own
+    int samples = 16;         // N-rooks points a pixel, 1 to 256; nodes that none of them shows are hidden
 };
 
 // A simplification for a picture of this very view. First the session's own simplification is drawn, to see what it
-// shows. `request.purpose` counts as picture.
-//
-// Passes that the view does not need are not drawn; Report::passes says which ran, why, and what they cost. Nothing is
-// masked if there is one object and nothing around it, if the gaze is uncertain, or if everything moves over the
-// retina. If the scene masks too little, the first simplification stays.
+// shows. `request.purpose` counts as picture. Report::passes says what was drawn, why, and what it cost.
 //
 // For the full model, for pixel tests, and under lights for tests other than `error`, the result is the session's own
-// simplification. Cost: two simplifications, `samples` drawings, with masking as many more for each layer, and the
-// trees on the GPU meanwhile. Fails where Session::simplify() and drawing do.
+// simplification. Cost: two simplifications, `samples` drawings, and the trees on the GPU meanwhile. Fails where
+// Session::simplify() and drawing do.
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,
                                         Request request, const AsSeenOptions& options = {});
 

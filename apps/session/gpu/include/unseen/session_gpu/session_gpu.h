@@ -1,8 +1,7 @@
 // session_gpu: drawing sessions with OpenGL, and judging the pictures. Include this first.
 //
 // - SceneRenderer draws all objects of a session and what surrounds them.
-// - simplify_as_seen() also folds whatever the picture hides, and what the scene masks; simplify_checked() as much as
-//   pictures show nothing of.
+// - simplify_as_seen() also folds whatever the picture hides; simplify_checked() as much as pictures show nothing of.
 // - PictureJudge judges what cuts show in a view; GpuJudge is perception::Judge on the GPU.
 // - measure_tradeoff() measures what accuracy costs in one view.
 // - make_levels() makes levels of detail for engines, with the distances from which nobody sees them.

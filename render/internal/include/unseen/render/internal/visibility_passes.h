@@ -42,13 +42,6 @@ struct VisibilitySummary {
     std::uint64_t visible_pixels = 0;
 };
 
-// The factors by which a picture raises thresholds, at least, in cells of a grid over it.
-struct ElevationGrid {
-    int cell_px = 0; // a side; cells at the right and the bottom may reach beyond the picture
-    int columns = 0, rows = 0;
-    std::vector<float> elevation; // [(band * rows + row) * columns + column], 1 or more; bands as in the tables
-};
-
 // Prepares a reference once, and judges any number of pictures against it. Everything is made on demand: the reference's
 // weights and the planes for judging in the first judge(), the threshold map in the first map_thresholds(). The same
 // pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
@@ -84,12 +77,6 @@ public:
 
     int full_screen_passes() const noexcept;      // since create()
     std::uint64_t texture_bytes() const noexcept; // of all textures except the tables
-
-    // Maps the reference's masking, band by band. The masker of a band is the mean around a sample, by a Gaussian of 1.5
-    // samples; a cell has the least of all samples in it or around it, so everything in some cells is masked by at least
-    // the least of these. Reading waits for the GPU, but less than reading a picture would. Cells are 1 to 64 pixels.
-    Result<void> map_elevations(int cell_px = 8);
-    Result<ElevationGrid> read_elevations() const; // fails where there is no map yet
 
 private:
     struct Impl;

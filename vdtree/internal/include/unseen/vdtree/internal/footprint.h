@@ -1,7 +1,6 @@
-// What nodes cover of a window.
+// What points cover of a window.
 #pragma once
 
-#include <unseen/vdtree/vertex_tree.h>
 #include <unseen/vdtree/view.h>
 
 namespace unseen::vdtree {
@@ -27,10 +26,5 @@ private:
     glm::dvec2 axis_px_;
     double focal_px_; // tangents in pixels
 };
-
-// By interior node: the footprint of its ring before and after the fold, and of all nodes below it. It holds as long as the
-// neighbours are unfolded, or folded under the same rule. Fails if VertexTree::check() fails, and for orthographic views.
-// Cost: some 40 ns a triangle in parallel, and 40 bytes a node.
-Result<std::vector<Footprint>> find_footprints(const VertexTree& tree, const Similarity& placement, const View& view);
 
 } // namespace unseen::vdtree

@@ -46,8 +46,7 @@ struct JudgeTables {
         int halvings = 0;
         std::vector<float> kernel; // from the middle on, along one axis; at most 12 values
     };
-    struct Band {               // level 0 first, the base last
-        double nominal_cpd = 0; // the frequency that it sees best
+    struct Band { // level 0 first, the base last
         float of_patch = 1;
         std::array<Gaussian, 3> window; // the law of area; from the widest on
         std::vector<Node> nodes;        // [e * luminances + l]

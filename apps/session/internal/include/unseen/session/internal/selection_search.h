@@ -2,6 +2,7 @@
 // composed from these images by depth, and only in the rectangle of the object that changes, so a search draws nothing.
 #pragma once
 
+#include <unseen/perception/display.h>
 #include <unseen/session/selection.h>
 
 namespace unseen::session {
