@@ -112,8 +112,9 @@ vdtree::Mesh whole_mesh(const vdtree::VertexTree& tree) {
     whole.unfold_all();
     vdtree::Mesh mesh = vdtree::extract_mesh(whole);
     const vdtree::TextureView texture = tree.texture();
-    mesh.texture = {texture.width, texture.height, texture.wrap_u, texture.wrap_v,
-                    std::vector(texture.texels.begin(), texture.texels.end())};
+    const auto copy = [](std::span<const vdtree::Texel> texels) { return std::vector(texels.begin(), texels.end()); };
+    mesh.texture = {texture.width,        texture.height, texture.wrap_u,         texture.wrap_v,
+                    copy(texture.texels), texture.blends, copy(texture.emission), copy(texture.relief)};
     return mesh;
 }
 

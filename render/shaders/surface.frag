@@ -1,7 +1,7 @@
 // The surface's shade, with the triangles' edges drawn over it (WIREFRAME). DISPLAY: for displays, opaque
-// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it. CUT_OUT: only where texels are there. DEPTH: no
-// colours. SHARE: instead of it, which share of its
-// light shadows leave it.
+// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it. CUT_OUT: only where texels are there; BLENDS:
+// by shares of the samples that are their alpha. RELIEF: lit by the normals of a normal map. EMISSION: with light of its own.
+// DEPTH: no colours. SHARE: instead of it, which share of its light shadows leave it.
 #ifdef FLAT
 layout(location = 0) flat in vec4 surface_shade;
 #else
@@ -27,14 +27,19 @@ vec4 bounded(vec4 shade) {
     return mix(highest_shade, shade, lessThanEqual(shade, highest_shade));
 }
 
-#ifdef CASTING
+#if defined(CASTING) || defined(RELIEF)
 layout(location = 4) in vec3 surface_place; // in the unit frame
-#ifdef FLAT
+#endif
+
+#ifdef CASTING
+#ifdef RELIEF
+// lit_luminance() knows what each light that casts shadows adds
+#elif defined(FLAT)
 layout(location = 5) flat in vec4 surface_cast[CASTING];
 #else
 layout(location = 5) in vec4 surface_cast[CASTING];
 #endif
-#ifdef TEXTURED
+#if defined(TEXTURED) && !defined(RELIEF)
 layout(location = 9) in vec4 surface_cast_highlights;
 #endif
 layout(location = 62) uniform vec4 whitest_shade; // what the sum is cut off at
@@ -120,11 +125,14 @@ vec4 visibilities() {
 
 #ifdef TEXTURED
 layout(location = 2) in vec2 surface_uv;
-#ifdef LIT
+#if defined(LIT) && !defined(RELIEF)
 layout(location = 3) in float surface_highlight;
 #endif
 
 layout(binding = 1) uniform sampler2D surface_image; // linear RGB
+#ifdef EMISSION
+layout(binding = 3) uniform sampler2D emission_image; // linear RGB
+#endif
 layout(location = 60) uniform float lod_bias;
 layout(location = 61) uniform vec4 uv_bounds; // the least of any vertex, and the largest: likewise
 
@@ -141,18 +149,73 @@ layout(location = 63) uniform float least_share; // spread evenly from 0 to 1 ov
 // Texels wider than this sample have outlines, where alpha is a half. Of finer ones a share of all samples is there.
 bool is_there() {
     vec2 uv = bounded_uv();
+    float alpha = texture(surface_image, uv, lod_bias).a;
+#ifdef BLENDS
+    return alpha >= least_share;
+#else
     float level = textureQueryLod(surface_image, uv).y + lod_bias;
-    return texture(surface_image, uv, lod_bias).a >= mix(0.5, least_share, clamp(level, 0.0, 1.0));
+    return alpha >= mix(0.5, least_share, clamp(level, 0.0, 1.0));
+#endif
 }
 #endif
 
 vec4 textured(vec4 shade, float highlight) {
     vec3 rgb = shade.rgb * texture(surface_image, bounded_uv(), lod_bias).rgb;
+#ifdef EMISSION
+    rgb += texture(emission_image, bounded_uv(), lod_bias).rgb;
+#endif
 #ifdef LIT
     rgb += vec3(highlight >= 0.0 ? highlight : 0.0); // neither less nor NaN, as for shades
+#endif
+#if defined(LIT) || defined(RELIEF) || defined(EMISSION)
     rgb /= max(dot(rgb, rec709), 1.0);
 #endif
     return vec4(rgb, dot(rgb, rec709));
+}
+#endif
+
+#ifdef RELIEF
+layout(location = 10) in vec4 surface_normal_and_albedo;
+layout(binding = 4) uniform sampler2D relief_image; // x, y, z from -1 to 1
+
+// The vertices' normal, tilted by the normal map: along the gradients of u and v on the triangle, the longer of which is a
+// unit (Schueler, "Normal mapping without precomputed tangents", 2013).
+vec3 tilted(vec3 n) {
+    vec3 across = dFdx(surface_place), along = dFdy(surface_place);
+    vec2 uv_across = dFdx(surface_uv), uv_along = dFdy(surface_uv);
+    vec3 p = cross(along, n), q = cross(n, across);
+    vec3 of_u = p * uv_across.x + q * uv_along.x, of_v = p * uv_across.y + q * uv_along.y;
+    float size = max(dot(of_u, of_u), dot(of_v, of_v));
+    if (!(size > 0.0))
+        return n;
+    float side = dot(cross(across, along), n) < 0.0 ? -1.0 : 1.0; // seen from behind, or where y grows downward
+    vec3 map = texture(relief_image, bounded_uv(), lod_bias).xyz;
+    vec3 sum = side * inversesqrt(size) * (of_u * map.x + of_v * map.y) + n * map.z;
+    float squared = dot(sum, sum);
+    return squared > 0.0 ? sum * inversesqrt(squared) : n;
+}
+
+#ifndef LIT
+layout(location = 112) uniform vec4 baked_light; // direction towards it; ambient light
+layout(location = 113) uniform float baked_fill; // of the light from behind
+
+// Of white, in the light that the vertices' shades are of.
+float baked_luminance(vec3 n) {
+    float facing = dot(n, baked_light.xyz);
+    return baked_light.w + (1.0 - baked_light.w) * max(facing, baked_fill * -facing);
+}
+
+const float darkest = 0.01; // a vertex that no light reaches shows no relief
+
+// By how much the relief brightens the vertices' shades.
+float brightening(vec3 n) { return baked_luminance(tilted(n)) / max(baked_luminance(n), darkest); }
+#endif
+
+// Zero where vertices have none.
+vec3 surface_normal() {
+    vec3 n = surface_normal_and_albedo.xyz;
+    float squared = dot(n, n);
+    return squared > 0.0 ? n * inversesqrt(squared) : vec3(0);
 }
 #endif
 
@@ -207,7 +270,17 @@ void main() {
 #endif
     vec4 result = bounded(surface_shade);
     float highlight = 0.0;
-#if defined(TEXTURED) && defined(LIT)
+#if defined(RELIEF) && defined(LIT)
+    vec4 hue = result;
+    vec3 n = surface_normal();
+    vec2 lit = lit_luminance(n == vec3(0) ? n : tilted(n), surface_place, surface_normal_and_albedo.w);
+    result = hue * lit.x;
+    highlight = lit.y;
+#elif defined(RELIEF)
+    vec3 n = surface_normal();
+    if (n != vec3(0))
+        result *= brightening(n);
+#elif defined(TEXTURED) && defined(LIT)
     highlight = surface_highlight;
 #endif
 #ifdef MASK
@@ -215,15 +288,28 @@ void main() {
 #endif
 #ifdef CASTING
     vec4 visible = visibilities();
+    vec4 casts[CASTING];
+    for (int i = 0; i < CASTING; ++i)
+#ifdef RELIEF
+        casts[i] = hue * blockable[i].x;
+#else
+        casts[i] = bounded(surface_cast[i]);
+#endif
 #ifdef SHARE
     vec4 unhidden = result;
     for (int i = 0; i < CASTING; ++i)
-        unhidden += bounded(surface_cast[i]);
+        unhidden += casts[i];
 #endif
     for (int i = 0; i < CASTING; ++i)
-        result += visible[i] * bounded(surface_cast[i]);
+        result += visible[i] * casts[i];
 #ifdef TEXTURED
-    vec4 cast_highlights = max(surface_cast_highlights, 0.0);
+    vec4 cast_highlights = vec4(0);
+    for (int i = 0; i < CASTING; ++i)
+#ifdef RELIEF
+        cast_highlights[i] = blockable[i].y;
+#else
+        cast_highlights[i] = max(surface_cast_highlights[i], 0.0);
+#endif
 #ifdef SHARE
     unhidden.a += highlight;
     for (int i = 0; i < CASTING; ++i)

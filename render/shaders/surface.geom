@@ -14,15 +14,20 @@ layout(location = 1) out vec3 corner_weights;
 #ifdef TEXTURED
 layout(location = 2) in vec2 uv[];
 layout(location = 2) out vec2 surface_uv;
-#ifdef LIT
+#if defined(LIT) && !defined(RELIEF)
 layout(location = 3) in float highlight[];
 layout(location = 3) out float surface_highlight;
 #endif
 #endif
 
-#ifdef CASTING
+#if defined(CASTING) || defined(RELIEF)
 layout(location = 4) in vec3 place[];
 layout(location = 4) out vec3 surface_place;
+#endif
+#ifdef RELIEF
+layout(location = 10) in vec4 normal_and_albedo[];
+layout(location = 10) out vec4 surface_normal_and_albedo;
+#elif defined(CASTING)
 layout(location = 5) in vec4 cast_shade[][CASTING];
 #ifdef FLAT
 layout(location = 5) flat out vec4 surface_cast[CASTING];
@@ -48,7 +53,7 @@ void main() {
         corner_weights = vec3(corner == 0, corner == 1, corner == 2);
 #ifdef TEXTURED
         surface_uv = uv[corner];
-#ifdef LIT
+#if defined(LIT) && !defined(RELIEF)
 #ifdef FLAT
         surface_highlight = (highlight[0] + highlight[1] + highlight[2]) / 3.0;
 #else
@@ -56,8 +61,12 @@ void main() {
 #endif
 #endif
 #endif
-#ifdef CASTING
+#if defined(CASTING) || defined(RELIEF)
         surface_place = place[corner];
+#endif
+#ifdef RELIEF
+        surface_normal_and_albedo = normal_and_albedo[corner];
+#elif defined(CASTING)
         for (int i = 0; i < CASTING; ++i)
 #ifdef FLAT
             surface_cast[i] = (cast_shade[0][i] + cast_shade[1][i] + cast_shade[2][i]) / 3.0;

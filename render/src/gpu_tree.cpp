@@ -143,7 +143,8 @@ Result<void> GpuTree::Impl::need_lit_vertices() {
                          static_cast<GLsizeiptr>(std::max<std::size_t>(made.size(), 1) * sizeof(LitVertex)),
                          made.data(), 0);
     if (glGetError() == GL_OUT_OF_MEMORY)
-        return too_large("the normals of the tree's " + std::to_string(made.size()) + " vertices, which lights need.");
+        return too_large("the normals of the tree's " + std::to_string(made.size()) +
+                         " vertices, which lights and normal maps need.");
     lit_vertices = std::move(buffer);
     describe_lit_vertices(arrays.id(), lit_vertices->id());
     return {};

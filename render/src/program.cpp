@@ -129,14 +129,19 @@ Result<Program> build_surface(const ProgramKey& key) {
     if (key.output == Output::depth) {
         if (!key.cut_out) return Program::build("depth", sources);
         sources.push_back({ShaderSource::Stage::fragment, shaders::surface_frag});
-        constexpr std::string_view cut_out[] = {"TEXTURED", "CUT_OUT", "DEPTH"};
+        std::vector<std::string_view> cut_out = {"TEXTURED", "CUT_OUT", "DEPTH"};
+        if (key.blends) cut_out.push_back("BLENDS");
         return Program::build("depth of what is there", sources, cut_out);
     }
-    std::string wrapped;
+    std::string vertex(shaders::surface_vert), fragment(shaders::surface_frag);
     if (key.compares || key.stippled)
-        wrapped = "#define main surface_main\n#line 1\n" + std::string(shaders::surface_frag) +
-                  "#undef main\n#line 1\n" + std::string(key.compares ? shaders::compare_frag : shaders::stipple_frag);
-    sources.push_back({ShaderSource::Stage::fragment, wrapped.empty() ? shaders::surface_frag : wrapped});
+        fragment = "#define main surface_main\n#line 1\n" + fragment + "#undef main\n#line 1\n" +
+                   std::string(key.compares ? shaders::compare_frag : shaders::stipple_frag);
+    if (key.lit) {
+        std::string& lit = key.relief ? fragment : vertex;
+        lit = std::string(shaders::lighting_glsl) + "#line 1\n" + lit;
+    }
+    sources = {{ShaderSource::Stage::vertex, vertex}, {ShaderSource::Stage::fragment, fragment}};
     if (key.flat || key.wireframe) sources.push_back({ShaderSource::Stage::geometry, shaders::surface_geom});
 
     std::vector<std::string_view> defines;
@@ -151,6 +156,9 @@ Result<Program> build_surface(const ProgramKey& key) {
     if (key.casting > 0) defines.push_back(casting[key.casting - 1]);
     if (key.mask) defines.push_back("MASK");
     if (key.cut_out) defines.push_back("CUT_OUT");
+    if (key.blends) defines.push_back("BLENDS");
+    if (key.emission) defines.push_back("EMISSION");
+    if (key.relief) defines.push_back("RELIEF");
     if (key.share) defines.push_back("SHARE");
     return Program::build("surface", sources, defines);
 }
@@ -171,7 +179,8 @@ Result<const Program*> find_or_build(std::map<Key, Program>& programs, const Key
 
 Result<const Program*> Programs::surface(ProgramKey key) {
     // Other looks do not change where a surface is.
-    if (key.output == Output::depth) key = {.textured = key.cut_out, .output = Output::depth, .cut_out = key.cut_out};
+    if (key.output == Output::depth)
+        key = {.textured = key.cut_out, .output = Output::depth, .cut_out = key.cut_out, .blends = key.blends};
     return find_or_build(surfaces_, key, [&] { return build_surface(key); });
 }
 

@@ -59,12 +59,14 @@ enum class Output {
 struct ProgramKey {
     bool lit = false, textured = false, flat = false, wireframe = false;
     Output output = Output::linear;
-    bool compares = false; // drops pixels that look like a picture: compare.frag
-    bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
-    int casting = 0;       // lights that cast shadows, and are drawn with them
-    bool mask = false;     // writes the shadows' mask as well
-    bool cut_out = false;  // drops pixels whose texels are not there; of depth, too
-    bool share = false;    // writes which share of its light comes to a surface, and nothing else
+    bool compares = false;                 // drops pixels that look like a picture: compare.frag
+    bool stippled = false;                 // drops pixels of a pattern: stipple.frag; not of what compares
+    int casting = 0;                       // lights that cast shadows, and are drawn with them
+    bool mask = false;                     // writes the shadows' mask as well
+    bool cut_out = false;                  // drops pixels whose texels are not there; of depth, too
+    bool blends = false;                   // of these, by shares that are the texels' alpha
+    bool emission = false, relief = false; // maps that a texture has
+    bool share = false;                    // writes which share of its light comes to a surface, and nothing else
     auto operator<=>(const ProgramKey&) const = default;
 };
 

@@ -14,6 +14,7 @@ extern const std::string_view energy_frag;
 extern const std::string_view examine_comp;
 extern const std::string_view full_screen_vert;
 extern const std::string_view halve_frag;
+extern const std::string_view lighting_glsl;
 extern const std::string_view luminance_frag;
 extern const std::string_view move_comp;
 extern const std::string_view overlay_frag;

@@ -26,6 +26,8 @@ enum UniformLocation {
     world_from_unit_location = 104,
     compared_location = 110,
     stipple_location = 111,
+    baked_light_location = 112,
+    baked_fill_location = 113,
 };
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -212,17 +214,35 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
         const int casting =
             camera.shadows && item.lighting ? static_cast<int>(vdtree::shadow_lights(*item.lighting)) : 0;
         const bool is_cut_out = tree.texture && tree.texture->has_cut_outs();
-        const auto program = target.context.impl().programs.surface(
-            {item.lighting.has_value(), tree.texture.has_value(), item.shading == Shading::flat, item.wireframe, output,
-             compares, is_stippled, casting, camera.shadow_mask.has_value(), is_cut_out, use == Use::share_of_light});
+        const bool is_flat = item.shading == Shading::flat;
+        // The vertices' own light is in the colours of what is pre-lit, and flat triangles show what triangles are.
+        const bool has_relief = tree.texture && tree.texture->has_relief() && !is_flat && output != Output::depth &&
+                                (item.lighting || !tree.tree.is_prelit());
+        const auto program =
+            target.context.impl().programs.surface({.lit = item.lighting.has_value(),
+                                                    .textured = tree.texture.has_value(),
+                                                    .flat = is_flat,
+                                                    .wireframe = item.wireframe,
+                                                    .output = output,
+                                                    .compares = compares,
+                                                    .stippled = is_stippled,
+                                                    .casting = casting,
+                                                    .mask = camera.shadow_mask.has_value(),
+                                                    .cut_out = is_cut_out,
+                                                    .blends = is_cut_out && tree.texture->blends(),
+                                                    .emission = tree.texture && tree.texture->has_emission(),
+                                                    .relief = has_relief,
+                                                    .share = use == Use::share_of_light});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
         PreparedItem prepared{item.cut, projection, *program,
                               cull_for(tree.tree.closedness(), projection.eye_inside || is_cut_out)};
         if (is_stippled && output != Output::depth) prepared.stipple = item.stipple;
-        if (item.lighting && output != Output::depth) {
+        prepared.has_relief = has_relief;
+        prepared.is_lit = item.lighting && output != Output::depth;
+        if (prepared.is_lit || has_relief)
             if (auto made = tree.need_lit_vertices(); !made) return made.error();
-            prepared.is_lit = true;
+        if (prepared.is_lit) {
             prepared.lights =
                 uniforms_of(*item.lighting, vdtree::eye_in_tree(tree.tree, view, item.placement), tree.frame);
             if (casting > 0) prepared.shadows = camera.shadows->impl().uniforms_of(item);
@@ -328,6 +348,11 @@ void SurfacePass::set_colours(const PreparedItem& item) const {
     const bool is_shadowed = !item.shadows.layers.empty();
     const glm::vec4 highest_lit = tree.texture || is_shadowed ? glm::vec4(brightest_light) : tree.highest_hue;
     program.set(highest_shade_location, item.is_lit ? highest_lit : tree.highest_shade);
+    if (item.has_relief && !item.is_lit) {
+        const vdtree::Light& light = tree.tree.light();
+        program.set(baked_light_location, glm::vec4(light.direction, light.ambient));
+        program.set(baked_fill_location, light.fill);
+    }
     if (item.stipple) glProgramUniform2f(program.id(), stipple_location, item.stipple->x, item.stipple->y);
     if (item.is_lit) {
         program.set(material_location, item.lights.material);

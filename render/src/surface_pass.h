@@ -73,7 +73,7 @@ private:
         Projection projection;
         const Program* program = nullptr;
         Cull cull = Cull::nothing;
-        bool is_lit = false;
+        bool is_lit = false, has_relief = false;
         LightUniforms lights = {};
         std::optional<glm::vec2> stipple = {}; // none: all pixels
         ShadowUniforms shadows = {};           // of layers, where its lights cast some

@@ -94,6 +94,47 @@ float largest_inside(const VertexTree& tree, const F& value) {
     return most;
 }
 
+// Half of a square is tilted towards the light by a normal map, half away from it; a quarter shines.
+TEST(ShownTexels, AreThoseThatPicturesShow) {
+    Texture texture{8, 8, Wrap::clamp, Wrap::clamp, std::vector<Texel>(64, Texel{188, 188, 188, 255})};
+    for (std::size_t i = 0; i < 64; ++i) {
+        texture.relief.push_back({static_cast<std::uint8_t>(i % 8 < 4 ? 204 : 52), 128, 230, 255}); // x = .6 or -.6
+        texture.emission.push_back(i < 16 ? Texel{128, 0, 0, 255} : Texel{0, 0, 0, 255});
+    }
+    const Light light{.direction = {0.6f, 0, 0.8f}, .ambient = 0.2f, .fill = 0.25f};
+    const VertexTree tree = support::built(textures::textured_grid(4, texture), {.light = light});
+    const ShownTexels shown(tree);
+    const double own = linear_luminance(texture.texels[0]), shade = 0.2 + 0.8 * 0.8;
+    const double towards = 0.2 + 0.8 * 1.0, away = 0.2 + 0.8 * (0.8 * 0.8 - 0.6 * 0.6);
+    constexpr double rounding = 0.01; // of the map's codes
+    EXPECT_NEAR(shade * shown.luminance(35), own * towards, rounding);
+    EXPECT_NEAR(shade * shown.luminance(38), own * away, rounding);
+    EXPECT_NEAR(shade * static_cast<double>(shown.colour(3).r - shown.colour(3).g),
+                static_cast<double>(linear_colour(texture.emission[0]).r), rounding);
+    EXPECT_TRUE(has_colours(tree));
+    EXPECT_FALSE(shown.are_alike());
+    // Colours that are pre-lit have their light.
+    EXPECT_NEAR(ShownTexels(support::built(textures::textured_grid(4, texture), {.prelit = true})).luminance(38), own,
+                1e-6);
+}
+
+// An even colour shows what a normal map shades it by, and what it slides by is seen.
+TEST(TexturedFolds, CountTheirMapsOfNormalsAndLight) {
+    Mesh mesh = textures::textured_grid(20, textures::checkerboard(512, 512, 4, 128, 128));
+    for (glm::vec2& uv : mesh.uvs) uv.x = uv.x * uv.x;
+    Mesh bumpy = mesh, shining = mesh;
+    const std::vector<Texel> board = textures::checkerboard(512, 512, 4, 40, 216).texels;
+    for (const Texel& texel : board) bumpy.texture.relief.push_back({texel[0], 128, 220, 255});
+    shining.texture.emission = board;
+    const auto even = measured(mesh, false);
+    for (const Mesh* m : {&bumpy, &shining}) {
+        const VertexTree tree = measured(*m, false);
+        EXPECT_GT(largest_contrast(tree), 0.2f);
+        // Not the noise that stands in for images that are not known.
+        EXPECT_NE(largest_contrast(tree), largest_contrast(even));
+    }
+}
+
 // On a plane an even texture slides nowhere, whatever it shows; squeezed to one side, it does.
 TEST(TexturedFolds, SlideWhereTheTextureIsUneven) {
     const Texture texture = textures::checkerboard(512, 512, 4, 0, 255);

@@ -309,4 +309,91 @@ TEST_F(Textured, CutOutsCoverTheShareThatIsThere) {
         }
 }
 
+// Of samples as many are stopped as alpha says, also where texels are wide.
+TEST_F(Textured, AlphaIsAShareWhereItBlends) {
+    for (const int alpha : {0, 64, 200, 255}) {
+        Texture texture{2, 2, {}, {}, {}};
+        texture.texels.assign(4, {255, 255, 255, static_cast<std::uint8_t>(alpha)});
+        texture.blends = true;
+        const render::Frame frame =
+            draw(built(textures::textured_grid(4, texture)), 4, 8, {.samples = 64, .background = 0.25f});
+        const double share = alpha / 255.0;
+        EXPECT_NEAR(luminance(frame, 3, 4), share + (1 - share) * 0.25, 1.0 / 64) << alpha;
+    }
+}
+
+// ---- maps of light and of normals
+
+TEST_F(Textured, ShineWhateverLightsThem) {
+    Texture texture{1, 1, {}, {}, {{100, 100, 100, 255}}};
+    texture.emission = {{90, 180, 30, 255}};
+    const VertexTree tree = built(textures::textured_grid(4, texture));
+    const glm::dvec3 own(vdtree::linear_colour(texture.texels[0])), light(vdtree::linear_colour(texture.emission[0]));
+    expect_near(colour(draw(tree, 4, 8, {}), 4, 4), own + light, code_step);
+    vdtree::Lighting dusk;
+    dusk.ambient = 0.1;
+    dusk.lights = {{.intensity = 0.5}}; // from the front
+    expect_near(colour(draw(tree, 4, 8, {.lighting = dusk}), 4, 4), 0.6 * own + light, code_step);
+}
+
+glm::dvec3 code_of(glm::dvec3 normal) { return glm::round(128.0 + 127.0 * normal); }
+
+// A map that tilts all normals alike, on a square before the eye: what the formulas of light say of such normals.
+TEST_F(Textured, AreLitByTheNormalsOfTheirMap) {
+    const vdtree::Light baked{.direction = glm::normalize(glm::vec3(0.5f, 0.3f, 0.8f)), .ambient = 0.1f, .fill = 0.25f};
+    const auto baked_luminance = [&](glm::dvec3 n) {
+        const double facing = glm::dot(n, glm::dvec3(baked.direction));
+        return 0.1 + 0.9 * std::max(facing, 0.25 * -facing);
+    };
+    vdtree::Lighting lighting;
+    lighting.ambient = 0.1;
+    lighting.specular = 0.05;
+    lighting.shininess = 8;
+    lighting.lights = {{.intensity = 0.5, .direction = glm::normalize(glm::dvec3(-0.4, 0.6, 0.7))}};
+    for (const glm::dvec3 tilt : {glm::dvec3(0, 0, 1), glm::dvec3(0.6, 0, 0.8), glm::dvec3(-0.36, 0.48, 0.8)})
+        for (const bool is_mirrored : {false, true}) {
+            const glm::dvec3 code = code_of(tilt);
+            Texture texture{1, 1, {}, {}, {{188, 188, 188, 255}}};
+            texture.relief = {{static_cast<std::uint8_t>(code.x), static_cast<std::uint8_t>(code.y),
+                               static_cast<std::uint8_t>(code.z), 255}};
+            Mesh mesh = textures::textured_grid(4, texture);
+            for (glm::vec2& uv : mesh.uvs) uv.x = is_mirrored ? 1 - uv.x : uv.x;
+            const VertexTree tree = support::built(mesh, {.light = baked});
+            glm::dvec3 normal = glm::normalize((code - 128.0) / 127.0);
+            if (is_mirrored) normal.x = -normal.x;
+            const double albedo = vdtree::linear_luminance(texture.texels[0]);
+            for (const bool wireframe : {false, true}) // by way of a geometry shader, away from the lines
+                EXPECT_NEAR(luminance(draw(tree, 4, 32, {.wireframe = wireframe}), 14, 11),
+                            albedo * baked_luminance(normal), 2e-3)
+                    << tilt.x;
+            const View view = from_the_front(4, 32);
+            const double expected = vdtree::lit_luminance(lighting, {0, 0, 0}, normal, albedo,
+                                                          view.eye - view.target); // the square is small from there
+            EXPECT_NEAR(luminance(draw(tree, 4, 32, {.lighting = lighting}), 14, 11), expected, 5e-3) << tilt.x;
+        }
+    // Flat triangles show their own light, and pre-lit colours have theirs.
+    Texture texture{1, 1, {}, {}, {{188, 188, 188, 255}}};
+    texture.relief = {{255, 128, 128, 255}};
+    const Mesh mesh = textures::textured_grid(4, texture);
+    const double plain = vdtree::linear_luminance(texture.texels[0]);
+    EXPECT_NEAR(luminance(draw(built(mesh), 4, 8, {}), 4, 4), plain, code_step);
+    EXPECT_NEAR(luminance(draw(support::built(mesh, {.light = baked}), 4, 8, {.shading = render::Shading::flat}), 4, 4),
+                plain * baked_luminance({0, 0, 1}), code_step);
+}
+
+TEST_F(Textured, MapsThatAreNotThereAreNotMade) {
+    const auto made_for = [&](const VertexTree& tree) {
+        GLuint before = 0, after = 0;
+        glGenTextures(1, &before), glDeleteTextures(1, &before);
+        const auto gpu = require(render::GpuTree::create(*context_, tree));
+        glGenTextures(1, &after), glDeleteTextures(1, &after);
+        return after - before;
+    };
+    static_cast<void>(require(render::GpuTree::create(*context_, built(textures::textured_grid(1, four_colours())))));
+    Texture texture = four_colours();
+    const auto without = made_for(built(textures::textured_grid(1, texture)));
+    texture.emission = texture.relief = texture.texels;
+    EXPECT_EQ(made_for(built(textures::textured_grid(1, texture))), without + 2);
+}
+
 } // namespace unseen::texture_test

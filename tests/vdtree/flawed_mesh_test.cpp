@@ -120,12 +120,12 @@ const std::vector<Case>& cases() {
          2,
          {"2 images were not read, so 2 triangles show the colour of the material alone; the first: "
           "'gone.png' is neither beside the file that names it nor beside the mesh; read.search_folder",
-          "what materials have of normal maps is not drawn: what is said of visibility does not know it."}},
+          "what materials have of bump maps is not drawn: what is said of visibility does not know it."}},
         {"light of its own",
          {{"a.obj", "mtllib a.mtl\n" + textured}, {"a.mtl", "newmtl m\nKe 0 0.5 0\nnewmtl n\nmap_d d.png\n"}},
          "a.obj",
          2,
-         {"1 image was not read", "what materials have of emission is not drawn"}},
+         {"1 image was not read"}},
         {"black light", {{"a.obj", "mtllib a.mtl\n" + textured}, {"a.mtl", "newmtl m\nKe 0 0 0\n"}}, "a.obj", 2},
         {"an image outside",
          {{"s/a.obj", "mtllib a.mtl\n" + textured}, {"s/a.mtl", mtl("../t.png")}, {"t.png", picture}},
@@ -215,11 +215,29 @@ const std::vector<Case>& cases() {
          {"image 0: 'gone.png' is neither beside"}},
         {"what nobody draws",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "", R"(
-             {"normalTexture":{"index":0},"emissiveFactor":[0,0,0],"alphaMode":"BLEND","extensions":{
+             {"normalTexture":{"index":0},"emissiveFactor":[1,1,1],"alphaMode":"BLEND","extensions":{
               "KHR_materials_ior":{"ior":1.5},"KHR_materials_clearcoat":{}}})")}},
          "a.glb",
          1,
-         {"of KHR_materials_clearcoat, normal maps and translucency by the alpha of images is not drawn"},
+         {"of KHR_materials_clearcoat is not drawn"},
+         picture},
+        {"maps with coordinates of their own",
+         {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "", R"(
+             {"normalTexture":{"index":0,"texCoord":1},"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0,
+              "extensions":{"KHR_texture_transform":{"scale":[2,2]}}}})")}},
+         "a.glb",
+         1,
+         {"of emission with coordinates of their own and normal maps with coordinates of their own is not drawn"},
+         picture},
+        {"an emission that is no colour",
+         {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",
+                        R"({"emissiveFactor":[1,2,-1],"normalTexture":{"index":0,"scale":"x"}})")}},
+         "a.glb",
+         1,
+         {"material 0: the scale of its normalTexture should be a number; correct it. Material 'm' is drawn without "
+          "that.",
+          "material 0: its emissiveFactor should be 3 numbers from 0 to 1; correct it. Material 'm' is drawn without "
+          "that."},
          picture},
         {"a cut-off that is no number",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",

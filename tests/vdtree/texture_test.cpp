@@ -145,6 +145,10 @@ TEST(Textures, AreCheckedBeforeTheyAreLaid) {
     bad.texture.width = 100000;
     EXPECT_NE(complaint(bad).find("scale it down"), std::string::npos);
     bad = mesh;
+    bad.texture.relief.resize(63);
+    EXPECT_NE(complaint(bad).find("A map over the texture of 8 x 8 texels holds 63"), std::string::npos)
+        << complaint(bad);
+    bad = mesh;
     bad.uvs.clear();
     EXPECT_NE(complaint(bad).find("no UVs"), std::string::npos);
     bad = mesh;
@@ -175,6 +179,9 @@ TEST(Textures, AreKeptInFiles) {
     const std::filesystem::path file = folder.path() / "t.vdt";
     Mesh mesh = textures::with_seams(textures::textured_sphere(3, textures::noise(33, 20, 8)));
     mesh.texture.wrap_v = Wrap::clamp;
+    mesh.texture.blends = true;
+    mesh.texture.emission = textures::noise(33, 20, 4).texels;
+    mesh.texture.relief = textures::noise(33, 20, 2).texels;
     const VertexTree tree = built(mesh, {.prelit = true});
     ASSERT_TRUE(write_tree(file, tree));
     for (const bool mapped : {false, true}) {
@@ -187,6 +194,9 @@ TEST(Textures, AreKeptInFiles) {
         EXPECT_EQ(texture.wrap_v, Wrap::clamp);
         EXPECT_TRUE(std::equal(texture.texels.begin(), texture.texels.end(), mesh.texture.texels.begin(),
                                mesh.texture.texels.end()));
+        EXPECT_TRUE(texture.blends);
+        EXPECT_TRUE(std::ranges::equal(texture.emission, mesh.texture.emission));
+        EXPECT_TRUE(std::ranges::equal(texture.relief, mesh.texture.relief));
         EXPECT_TRUE(std::equal(again->ring_texture().begin(), again->ring_texture().end(), tree.ring_texture().begin(),
                                tree.ring_texture().end()));
         EXPECT_TRUE(verify(*again));
@@ -204,7 +214,9 @@ TEST(Textures, AreKeptInFiles) {
 TEST(Textures, OfDamagedFilesAreRefused) {
     const support::TempFolder folder;
     const std::filesystem::path file = folder.path() / "t.vdt";
-    ASSERT_TRUE(write_tree(file, built(textures::textured_sphere(2, textures::noise(8, 8, 8)))));
+    Mesh mesh = textures::textured_sphere(2, textures::noise(8, 8, 8));
+    mesh.texture.emission = mesh.texture.relief = mesh.texture.texels;
+    ASSERT_TRUE(write_tree(file, built(mesh)));
     const std::string whole = support::read_bytes(file);
     const auto complaint = [&](auto&& damage) {
         support::TreeFile parts = support::TreeFile::parse(whole);
@@ -229,6 +241,8 @@ TEST(Textures, OfDamagedFilesAreRefused) {
         expect("texture", 2, [&](Parts& p) { p["texture"].set<std::uint32_t>(0, width); });
     expect("repeats", 2, [](Parts& p) { p["texture"].set<std::uint32_t>(2, 5u); });
     expect("texels", 2, [](Parts& p) { p["texels"].data.resize(4 * 63); });
+    for (const char* map : {"emission", "relief"})
+        expect("A map over", 2, [&](Parts& p) { p[map].data.resize(4 * 63); });
     expect("texture", 2, [](Parts& p) { p["texture"].data += p["texture"].data; });
     expect("texture", 2, [](Parts& p) { p["uvs"].data.clear(); });
     expect("ring_texture", 2, [](Parts& p) { p["ring_texture"].data.resize(4); });

@@ -1,14 +1,13 @@
 // Whether simplified glTF and OBJ files hold what their sources do, and look in three.js, which Chromium runs, as in
 // Unseen. round_trips.mjs UNSEEN NPM_FOLDER EMPTY_FOLDER MODEL.glb ... Exit status 77: all but the pictures.
-import {execFileSync, spawn, spawnSync} from 'node:child_process';
+import {execFileSync, spawnSync} from 'node:child_process';
 import fs from 'node:fs';
-import http from 'node:http';
 import {createRequire} from 'node:module';
 import path from 'node:path';
-import {fileURLToPath} from 'node:url';
 import {isDeepStrictEqual} from 'node:util';
 
 import {write_lamp} from './lamp.mjs';
+import {draw_with_three, luminances, write_luminances} from './three.mjs';
 
 const [unseen, npm, folder, ...models] = process.argv.slice(2);
 const packages = path.resolve(npm, 'node_modules'), three = packages + '/three';
@@ -84,36 +83,6 @@ function expect_what_it_had(source, cut, percent) {
     here(apart <= most_apart, `its second coordinates are not 0.4 of the first, by ${apart}`);
 }
 
-// Has three.js draw pictures of {file, view}, into FILE.three.pfm. What went wrong, if anything.
-async function draw_with_three(pictures) {
-    const folders = {npm: packages, files: folder, '': path.dirname(fileURLToPath(import.meta.url))};
-    const types = {'.html': 'text/html', '.js': 'text/javascript', '.png': 'image/png'};
-    let end;
-    const ended = new Promise(resolve => { end = resolve; });
-    const server = http.createServer(async (request, response) => {
-        const [, place, ...names] = decodeURI(request.url).split('/'), chunks = [];
-        for await (const chunk of request) chunks.push(chunk);
-        if (place === 'pictures') return response.end(JSON.stringify(pictures));
-        if (place === 'drawn') fs.writeFileSync(path.join(folder, names + '.three.pfm'), Buffer.concat(chunks));
-        if (place === 'end') end(String(Buffer.concat(chunks)));
-        const file = place in folders && path.join(folders[place], ...(place ? names : ['draw.html']));
-        if (request.method !== 'GET' || !file || !fs.existsSync(file)) return response.writeHead(404).end();
-        response.setHeader('Content-Type', types[path.extname(file)] ?? 'application/octet-stream');
-        response.end(fs.readFileSync(file));
-    });
-    await new Promise(resolve => server.listen(0, '127.0.0.1', resolve));
-    const browser = spawn('chromium', ['--headless', '--no-sandbox', '--use-angle=swiftshader',
-        '--enable-unsafe-swiftshader', `--user-data-dir=${folder}/browser`,
-        `http://127.0.0.1:${server.address().port}/`], {stdio: 'ignore'});
-    const gone = new Promise(resolve => browser.on('exit', resolve));
-    gone.then(status => end('Chromium ended with status ' + status));
-    const problem = await ended;
-    browser.kill();
-    await gone; // it writes to its folder until then
-    server.close();
-    return problem;
-}
-
 // Where three.js says that a picture is not defined, both become black. How many pixels.
 function leave_out(theirs, ours, pixels) {
     const pictures = [theirs, ours].map(bytes_of), values = pictures.map(bytes => bytes.subarray(-4 * pixels));
@@ -125,18 +94,6 @@ function leave_out(theirs, ours, pixels) {
     }
     [theirs, ours].forEach((file, i) => fs.writeFileSync(path.join(folder, file), pictures[i]));
     return left_out;
-}
-
-// three.js is asked for luminance: so is made of a picture in colour.
-function make_grey(file, size) {
-    const bytes = bytes_of(file);
-    if (bytes.toString('latin1', 0, 2) !== 'PF') return;
-    const rgb = bytes.subarray(-12 * size ** 2), grey = Buffer.alloc(4 * size ** 2);
-    for (let pixel = 0; pixel < size ** 2; ++pixel) {
-        const [r, g, b] = [0, 4, 8].map(at => rgb.readFloatLE(12 * pixel + at));
-        grey.writeFloatLE(0.2126 * r + 0.7152 * g + 0.0722 * b, 4 * pixel);
-    }
-    fs.writeFileSync(path.join(folder, file), Buffer.concat([Buffer.from(`Pf\n${size} ${size}\n-1.0\n`), grey]));
 }
 
 function compare(a, b) {
@@ -151,7 +108,7 @@ function compare_all(pictures) {
         const [theirs, ours] = [file + '.three.pfm', file + '.unseen.pfm'], pixels = view.size ** 2;
         run('render', file, '--as', 'model', '--full', '--eye', ...view.eye, '--target', ...view.target,
             '--fov', view.fov, '--size', view.size, '--samples', 256, '-o', ours);
-        make_grey(ours, view.size);
+        write_luminances(path.join(folder, ours), luminances(path.join(folder, ours), view.size), view.size);
         const left_out = leave_out(theirs, ours, pixels);
         expect(left_out <= 0.02 * pixels, `${file}: three.js left out ${left_out} pixels`);
         const found = [`${compare(theirs, ours)} of the threshold`];
@@ -185,7 +142,7 @@ for (const file of sources) {
 
 let skipped = spawnSync('chromium', ['--version']).error && 'chromium is not installed';
 if (!skipped) {
-    const problem = await draw_with_three(pictures);
+    const problem = await draw_with_three(pictures, folder, packages);
     expect(!problem, problem);
     try {
         if (!problem) compare_all(pictures);

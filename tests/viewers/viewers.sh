@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Writes levels of detail in all forms, or simplified files, and has other programs read them.
-# viewers.sh lod|round_trips UNSEEN NPM_FOLDER
+# Writes levels of detail in all forms, or simplified files, and has other programs read them; or draws what they draw.
+# viewers.sh lod|round_trips|materials UNSEEN NPM_FOLDER
 set -euo pipefail
 source cmake/setup.sh
 unseen=$2 npm=$3 here=$(cd "$(dirname "$0")" && pwd)
@@ -12,6 +12,11 @@ fetch_npm "$npm" gltf-validator@2.0.0-dev.3.10 three@0.180.0 "$models_package" |
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 export UNSEEN_CACHE=$out/cache # each tree is built once
+if [ "$1" = materials ]; then
+    mkdir "$out/files"
+    node "$here/materials.mjs" "$unseen" "$npm" "$out/files"
+    exit
+fi
 if [ "$1" = round_trips ]; then
     mkdir "$out/files"
     node "$here/round_trips.mjs" "$unseen" "$npm" "$out/files" "$npm/$models_folder/oculus-touch-v3/left.glb"

@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // One more where the same file gives another tree or other warnings, or trees are written in another way.
-constexpr std::uint32_t revision = 6;
+constexpr std::uint32_t revision = 7;
 // More is no mesh that anybody has made.
 constexpr std::size_t most_words = 64, most_names = 4096;
 
@@ -173,11 +173,13 @@ std::string mesh_cache_key(const vdtree::Mesh& mesh, const vdtree::BuildOptions&
                                      static_cast<std::uint64_t>(mesh.texture.width),
                                      static_cast<std::uint64_t>(mesh.texture.height),
                                      static_cast<std::uint64_t>(mesh.texture.wrap_u),
-                                     static_cast<std::uint64_t>(mesh.texture.wrap_v)};
+                                     static_cast<std::uint64_t>(mesh.texture.wrap_v),
+                                     mesh.texture.blends};
     hash.add("a mesh alone");
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     add_all(mesh.positions), add_all(mesh.triangles), add_all(mesh.normals), add_all(mesh.colours), add_all(mesh.uvs);
-    add_all(mesh.texture.texels), add_all(mesh.document), add_all(mesh.smoothing), add_all(mesh.further);
+    add_all(mesh.texture.texels), add_all(mesh.texture.emission), add_all(mesh.texture.relief);
+    add_all(mesh.document), add_all(mesh.smoothing), add_all(mesh.further);
     add_all(mesh.weights);
     for (const vdtree::MeshRange& range : mesh.ranges) {
         const std::uint64_t place[] = {static_cast<std::uint64_t>(range.kind), range.first_triangle,

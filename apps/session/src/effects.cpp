@@ -122,14 +122,22 @@ Reason translucency(const Cutting& c) {
 }
 
 Reason texture(const Cutting& c) {
-    if (c.sight.object.tree.texture().empty())
+    const vdtree::TextureView texture = c.sight.object.tree.texture();
+    if (texture.empty())
         return {false, c.sight.object.texture_left_out ? Message::of("{load.without_textures} leaves it out")
                                                        : Message("the model has none")};
+    const bool has_relief = !texture.relief.empty(), shines = !texture.emission.empty();
+    const std::string maps = has_relief && shines ? "its normal map and its emission"
+                             : has_relief         ? "its normal map"
+                             : shines             ? "its emission"
+                                                  : "";
     if (!c.is_perceptual()) return {true, "drawn; folds are not tested against it"};
     if (c.decision.test == FoldTest::error)
-        return {true, "folds are tested against what they change of it, and its detail against how far they move it"};
+        return {true, "folds are tested against what they change of it" + (maps.empty() ? "" : " with " + maps) +
+                          ", and its detail against how far they move it"};
     const std::string extremes = "folds are tested against its darkest and brightest texels around them";
-    return {true, extremes + (c.decision.test == FoldTest::luebke_hallen_safe ? ", and by how far they move it" : "")};
+    return {true, extremes + (c.decision.test == FoldTest::luebke_hallen_safe ? ", and by how far they move it" : "") +
+                      (maps.empty() ? "" : "; the fold test does not know " + maps)};
 }
 
 Reason prelit(const Cutting& c) {

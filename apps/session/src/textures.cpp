@@ -6,6 +6,7 @@
 #include <span>
 #include <tuple>
 
+#include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/budget.h>
 #include <unseen/vdtree/internal/names.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
@@ -41,6 +42,9 @@ struct Atlas {
     vdtree::Texture texture;
     std::vector<AtlasPlace> places; // by part
 };
+
+// Of maps that a part lacks.
+constexpr vdtree::Texel dark{0, 0, 0, 255}, flat{128, 128, 255, 255};
 
 // Texels around a part: mip levels up to the fourth do not reach across.
 constexpr std::int64_t border = 16;
@@ -101,8 +105,12 @@ void lay(const Tile& tile, const Texture& from, Texture& to) {
         const std::int64_t row = vdtree::wrapped_texel(y + tile.first_v * from.height, from.height, from.wrap_v);
         for (std::int64_t x = -border; x < tile.width + border; ++x) {
             const std::int64_t column = vdtree::wrapped_texel(x + tile.first_u * from.width, from.width, from.wrap_u);
-            to.texels[static_cast<std::size_t>((tile.y + y) * to.width + tile.x + x)] =
-                from.texels[static_cast<std::size_t>(row * from.width + column)];
+            const auto place = static_cast<std::size_t>((tile.y + y) * to.width + tile.x + x),
+                       texel = static_cast<std::size_t>(row * from.width + column);
+            to.texels[place] = from.texels[texel];
+            if (to.blends && !from.blends) to.texels[place][3] = from.texels[texel][3] >= 128 ? 255 : 0;
+            if (!from.emission.empty()) to.emission[place] = from.emission[texel];
+            if (!from.relief.empty()) to.relief[place] = from.relief[texel];
         }
     }
 }
@@ -134,34 +142,53 @@ Result<Atlas> make_atlas(std::span<const AtlasPart> parts) {
     atlas.texture.width = static_cast<std::uint32_t>(width);
     atlas.texture.height = static_cast<std::uint32_t>(height);
     atlas.texture.wrap_u = atlas.texture.wrap_v = vdtree::Wrap::clamp;
-    atlas.texture.texels.resize(static_cast<std::size_t>(width * height), vdtree::Texel{255, 255, 255, 255});
+    const auto texels = static_cast<std::size_t>(width * height);
+    atlas.texture.texels.resize(texels, vdtree::Texel{255, 255, 255, 255});
+    const auto any = [&](auto&& holds) {
+        return std::ranges::any_of(parts, [&](const AtlasPart& part) { return holds(*part.texture); });
+    };
+    atlas.texture.blends = any([](const Texture& t) { return t.blends; });
+    if (any([](const Texture& t) { return !t.emission.empty(); })) atlas.texture.emission.resize(texels, dark);
+    if (any([](const Texture& t) { return !t.relief.empty(); })) atlas.texture.relief.resize(texels, flat);
     atlas.places.resize(parts.size());
     for (const Tile& tile : tiles) {
         const Texture& from = *parts[tile.part].texture;
         lay(tile, from, atlas.texture);
-        const glm::dvec2 size(static_cast<double>(width), static_cast<double>(height)), texels(from.width, from.height);
+        const glm::dvec2 size(static_cast<double>(width), static_cast<double>(height)), own(from.width, from.height);
         const glm::dvec2 first(static_cast<double>(tile.first_u), static_cast<double>(tile.first_v)),
             at(static_cast<double>(tile.x), static_cast<double>(tile.y));
-        atlas.places[tile.part] = {texels / size, (at - first * texels) / size};
+        atlas.places[tile.part] = {own / size, (at - first * own) / size};
     }
     return atlas;
 }
 
 // ---- materials
 
+// What two materials have alike if one texture does for both.
+using Maps = std::tuple<const std::string*, const std::string*, const std::string*, const std::string*, vdtree::Wrap,
+                        vdtree::Wrap, std::optional<float>, float, float, std::array<float, 3>>;
+Maps maps_of(const Material& m) {
+    return {m.image_bytes.get(),
+            m.normal_map.get(),
+            m.emission_map.get(),
+            m.opacity_map.get(),
+            m.wrap_u,
+            m.wrap_v,
+            m.alpha_cutoff,
+            m.blends ? m.colour.a : 2.0f,
+            m.normal_scale,
+            {m.emission.r, m.emission.g, m.emission.b}};
+}
+
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
-    using Look = std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::optional<float>, std::array<float, 4>,
-                            std::array<double, 6>>;
+    using Look = std::tuple<Maps, std::array<float, 4>, std::array<double, 6>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
         const meshio::Material& m = read.materials[i];
         const glm::dmat2& uv = m.uv_map.linear;
-        const Look look{m.image_bytes.get(),
-                        m.wrap_u,
-                        m.wrap_v,
-                        m.alpha_cutoff,
+        const Look look{maps_of(m),
                         {m.colour.r, m.colour.g, m.colour.b, m.colour.a},
                         {uv[0][0], uv[0][1], uv[1][0], uv[1][1], m.uv_map.offset.x, m.uv_map.offset.y}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
@@ -207,7 +234,7 @@ std::vector<std::size_t> part_vertices(meshio::ReadResult& read, const std::vect
     return of_vertex;
 }
 
-// Stretches alpha so that texels are there from a half on (vdtree::is_there()), and the outline between two lies where it
+// Stretches alpha so that texels are there from a half on (vdtree::coverage()), and the outline between two lies where it
 // did. Without a cut-off all are there.
 void cut_out(Texture& texture, std::optional<float> cutoff) {
     std::array<std::uint8_t, 256> stretched{};
@@ -221,33 +248,66 @@ void cut_out(Texture& texture, std::optional<float> cutoff) {
     for (vdtree::Texel& texel : texture.texels) texel[3] = stretched[texel[3]];
 }
 
-// The images that are asked for, each decoded once. Null: it could not be decoded.
-class Images {
-public:
-    explicit Images(bool from_top) : from_top_(from_top) {}
-
-    const Texture* of(const meshio::Material& material) {
-        auto [entry, is_new] =
-            images_.try_emplace({material.image_bytes.get(), material.wrap_u, material.wrap_v, material.alpha_cutoff});
-        if (is_new) {
-            const std::string name = material.image.empty() ? "the image of material '" + material.name + "'"
-                                                            : material.image.generic_string();
-            auto texture = decode_texture(*material.image_bytes, name, from_top_);
-            if (!texture) complaints_.push_back(texture.error().message);
-            else if (!texels_.spend(texture->texels.size()))
-                complaints_.push_back(name + ": with it the images have more than 2^29 pixels in all; scale it down.");
-            else {
-                entry->second = std::move(*texture);
-                entry->second->wrap_u = material.wrap_u;
-                entry->second->wrap_v = material.wrap_v;
-                cut_out(*entry->second, material.alpha_cutoff);
-            }
+void set_alpha(Texture& texture, const Material& material, const Texture* opacity) {
+    if (!material.blends && opacity == nullptr) return cut_out(texture, material.alpha_cutoff);
+    const auto is_whole = [](vdtree::Texel texel) { return texel[3] == 255; };
+    const bool by_alpha = opacity != nullptr && !std::ranges::all_of(opacity->texels, is_whole);
+    for (std::size_t i = 0; i < texture.texels.size(); ++i) {
+        std::uint8_t& alpha = texture.texels[i][3];
+        if (opacity != nullptr) {
+            const vdtree::Texel& of = opacity->texels[i];
+            alpha = by_alpha
+                        ? of[3]
+                        : static_cast<std::uint8_t>(std::lround(rec709_luminance(glm::dvec3(of[0], of[1], of[2]))));
         }
+        alpha = static_cast<std::uint8_t>(std::lround(static_cast<float>(alpha) * material.colour.a));
+    }
+    texture.blends = !std::ranges::all_of(texture.texels, is_whole);
+}
+
+// What all texels of a map become, by axis or code.
+void scale_relief(std::vector<vdtree::Texel>& relief, float scale, bool from_top) {
+    for (vdtree::Texel& texel : relief) {
+        glm::vec3 normal = vdtree::relief_normal(texel) * glm::vec3(scale, from_top ? -scale : scale, 1);
+        const float length = glm::length(normal);
+        normal = length > 0 && std::isfinite(length) ? normal / length : glm::vec3(0, 0, 1);
+        for (int k = 0; k < 3; ++k)
+            texel[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(std::lround(128 + 127 * normal[k]));
+        texel[3] = 255;
+    }
+}
+
+// Times the factor. True if some of it is brighter than white, and was cut off there.
+bool scale_light(std::vector<vdtree::Texel>& texels, glm::vec3 factor) {
+    bool is_too_bright = false;
+    for (vdtree::Texel& texel : texels) {
+        const glm::vec3 light = glm::vec3(vdtree::linear_colour(texel)) * factor;
+        for (int k = 0; k < 3; ++k) {
+            is_too_bright = is_too_bright || light[k] > 1;
+            texel[static_cast<std::size_t>(k)] =
+                static_cast<std::uint8_t>(std::lround(255 * linear_to_srgb(std::min(light[k], 1.0f))));
+        }
+    }
+    return is_too_bright;
+}
+
+// The textures of materials, each made once of images that are each decoded once.
+class Textures {
+public:
+    explicit Textures(bool from_top) : from_top_(from_top) {}
+
+    // Its image's colours are multiplied by `tint`. Null: nothing of it could be decoded.
+    const Texture* of(const Material& material, glm::vec3 tint) {
+        auto [entry, is_new] = textures_.try_emplace({maps_of(material), {tint.r, tint.g, tint.b}});
+        if (is_new) entry->second = make(material, tint);
         return entry->second ? &*entry->second : nullptr;
     }
 
-    // A sentence on the images that could not be decoded, and the triangles that are drawn without; or nothing.
+    // Sentences on the images that could not be decoded, the triangles that are drawn without, and light beyond white.
     void warn(std::uint64_t triangles, std::vector<Message>& warnings) const {
+        if (is_too_bright_)
+            warnings.push_back(
+                "what shines brighter than white is drawn white, which is the brightest that displays show.");
         if (complaints_.empty()) return;
         std::string first = complaints_.front();
         if (first.ends_with('.')) first.pop_back();
@@ -260,10 +320,100 @@ public:
     }
 
 private:
-    bool from_top_;
+    // Null: there is none, or it could not be decoded.
+    const Texture* image_of(const std::shared_ptr<const std::string>& bytes, const Material& material) {
+        if (!bytes) return nullptr;
+        auto [entry, is_new] = images_.try_emplace(bytes.get());
+        std::optional<Texture>& image = entry->second;
+        if (!is_new) return image ? &*image : nullptr;
+        const std::string name = bytes == material.image_bytes && !material.image.empty()
+                                     ? material.image.generic_string()
+                                     : (bytes == material.image_bytes ? "the image" : "a map") +
+                                           std::string(" of material '") + material.name + "'";
+        auto decoded = decode_texture(*bytes, name, from_top_);
+        if (!decoded) complaints_.push_back(decoded.error().message);
+        else if (spends(decoded->texels.size(), name)) image = std::move(*decoded);
+        return image ? &*image : nullptr;
+    }
+
+    bool spends(std::uint64_t texels, const std::string& name) {
+        if (texels_.spend(texels)) return true;
+        complaints_.push_back(name + ": with it the images have more than 2^29 pixels in all; scale it down.");
+        return false;
+    }
+
+    // As large as the largest of its images: others are interpolated.
+    std::optional<Texture> make(const Material& material, glm::vec3 tint) {
+        const Texture *const colour = image_of(material.image_bytes, material),
+                             *const normals = image_of(material.normal_map, material),
+                             *const light = image_of(material.emission_map, material),
+                             *const opacity = image_of(material.opacity_map, material);
+        const bool shines = material.shines() && (light || !material.emission_map);
+        if (!colour && !normals && !opacity && !shines && !material.blends) return std::nullopt;
+        Texture made{1, 1, material.wrap_u, material.wrap_v, {}};
+        for (const Texture* image : {colour, normals, light, opacity}) {
+            if (!image) continue;
+            made.width = std::max(made.width, image->width);
+            made.height = std::max(made.height, image->height);
+        }
+        const std::uint64_t texels = std::uint64_t{made.width} * made.height;
+        if (std::max(made.width, made.height) > vdtree::largest_texture_side ||
+            !spends(texels, "the maps of material '" + material.name + "'"))
+            return std::nullopt;
+        constexpr vdtree::Texel white{255, 255, 255, 255};
+        const auto fitted = [&](const Texture* image) {
+            return image ? resized(*image, made) : std::vector<vdtree::Texel>(texels, white);
+        };
+        made.texels = fitted(colour);
+        if (tint != glm::vec3(1)) scale_light(made.texels, tint);
+        if (opacity) {
+            Texture alpha = made;
+            alpha.texels = fitted(opacity);
+            set_alpha(made, material, &alpha);
+        } else {
+            set_alpha(made, material, nullptr);
+        }
+        if (normals) {
+            made.relief = fitted(normals);
+            scale_relief(made.relief, material.normal_scale, from_top_);
+        }
+        if (shines) {
+            made.emission = fitted(light);
+            is_too_bright_ = scale_light(made.emission, material.emission) || is_too_bright_;
+        }
+        return made;
+    }
+
+    // Interpolated between texels' middles, code by code.
+    static std::vector<vdtree::Texel> resized(const Texture& image, const Texture& to) {
+        if (image.width == to.width && image.height == to.height) return image.texels;
+        std::vector<vdtree::Texel> texels;
+        texels.reserve(std::size_t{to.width} * to.height);
+        const auto at = [&](std::int64_t x, std::int64_t y) -> const vdtree::Texel& {
+            return image
+                .texels[static_cast<std::size_t>(vdtree::wrapped_texel(y, image.height, to.wrap_v) * image.width +
+                                                 vdtree::wrapped_texel(x, image.width, to.wrap_u))];
+        };
+        for (std::uint32_t row = 0; row < to.height; ++row)
+            for (std::uint32_t column = 0; column < to.width; ++column) {
+                const double x = (column + 0.5) * image.width / to.width - 0.5,
+                             y = (row + 0.5) * image.height / to.height - 0.5;
+                const auto left = static_cast<std::int64_t>(std::floor(x)),
+                           above = static_cast<std::int64_t>(std::floor(y));
+                const double s = x - std::floor(x), t = y - std::floor(y);
+                vdtree::Texel& texel = texels.emplace_back();
+                for (std::size_t k = 0; k < texel.size(); ++k)
+                    texel[k] = static_cast<std::uint8_t>(
+                        std::lround((1 - t) * ((1 - s) * at(left, above)[k] + s * at(left + 1, above)[k]) +
+                                    t * ((1 - s) * at(left, above + 1)[k] + s * at(left + 1, above + 1)[k])));
+            }
+        return texels;
+    }
+
+    bool from_top_, is_too_bright_ = false;
     Budget texels_{0, 0, std::uint64_t{1} << 29};
-    std::map<std::tuple<const std::string*, vdtree::Wrap, vdtree::Wrap, std::optional<float>>, std::optional<Texture>>
-        images_;
+    std::map<const std::string*, std::optional<Texture>> images_;
+    std::map<std::pair<Maps, std::array<float, 3>>, std::optional<Texture>> textures_;
     std::vector<std::string> complaints_;
 };
 
@@ -304,19 +454,20 @@ void note_drawing(meshio::ReadResult& read, const std::vector<std::size_t>& of_t
 // material, get a white one. Returns by material how its coordinates are drawn, the last of those without one.
 Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_file, meshio::ReadResult& read,
                                               const std::vector<std::size_t>& of_triangle,
-                                              const std::vector<std::size_t>& of_vertex) {
+                                              const std::vector<std::size_t>& of_vertex,
+                                              const std::vector<glm::vec3>& tints) {
     Mesh& mesh = read.mesh;
-    const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
-    Images images(read.uvs_from_top);
+    const auto has_maps = [&](std::size_t m) { return m != no_material && read.materials[m].has_maps(); };
+    Textures textures(read.uvs_from_top);
     static const Texture white{1, 1, vdtree::Wrap::clamp, vdtree::Wrap::clamp, {{255, 255, 255, 255}}};
     std::vector<const Texture*> of_material(read.materials.size() + 1, &white); // the last: no material
     std::uint64_t lost = 0;
     for (const std::size_t m : of_triangle) {
-        if (!has_image(m) || of_material[m] != &white) continue;
-        if (const Texture* image = images.of(read.materials[m])) of_material[m] = image;
+        if (!has_maps(m) || of_material[m] != &white) continue;
+        if (const Texture* texture = textures.of(read.materials[m], tints[m])) of_material[m] = texture;
         else ++lost;
     }
-    images.warn(lost, read.warnings);
+    textures.warn(lost, read.warnings);
     if (std::all_of(of_material.begin(), of_material.end(), [](const Texture* image) { return image == &white; }))
         return std::vector<meshio::UvMap>(of_material.size());
     constexpr meshio::UvMap middle{glm::dmat2(0), glm::dvec2(0.5)};
@@ -366,13 +517,24 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
                            [&](std::size_t m) { return m != no_material && holds(read.materials[m]); });
     };
     const bool has_images =
-        with_images && !read.mesh.uvs.empty() && any([](const Material& m) { return m.has_image(); });
+        with_images && !read.mesh.uvs.empty() && any([](const Material& m) { return m.has_maps(); });
+    if (with_images && read.mesh.uvs.empty() && any([](const Material& m) { return m.shines() || m.is_glass(); }))
+        read.warnings.push_back("without texture coordinates neither light that materials send out is drawn, nor what "
+                                "shows through them: what is said of visibility does not know it.");
+    // The colour of what shines goes into its texels: what darkens vertices darkens their light in measurements, too.
+    std::vector<glm::vec3> tints(read.materials.size(), glm::vec3(1));
+    for (std::size_t m = 0; has_images && m < tints.size(); ++m) {
+        if (!read.materials[m].shines()) continue;
+        glm::vec4& colour = read.materials[m].colour;
+        tints[m] = glm::vec3(colour);
+        colour = glm::vec4(1, 1, 1, colour.a);
+    }
     const bool has_colours = any([](const Material& m) { return m.colour != glm::vec4(1); });
     if (!has_images && !has_colours) return {};
     const std::vector<std::size_t> of_vertex = part_vertices(read, of_triangle);
     if (has_colours) colour_vertices(read.mesh, read.materials, of_vertex);
     Result<std::vector<meshio::UvMap>> maps = std::vector<meshio::UvMap>(read.materials.size() + 1);
-    if (has_images) maps = lay_images(mesh_file, read, of_triangle, of_vertex);
+    if (has_images) maps = lay_images(mesh_file, read, of_triangle, of_vertex, tints);
     if (!maps) return maps.error();
     note_drawing(read, of_triangle, *maps);
     return {};

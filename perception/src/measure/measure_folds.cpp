@@ -45,15 +45,10 @@ std::optional<glm::vec3> common_tint(const VertexTree& tree) {
     return tint ? *tint : glm::vec3(1);
 }
 
-bool is_of_one_colour(const TextureView& texture) {
-    return std::ranges::all_of(texture.texels, [&](const Texel& texel) { return texel == texture.texels.front(); });
-}
-
 } // namespace
 
 std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
-    const TextureView texture = tree.texture();
-    if (texture.empty()) {
+    if (tree.texture().empty()) {
         if (!has_detail(tree)) return nullptr;
         // Alone: a thread that waits here must not begin another measurement, which would wait for this.
         static const auto stand_in = tbb::this_task_arena::isolate(
@@ -61,11 +56,10 @@ std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
         return stand_in;
     }
     const glm::vec3 tint = common_tint(tree).value_or(glm::vec3(1));
-    if (is_of_one_colour(texture)) {
-        const TextureDetail even({1, 1, texture.wrap_u, texture.wrap_v, texture.texels.first(1)}, tint);
-        return std::make_shared<const TextureDetail>(TextureDetail::stand_in(even.at(0, glm::vec2(0))));
-    }
-    return std::make_shared<const TextureDetail>(texture, tint);
+    const ShownTexels texels(tree);
+    TextureDetail detail(texels, tint);
+    if (texels.are_alike()) detail = TextureDetail::stand_in(detail.at(0, glm::vec2(0)));
+    return std::make_shared<const TextureDetail>(std::move(detail));
 }
 
 bool has_detail(const VertexTree& tree) {
@@ -116,17 +110,17 @@ std::optional<Colours> colours_of(const VertexTree& tree, std::shared_ptr<const 
         const float luminance = tree.luminance()[wedge];
         of.rgb[wedge] = colours.empty() ? glm::vec3(luminance) : drawn_colour(colours[wedge], luminance);
     }
-    const TextureView texture = tree.texture();
     if (!detail) return of;
-    if (texture.empty()) {
+    if (tree.texture().empty()) {
         of.texture.assign(3, detail);
-    } else if (is_of_one_colour(texture)) {
-        for (int k = 0; k < 3; ++k)
-            of.texture.push_back(std::make_shared<const TextureDetail>(
-                TextureDetail::stand_in(linear_colour(texture.texels.front())[k])));
-    } else {
-        for (int k = 0; k < 3; ++k)
-            of.texture.push_back(std::make_shared<const TextureDetail>(TextureDetail::of_primary(texture, k)));
+        return of;
+    }
+    const ShownTexels texels(tree);
+    const bool are_alike = texels.are_alike();
+    for (int k = 0; k < 3; ++k)
+        of.texture.push_back(std::make_shared<const TextureDetail>(
+            are_alike ? TextureDetail::stand_in(texels.colour(0)[k]) : TextureDetail::of_primary(texels, k)));
+    if (!are_alike) {
         TextureDetail with_colours = *detail;
         with_colours.include_colours(of.texture);
         detail = std::make_shared<const TextureDetail>(std::move(with_colours));

@@ -31,7 +31,9 @@ bool has_colours(const VertexTree& tree) {
         const auto [least, most] = std::minmax({t[0], t[1], t[2]});
         return most - least <= alike;
     };
-    return has_chroma(tree) || !std::ranges::all_of(tree.texture().texels, is_grey);
+    const TextureView texture = tree.texture();
+    return has_chroma(tree) || !std::ranges::all_of(texture.texels, is_grey) ||
+           !std::ranges::all_of(texture.emission, is_grey);
 }
 
 glm::vec3 drawn_colour(const glm::vec4& colour, float luminance) {
@@ -69,13 +71,16 @@ ChromaRange colour_reach(const VertexTree& tree) {
     const auto colours = tree.colours();
     for (std::size_t wedge = 0; wedge < colours.size(); ++wedge)
         include(drawn_chroma(colours[wedge], tree.luminance()[wedge]));
-    const float brightest = tree.luminance_range().hi;
-    std::optional<Texel> last; // neighbours are often alike
-    for (const Texel& texel : tree.texture().texels) {
-        if (last == texel || (texel[0] == texel[1] && texel[0] == texel[2])) continue;
-        last = texel;
-        include(brightest * glm::vec2(opponent_chroma(glm::dvec3(linear_colour(texel)))));
-    }
+    const auto include_texels = [&](std::span<const Texel> texels, float brightest) {
+        std::optional<Texel> last; // neighbours are often alike
+        for (const Texel& texel : texels) {
+            if (last == texel || (texel[0] == texel[1] && texel[0] == texel[2])) continue;
+            last = texel;
+            include(brightest * glm::vec2(opponent_chroma(glm::dvec3(linear_colour(texel)))));
+        }
+    };
+    include_texels(tree.texture().texels, tree.luminance_range().hi);
+    include_texels(tree.texture().emission, 1);
     return all;
 }
 

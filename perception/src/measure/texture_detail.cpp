@@ -23,26 +23,24 @@ std::uint32_t tiles_of(std::uint32_t texels) { return (texels + tile_side - 1) /
 
 } // namespace
 
-TextureDetail::TextureDetail(const TextureView& texture, glm::vec3 tint)
-    : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
+TextureDetail::TextureDetail(const ShownTexels& texels, glm::vec3 tint) {
     const glm::dvec3 of_tint(tint);
     const double own = rec709_luminance(of_tint);
-    set_levels([&](std::size_t i) {
-        const glm::dvec3 texel(glm::vec3(linear_colour(texture.texels[i])));
-        return own > 0 ? rec709_luminance(of_tint * texel) / own : linear_luminance(texture.texels[i]);
+    set_levels(texels.texture(), [&](std::size_t i) {
+        return own > 0 ? rec709_luminance(of_tint * glm::dvec3(texels.colour(i))) / own : texels.luminance(i);
     });
     for (std::size_t level = 0; level < levels_.size(); ++level) find_contrasts(level);
 }
 
-TextureDetail TextureDetail::of_primary(const TextureView& texture, int primary) {
-    TextureDetail detail(texture.width);
-    detail.height_ = texture.height, detail.wrap_u_ = texture.wrap_u, detail.wrap_v_ = texture.wrap_v;
-    detail.set_levels([&](std::size_t i) { return linear_colour(texture.texels[i])[primary]; });
+TextureDetail TextureDetail::of_primary(const ShownTexels& texels, int primary) {
+    TextureDetail detail;
+    detail.set_levels(texels.texture(), [&](std::size_t i) { return texels.colour(i)[primary]; });
     return detail;
 }
 
 template <class Value>
-void TextureDetail::set_levels(Value&& value) {
+void TextureDetail::set_levels(const TextureView& size, Value&& value) {
+    width_ = size.width, height_ = size.height, wrap_u_ = size.wrap_u, wrap_v_ = size.wrap_v;
     Level base{width_, height_, std::vector<float>(std::size_t{width_} * height_), {}};
     parallel_loop(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
         for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) base.means[i] = static_cast<float>(value(i));
@@ -75,7 +73,8 @@ void TextureDetail::include_colours(std::span<const std::shared_ptr<const Textur
 TextureDetail TextureDetail::stand_in(float mean) {
     using namespace measurement;
     static_assert((stand_in_side & (stand_in_side - 1)) == 0);
-    TextureDetail noise(stand_in_side);
+    TextureDetail noise;
+    noise.width_ = noise.height_ = stand_in_side;
     for (std::uint32_t side = stand_in_side; side > 0; side /= 2)
         noise.levels_.push_back({side, side, std::vector<float>(std::size_t{side} * side, mean), {}});
     // From each level to the next finer one: of a texel's four, two are brighter and two are darker.

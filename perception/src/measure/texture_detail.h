@@ -7,20 +7,22 @@
 #include <unseen/vdtree/internal/texture_pyramid.h>
 #include <unseen/vdtree/vertex_tree.h>
 
+#include "measure/shown_texels.h"
+
 namespace unseen::perception {
 
 // Level l has texels 2^l times as wide as the texture's own. What a level shows and the next one does not is its
 // detail: patterns of about four of its texels a wave.
 class TextureDetail {
 public:
-    // Takes a valid texture that is not empty, on vertices of this colour (linear RGB; its brightness does not count).
-    // Cost: some passes over the texels; 6 bytes of memory for each.
-    explicit TextureDetail(const vdtree::TextureView& texture, glm::vec3 tint = glm::vec3(1));
+    // On vertices of this colour (linear RGB; its brightness does not count). Cost: some passes over the texels; 6 bytes of
+    // memory for each.
+    explicit TextureDetail(const ShownTexels& texels, glm::vec3 tint = glm::vec3(1));
 
     // Likewise, what the texture shows of one primary: 0 red, 1 green, 2 blue. Without contrasts.
-    static TextureDetail of_primary(const vdtree::TextureView& texture, int primary);
+    static TextureDetail of_primary(const ShownTexels& texels, int primary);
 
-    // In place of images that are not known, such as normal maps: noise of this mean, of measurement::usual_contrast in
+    // In place of images that are not known: noise of this mean, of measurement::usual_contrast in
     // each octave. Cost: some passes over its texels.
     static TextureDetail stand_in(float mean);
 
@@ -55,16 +57,16 @@ private:
         std::int64_t first, last;
     };
 
-    explicit TextureDetail(std::uint32_t side) : width_(side), height_(side), wrap_u_(), wrap_v_() {}
+    TextureDetail() = default;
     template <class Value>
-    void set_levels(Value&& value); // value(texel): of the finest
+    void set_levels(const vdtree::TextureView& size, Value&& value); // value(texel): of the finest
     void find_contrasts(std::size_t level, std::span<const std::shared_ptr<const TextureDetail>> primaries = {});
     float nearest_outside(const Level& level, float x, float y) const;
     float bilinear(const Level& level, double u, double v) const;
     static std::size_t runs_of(float lo, float hi, std::uint32_t size, vdtree::Wrap wrap, Run (&runs)[2]);
 
-    std::uint32_t width_, height_;
-    vdtree::Wrap wrap_u_, wrap_v_;
+    std::uint32_t width_ = 0, height_ = 0;
+    vdtree::Wrap wrap_u_ = {}, wrap_v_ = {};
     std::vector<Level> levels_;
 };
 

@@ -143,8 +143,14 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
     return static_cast<std::int64_t>(as_double);
 }
 
-std::optional<std::uint32_t> colour_uv_set(const json& material) {
-    const json& texture = within(material, {"pbrMetallicRoughness", "baseColorTexture"});
+const json& leading_texture(const json& material) {
+    const json* texture = &within(material, {"pbrMetallicRoughness", "baseColorTexture"});
+    for (const char* other : {"normalTexture", "emissiveTexture"})
+        if (texture->is_null()) texture = &within(material, {other});
+    return *texture;
+}
+
+std::optional<std::uint32_t> uv_set_of(const json& texture) {
     const json* set = &within(texture, {"extensions", "KHR_texture_transform", "texCoord"});
     if (set->is_null()) set = &within(texture, {"texCoord"});
     if (set->is_null()) return 0;

@@ -58,10 +58,12 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
 inline constexpr std::int64_t max_size = std::int64_t{1} << 53; // integers above are not exact in JSON
 inline constexpr std::int64_t max_int = std::numeric_limits<int>::max();
 
-// The number of the texture coordinates by which the colour texture of a material lies: 0 where nothing else is said,
-// nothing where the number is not read.
+// The texture by whose coordinates a material is drawn: that of its colour, or else of its normals, or of its emission; null
+// where it has none of them.
+const json& leading_texture(const json& material);
+// The number of a texture's coordinates: 0 where nothing else is said, nothing where the number is not read.
 inline constexpr std::uint32_t last_uv_set = 7;
-std::optional<std::uint32_t> colour_uv_set(const json& material);
+std::optional<std::uint32_t> uv_set_of(const json& texture);
 std::string uv_attribute(std::uint32_t set); // "TEXCOORD_0"
 
 // What describes triangles, every integer in range, without buffers and images.

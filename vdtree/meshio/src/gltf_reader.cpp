@@ -117,58 +117,104 @@ public:
     // `images`: null: colours only.
     MaterialReader(const json& document, ImageReader* images) : document_(document), images_(images) {}
 
-    // Alpha counts where it is not said to be ignored. What is wrong loses the material its texture, or its colour.
+    // Alpha counts where it is not said to be ignored. What is wrong loses the material its textures, or its colour.
     Material read(std::size_t index, std::string name, std::vector<Message>& warnings, LostImages& lost) {
         Material material{.name = std::move(name)};
         const json& of_file = array_of(document_, "materials")[index];
-        where_ = numbered("material", index);
         material.undrawn = undrawn(of_file);
         material.is_unlit = material.undrawn.erase("KHR_materials_unlit") > 0;
-        try {
-            const json* surface = optional_object(of_file, "pbrMetallicRoughness");
-            if (surface == nullptr) return material;
-            if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
-            const json* mode = member(of_file, "alphaMode");
-            if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
-            const json* texture = optional_object(*surface, "baseColorTexture");
-            if (images_ == nullptr || texture == nullptr) return material;
-            if (!colour_uv_set(of_file))
-                fail(where_, ": its texture lies by texture coordinates that are not read, which are 0 to ",
-                     last_uv_set, ".");
-            if (mode != nullptr && *mode == "MASK") cut_out(of_file, material);
-            add_texture(*texture, material, lost);
-        } catch (const Fault& fault) {
-            warnings.push_back(fault.what + " Material " + in_quotes(material.name) + " is drawn without that.");
-        }
+        const auto try_to = [&](auto&& read_part) {
+            where_ = numbered("material", index);
+            try {
+                read_part();
+            } catch (const Fault& fault) {
+                warnings.push_back(fault.what + " Material " + in_quotes(material.name) + " is drawn without that.");
+            }
+        };
+        try_to([&] { read_surface(of_file, material, lost); });
+        if (material.is_unlit) return material; // by its colour alone
+        try_to([&] { read_relief(of_file, material, lost); });
+        try_to([&] { read_emission(of_file, material, lost); });
         return material;
     }
 
 private:
-    // With images, or else what shows without.
+    // What else than what is read below shows.
     std::set<std::string> undrawn(const json& of_file) const {
         std::set<std::string> all;
-        const auto has = [](const json& in, const char* key) {
-            const json* value = member(in, key);
-            return value != nullptr && value->is_object();
-        };
-        const auto is_positive = [](const json& value) { return value.is_number() && value > 0; };
-        const json* surface = member(of_file, "pbrMetallicRoughness");
-        const json* mode = member(of_file, "alphaMode");
-        if (images_ != nullptr) {
-            const bool has_image = surface != nullptr && has(*surface, "baseColorTexture");
-            if (has_image && mode != nullptr && *mode == "BLEND") all.insert("translucency by the alpha of images");
-            if (has(of_file, "normalTexture")) all.insert("normal maps");
-            if (has(of_file, "occlusionTexture")) all.insert("occlusion maps");
-        }
-        const json* emission = member(of_file, "emissiveFactor");
-        if (emission != nullptr && emission->is_array() && std::ranges::any_of(*emission, is_positive))
-            all.insert("emission");
+        if (images_ != nullptr && within(of_file, {"occlusionTexture"}).is_object()) all.insert("occlusion maps");
+        const json& metalness = within(of_file, {"pbrMetallicRoughness", "metallicFactor"});
+        const bool has_map = within(of_file, {"pbrMetallicRoughness", "metallicRoughnessTexture"}).is_object();
+        if (metalness.is_number() ? metalness > 0 : has_map) all.insert("metalness");
         if (const json* extensions = member(of_file, "extensions"); extensions != nullptr && extensions->is_object())
             for (const auto& [name, value] : extensions->items())
                 if (name.starts_with("KHR_materials_") && name != "KHR_materials_ior" &&
                     name != "KHR_materials_emissive_strength")
                     all.insert(name);
         return all;
+    }
+
+    void read_surface(const json& of_file, Material& material, LostImages& lost) {
+        const json* surface = optional_object(of_file, "pbrMetallicRoughness");
+        if (surface == nullptr) return;
+        if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
+        const json* mode = member(of_file, "alphaMode");
+        if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
+        material.blends = mode != nullptr && *mode == "BLEND";
+        const json* texture = optional_object(*surface, "baseColorTexture");
+        if (images_ == nullptr || texture == nullptr) return;
+        if (!uv_set_of(*texture))
+            fail(where_, ": its texture lies by texture coordinates that are not read, which are 0 to ", last_uv_set,
+                 ".");
+        if (mode != nullptr && *mode == "MASK") cut_out(of_file, material);
+        material.uv_map = transform_of(*texture);
+        add_wrap(*texture, material);
+        if (const auto image = image_of(*texture, material, lost)) {
+            material.image = decode_percent(image->uri);
+            material.image_bytes = image->bytes;
+        }
+    }
+
+    void read_relief(const json& of_file, Material& material, LostImages& lost) {
+        const json* texture = optional_object(of_file, "normalTexture");
+        if (images_ == nullptr || texture == nullptr) return;
+        if (const json* scale = member(*texture, "scale")) {
+            if (!scale->is_number()) fail(where_, ": the scale of its normalTexture should be a number; correct it.");
+            material.normal_scale = scale->get<float>();
+        }
+        material.normal_map = further_map(of_file, *texture, "normal maps", material, lost);
+    }
+
+    void read_emission(const json& of_file, Material& material, LostImages& lost) {
+        glm::dvec3 factor(0);
+        const json* given = member(of_file, "emissiveFactor");
+        if (given != nullptr && !numbers_in(*given, 0, 1, factor))
+            fail(where_, ": its emissiveFactor should be 3 numbers from 0 to 1; correct it.");
+        const json& strength = within(of_file, {"extensions", "KHR_materials_emissive_strength", "emissiveStrength"});
+        constexpr double most = 1e4; // beyond what any display shows
+        if (strength.is_number()) factor *= std::clamp(strength.get<double>(), 0.0, most);
+        material.emission = glm::vec3(factor);
+        const json* texture = optional_object(of_file, "emissiveTexture");
+        if (images_ == nullptr || texture == nullptr || !material.shines()) return;
+        material.emission_map = further_map(of_file, *texture, "emission", material, lost);
+        if (!material.emission_map) material.emission = glm::vec3(0);
+    }
+
+    // An image that lies as the leading one does; none where it does not, which is noted by its name.
+    std::shared_ptr<const std::string> further_map(const json& of_file, const json& texture, const char* name,
+                                                   Material& material, LostImages& lost) {
+        const json& leading = leading_texture(of_file);
+        if (!uv_set_of(texture) || uv_set_of(texture) != uv_set_of(leading) ||
+            transform_of(texture) != transform_of(leading)) {
+            material.undrawn.insert(std::string(name) + " with coordinates of their own");
+            return nullptr;
+        }
+        if (&texture == &leading) {
+            material.uv_map = transform_of(texture);
+            add_wrap(texture, material);
+        }
+        const auto image = image_of(texture, material, lost);
+        return image ? image->bytes : nullptr;
     }
 
     // By the image's alpha times the factor's, so that the rest is opaque.
@@ -207,34 +253,41 @@ private:
         return array[index];
     }
 
-    void add_texture(const json& info, Material& material, LostImages& lost) {
-        const json* extensions = optional_object(info, "extensions");
-        const json* transform = extensions ? optional_object(*extensions, "KHR_texture_transform") : nullptr;
-        if (transform != nullptr) material.uv_map = uv_map(*transform);
+    void add_wrap(const json& info, Material& material) {
+        const std::string of_material = where_;
         const json& texture = element("textures", info, "index");
         if (member(texture, "sampler") != nullptr) {
-            const std::string of_texture = where_;
             const json& sampler = element("samplers", texture, "sampler");
             material.wrap_u = wrap(sampler, "wrapS");
             material.wrap_v = wrap(sampler, "wrapT");
-            where_ = of_texture;
         }
+        where_ = of_material;
+    }
+
+    // None: it was not found or is of no known kind, which is noted.
+    std::optional<NamedFile> image_of(const json& info, const Material& material, LostImages& lost) {
+        const json& texture = element("textures", info, "index");
         if (member(texture, "source") == nullptr) {
             const TextureSource other = source_of(texture);
             if (!other.extension.empty()) {
                 lost.add(where_ + " is an image of the extension " + other.extension + ", which is not decoded");
                 lost.materials.insert(material.name);
-                return;
+                return std::nullopt;
             }
         }
         element("images", texture, "source"); // it is there
         const NamedFile& image =
             images_->read(static_cast<std::size_t>(to_integer_in_range(texture["source"], max_int, where_)));
-        material.image = decode_percent(image.uri);
-        material.image_bytes = image.bytes;
-        if (image.bytes) return;
+        if (image.bytes) return image;
         lost.add(image.why);
         lost.materials.insert(material.name);
+        return std::nullopt;
+    }
+
+    UvMap transform_of(const json& info) const {
+        const json* extensions = optional_object(info, "extensions");
+        const json* transform = extensions ? optional_object(*extensions, "KHR_texture_transform") : nullptr;
+        return transform != nullptr ? uv_map(*transform) : UvMap{};
     }
 
     // KHR_texture_transform: scaled, turned and moved.
@@ -303,10 +356,10 @@ public:
         : source_(source), whole_(document), model_(model), accessors_(model, buffers),
           budget_(source.bytes.size() + buffers.external_bytes(), max_bytes_out_per_byte_in, min_bytes_out) {
         for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
-        const json::json_pointer texture("/pbrMetallicRoughness/baseColorTexture");
         for (const json& material : array_of(document, "materials")) {
-            uv_sets_.push_back(colour_uv_set(material).value_or(0));
-            is_textured_.push_back(material.contains(texture));
+            const json& texture = leading_texture(material);
+            uv_sets_.push_back(uv_set_of(texture).value_or(0));
+            is_textured_.push_back(!texture.is_null());
         }
     }
 

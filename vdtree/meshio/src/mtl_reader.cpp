@@ -27,7 +27,7 @@ public:
             if (keyword == "newmtl") begin(trimmed(rest));
             else if (names_image(keyword)) {
                 if (is_open_) note_undrawn(keyword);
-                read_image(rest, keyword == "map_Kd");
+                read_image(rest, keyword);
             } else if (!is_open_) continue; // before the first material, or in one that was there before
             else if (keyword == "Kd") read_colour(rest);
             else if (keyword == "d") read_alpha(rest, false);
@@ -55,19 +55,19 @@ private:
     }
 
     void note_undrawn(std::string_view keyword) {
-        constexpr std::pair<std::string_view, const char*> names[] = {{"map_d", "cut-outs by the alpha of images"},
-                                                                      {"map_Ke", "emission"},
-                                                                      {"map_Bump", "normal maps"},
-                                                                      {"map_bump", "normal maps"},
-                                                                      {"bump", "normal maps"},
-                                                                      {"norm", "normal maps"}};
+        constexpr std::pair<std::string_view, const char*> names[] = {
+            {"map_Bump", "bump maps"}, {"map_bump", "bump maps"}, {"bump", "bump maps"}};
         for (const auto& [word, what] : names)
             if (keyword == word) material().undrawn.insert(what);
     }
 
     void read_emission(std::string_view rest) {
-        for (double value = 0; to_number(take_word(rest), value);)
-            if (value > 0) material().undrawn.insert("emission");
+        std::array<double, 3> rgb{};
+        if (!take_shares(rest, rgb))
+            return note_odd("the emission of material " + in_quotes(material().name) +
+                            " should be 3 numbers, and was left out");
+        const glm::vec4 decoded = decode_colour(glm::vec4(rgb[0], rgb[1], rgb[2], 1), ColourEncoding::srgb);
+        material().emission = glm::vec3(decoded);
     }
 
     // Numbers from 0 to 1, with which a line begins; those beyond are clamped. False if there is another word.
@@ -108,6 +108,7 @@ private:
             return note_odd("the opacity of material " + in_quotes(material().name) + " should be a number, not " +
                             in_quotes(all) + ", and was left out");
         material().colour.a = static_cast<float>(is_transparency ? 1 - value : value);
+        material().blends = material().colour.a < 1;
     }
 
     static bool names_image(std::string_view keyword) {
@@ -132,9 +133,14 @@ private:
         }
     }
 
-    // All images are kept; that of the colour is the material's.
-    void read_image(std::string_view rest, bool is_colour) {
-        is_colour = is_colour && is_open_;
+    // All images are kept; those that are drawn are the material's.
+    void read_image(std::string_view rest, std::string_view keyword) {
+        const bool is_colour = is_open_ && keyword == "map_Kd";
+        std::shared_ptr<const std::string>* const further = !is_open_             ? nullptr
+                                                            : keyword == "map_d"  ? &material().opacity_map
+                                                            : keyword == "map_Ke" ? &material().emission_map
+                                                            : keyword == "norm"   ? &material().normal_map
+                                                                                  : nullptr;
         Wrap wrap = Wrap::repeat;
         skip_options(rest, [&](std::string_view option, std::string_view value) {
             if (option == "-clamp") wrap = value == "on" ? Wrap::clamp : Wrap::repeat;
@@ -151,9 +157,10 @@ private:
             material().image = image.uri.empty() ? std::string(rest) : image.uri;
             material().image_bytes = image.bytes;
         }
+        if (further) *further = image.bytes;
         if (!image.bytes) {
             contents_.lost.add(image.why);
-            if (is_colour) contents_.lost.materials.insert(material().name);
+            if (is_colour || further) contents_.lost.materials.insert(material().name);
             return;
         }
         rename(rest, image.uri);

@@ -395,14 +395,20 @@ private:
         for (Message& warning : library_.warnings) warn(std::move(warning));
         result_.materials = std::move(library_.materials);
         if (!source_.options.images) {
-            for (Material& material : result_.materials) material.image.clear(), material.image_bytes.reset();
+            for (Material& material : result_.materials) {
+                for (auto* const bytes :
+                     {&material.image_bytes, &material.normal_map, &material.emission_map, &material.opacity_map})
+                    bytes->reset();
+                material.image.clear();
+            }
             return;
         }
         warn_of_lost_images(library_.lost, ranges(), result_.warnings);
         warn_of_undrawn(result_);
         std::set<std::string> textured;
         for (const Material& material : result_.materials)
-            if (material.has_image()) textured.insert(material.name);
+            if (material.has_image() || material.normal_map || material.opacity_map || material.emission_map)
+                textured.insert(material.name);
         std::uint64_t bare = 0;
         for (const MeshRange& range : ranges()) {
             if (range.kind != MeshRange::Kind::material || !textured.contains(range.name)) continue;

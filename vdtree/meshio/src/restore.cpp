@@ -280,7 +280,7 @@ std::vector<std::string> drawn_uvs(const SourceDocument& document) {
         const gltf::json& material = gltf::within(element(mesh.at("primitives"), part.primitive), {"material"});
         if (material.is_null()) continue;
         const gltf::json& used = gltf::array_of(source, "materials").at(material.get<std::size_t>());
-        uvs[i] = gltf::uv_attribute(gltf::colour_uv_set(used).value_or(0));
+        uvs[i] = gltf::uv_attribute(gltf::uv_set_of(gltf::leading_texture(used)).value_or(0));
     }
     return uvs;
 }

@@ -415,7 +415,11 @@ private:
     void lay_texture() {
         const TextureView& texture = source_.texture;
         g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
-        g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
+        const auto copy = [](std::span<const Texel> texels) {
+            return std::vector<Texel>(texels.begin(), texels.end());
+        };
+        g_->texels = copy(texture.texels), g_->emission = copy(texture.emission), g_->relief = copy(texture.relief);
+        if (texture.blends) g_->blends = std::vector<std::byte>(1);
         g_->ring_texture = bound_ring_texture(*g_, *parts_);
     }
 

@@ -108,10 +108,16 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("document", g.document);
     f("texture", g.texture);
     f("texels", g.texels);
+    f("emission", g.emission);
+    f("relief", g.relief);
+    f("blends", g.blends);
     f("ring_texture", g.ring_texture);
 }
 
-bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
+bool is_of_texture(std::string_view name) {
+    return name == "texture" || name == "texels" || name == "emission" || name == "relief" || name == "blends" ||
+           name == "ring_texture";
+}
 
 // Sections that are there only where they have elements.
 bool is_of_seams(std::string_view name) {
@@ -520,6 +526,7 @@ private:
             {g.source_vertices.size() == leaves, "source_vertices"},
             {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
             {g.texels.empty() == g.texture.empty(), "texels"},
+            {g.blends.size() <= (g.texels.empty() ? 0 : 1), "blends"},
             {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
         for (const auto& [holds, name] : checks)
             if (!holds) return fail("Section " + std::string(name) + " has the wrong length.");

@@ -62,6 +62,9 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
                                  view_of(g.document),
                                  view_of(g.texture),
                                  view_of(g.texels),
+                                 view_of(g.emission),
+                                 view_of(g.relief),
+                                 view_of(g.blends),
                                  view_of(g.ring_texture)};
     return std::make_shared<TreeGeometry>(TreeGeometry{std::move(arrays), std::move(facts), given});
 }

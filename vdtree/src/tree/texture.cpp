@@ -52,6 +52,10 @@ Result<void> validate(const TextureView& texture) {
     if (texture.texels.size() != std::size_t{texture.width} * texture.height)
         return invalid("The texture of " + size + " texels holds " + std::to_string(texture.texels.size()) +
                        "; give as many as it says.");
+    for (const auto further : {texture.emission, texture.relief})
+        if (!further.empty() && further.size() != texture.texels.size())
+            return invalid("A map over the texture of " + size + " texels holds " + std::to_string(further.size()) +
+                           "; give as many, or none.");
     for (const Wrap wrap : {texture.wrap_u, texture.wrap_v})
         if (wrap != Wrap::repeat && wrap != Wrap::clamp && wrap != Wrap::mirror)
             return invalid("The texture repeats in a way that is not known.");
@@ -77,7 +81,14 @@ double linear_luminance(Texel texel) noexcept {
     return rec709_luminance(glm::dvec3(linear[texel[0]], linear[texel[1]], linear[texel[2]]));
 }
 
-bool has_cut_outs(const TextureView& texture) noexcept { return !std::ranges::all_of(texture.texels, is_there); }
+bool has_cut_outs(const TextureView& texture) noexcept {
+    return std::ranges::any_of(texture.texels, [&](Texel texel) { return coverage(texture, texel) < 1; });
+}
+
+glm::vec3 relief_normal(Texel texel) noexcept {
+    const auto axis = [](std::uint8_t code) { return std::max((static_cast<float>(code) - 128) / 127, -1.0f); };
+    return {axis(texel[0]), axis(texel[1]), axis(texel[2])};
+}
 
 CutOuts::CutOuts(const TextureView& texture) : width_(texture.width), height_(texture.height) {
     if (!has_cut_outs(texture)) return;
@@ -86,7 +97,7 @@ CutOuts::CutOuts(const TextureView& texture) : width_(texture.width), height_(te
     for (std::size_t y = 0; y < height_; ++y) {
         std::uint32_t of_row = 0;
         for (std::size_t x = 0; x < width_; ++x) {
-            of_row += !is_there(texture.texels[y * width_ + x]);
+            of_row += coverage(texture, texture.texels[y * width_ + x]) < 1;
             sums_[(y + 1) * columns + x + 1] = sums_[y * columns + x + 1] + of_row;
         }
     }

@@ -369,7 +369,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
                     g.first_need, g.needs, g.positions, g.normals, g.colours, g.uvs, g.first_leaf, g.leaf_end,
                     g.subtree_end, g.first_triangle, g.bounds, g.support_spheres, g.mask_at, g.mask_records,
                     g.displacement, g.fold_weights, g.locked_positions, g.triangles, g.source_triangles,
-                    g.source_vertices, g.document, g.texels, g.ring_texture) +
+                    g.source_vertices, g.document, g.texels, g.emission, g.relief, g.ring_texture) +
            bytes_of(l.luminance, l.support_range, l.ring_range, l.adaptation);
 }
 

@@ -25,6 +25,8 @@ namespace {
 constexpr double moved_share = 0.02;
 // Nor, under lights that move, in so many of its tests.
 constexpr int tests_until_retried = 16;
+// By modern maps so much of the disc around an object may differ visibly.
+constexpr double most_of_object = 0.01;
 
 Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
 
@@ -235,8 +237,13 @@ struct LevelControl::Impl {
         subject.is_open = false;
         test.pixels = pixels;
         const double all = static_cast<double>(passes->width) * static_cast<double>(passes->height);
-        const bool is_too_coarse = static_cast<double>(pixels) > options.upper_share * all,
-                   could_be_coarser = static_cast<double>(pixels) < options.lower_share * all;
+        // The paper counts pixels of the window, whatever the object's size. A small one may then differ all over.
+        const double of_object = pixels_of(subject.sphere, view);
+        const double upper = options.maps == MapRecipe::rpg99
+                                 ? options.upper_share * all
+                                 : std::min(options.upper_share * all, most_of_object * of_object);
+        const bool is_too_coarse = static_cast<double>(pixels) > upper,
+                   could_be_coarser = static_cast<double>(pixels) * options.upper_share < options.lower_share * upper;
         const int worst = subject.levels->chain.size() - 1;
         const bool has_moved =
             glm::length(view.eye - subject.refused_at) > moved_share * glm::length(subject.sphere.centre - view.eye);
@@ -641,12 +648,6 @@ struct LevelControl::Impl {
     bool tests_all = false;
     vdtree::View view;
 };
-
-// ---- shadows
-
-// ---- decisions
-
-// ---- a frame
 
 Result<LevelControl> LevelControl::create(const render::Context& context, Session& session, const vdtree::View& view,
                                           const LevelControlOptions& options, Request request) {

@@ -30,6 +30,11 @@ struct TextureView {
     std::uint32_t width = 0, height = 0;
     Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
     std::span<const Texel> texels = {};
+    bool blends = false; // alpha is the share of light that texels stop; else texels are there from a half on
+    // Further maps of the same texels, or empty.
+    std::span<const Texel> emission = {}; // RGB, sRGB: light that is added, whatever lights the surface; 1 is white
+    // A normal map: x, y and z from -1 to 1 as 0 to 255, along growing u, growing v and the vertices' normals.
+    std::span<const Texel> relief = {};
 
     bool empty() const noexcept { return texels.empty(); }
 };
@@ -38,13 +43,16 @@ struct Texture {
     std::uint32_t width = 0, height = 0;
     Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
     std::vector<Texel> texels;
+    bool blends = false;
+    std::vector<Texel> emission = {}, relief = {};
 
-    TextureView view() const { return {width, height, wrap_u, wrap_v, texels}; }
+    TextureView view() const { return {width, height, wrap_u, wrap_v, texels, blends, emission, relief}; }
 };
 
 inline constexpr std::uint32_t largest_texture_side = 16384; // texels; what graphics processors take
 
-// An empty texture is valid. Otherwise sides must be 1 to largest_texture_side, and there must be width x height texels.
+// An empty texture is valid. Otherwise sides must be 1 to largest_texture_side, and there must be width x height texels, of
+// further maps as many or none.
 Result<void> validate(const TextureView& texture);
 
 // A run of triangles that the file held together: an OBJ group or material, a glTF primitive.

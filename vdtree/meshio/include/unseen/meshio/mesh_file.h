@@ -61,11 +61,21 @@ struct Material {
     UvMap uv_map = {}; // from the vertices' texture coordinates to those of the image
     // Texels of the image whose alpha is less are not there; none: alpha does not count. Above 1: none of them is.
     std::optional<float> alpha_cutoff = {};
+    bool blends = false;   // alpha, times the image's, is the share of light that it stops; without a cut-off
     bool is_unlit = false; // KHR_materials_unlit: it looks as it is, whatever the light
+    // Further image files that lie as the image does, or null.
+    std::shared_ptr<const std::string> normal_map = {}, emission_map = {};
+    std::shared_ptr<const std::string> opacity_map = {}; // OBJ's map_d: alpha, or luminance where all alpha is 1
+    float normal_scale = 1;                              // of x and y of the normal map
+    glm::vec3 emission =
+        glm::vec3(0); // linear RGB of light that it sends out, times the map's; 1 is the display's white
     // What else the file says of how it looks, which nothing here draws or judges: "normal maps", "emission", ...
     std::set<std::string> undrawn = {};
 
     bool has_image() const { return image_bytes != nullptr; }
+    bool shines() const { return emission != glm::vec3(0); }
+    bool is_glass() const { return blends && colour.a < 1; } // seen through all over
+    bool has_maps() const { return has_image() || normal_map || opacity_map || shines() || is_glass(); }
 };
 
 struct ReadResult {

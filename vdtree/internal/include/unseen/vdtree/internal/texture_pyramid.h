@@ -15,9 +15,14 @@ std::int64_t wrapped_texel(std::int64_t i, std::int64_t size, Wrap wrap) noexcep
 glm::vec4 linear_colour(Texel texel) noexcept;
 double linear_luminance(Texel texel) noexcept;
 
-// Whether anything is drawn where the texel is: its alpha is a half or more.
-inline bool is_there(Texel texel) noexcept { return texel[3] >= 128; }
-bool has_cut_outs(const TextureView& texture) noexcept; // texels that are not there
+// The share of light that a texel stops.
+inline float coverage(const TextureView& texture, Texel texel) noexcept {
+    return texture.blends ? static_cast<float>(texel[3]) / 255 : texel[3] >= 128 ? 1.0f : 0.0f;
+}
+bool has_cut_outs(const TextureView& texture) noexcept; // texels of which this is below 1
+
+// x, y, z of a texel of a normal map, from -1 to 1: glTF's code 128 is none.
+glm::vec3 relief_normal(Texel texel) noexcept;
 
 // The least box around texture coordinates; empty until something is included.
 struct UvBox {
@@ -40,7 +45,7 @@ struct UvBox {
     bool operator==(const UvBox&) const = default;
 };
 
-// Where texels are not there.
+// Where a texture is seen through.
 class CutOuts {
 public:
     // Precondition: a valid texture. Cost: a pass over the texels; 4 bytes of memory for each, if any is not there.

@@ -82,6 +82,8 @@ struct GeometryArrays : WedgeArrays<Storage>, NeedArrays<Storage> {
     // Textured trees only.
     Storage<TextureFacts> texture; // one
     Storage<Texel> texels;
+    Storage<Texel> emission, relief;   // as many, or none
+    Storage<std::byte> blends;         // one if TextureView::blends, or none
     Storage<PackedRange> ring_texture; // by interior node
 };
 
@@ -102,7 +104,8 @@ struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
     // Empty without a texture.
     TextureView texture_view() const {
         if (texture.empty()) return {};
-        return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v, texels};
+        return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v,
+                texels,           !blends.empty(),   emission,          relief};
     }
 };
 
