@@ -1,6 +1,8 @@
 // Lights that move: the test by errors folds for a stretch of time, and nothing is seen within it.
 #include <fstream>
 
+#include <unseen/session/follower.h>
+#include <unseen/session_gpu/as_seen.h>
 #include <unseen/session_gpu/picture_judge.h>
 
 #include "built.h"
@@ -28,7 +30,9 @@ protected:
         return session.frame({0.2, 0.3, 1}, 0.3, window);
     }
     void expect_invisible(Session& session, std::initializer_list<double> times) {
-        const vdtree::View view = view_of(session);
+        expect_invisible(session, times, view_of(session));
+    }
+    void expect_invisible(Session& session, std::initializer_list<double> times, const vdtree::View& view) {
         for (const double seconds : times) {
             session.set_time(seconds);
             const auto made = require(session.simplify(view, {.purpose = Purpose::picture}));
@@ -77,6 +81,15 @@ TEST_F(MovingLights, KeepLittleMoreThanLightsThatStandStill) {
                 0.01 * now->stats.triangles);
 }
 
+// Shadows of lights that move take the safe test, which goes by no picture.
+TEST_F(MovingLights, BudgetsHoldWherePicturesTellNothing) {
+    Session session = session_under(R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [0.4, 0.7, 0.6],
+        "intensity": 0.8, "shadow": true, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}}]})");
+    const auto made = require(simplify_as_seen(session, context_, view_of(session), {.goal = Goal::budget(500)}));
+    EXPECT_EQ(made->fold_tests.front(), FoldTest::luebke_hallen_safe);
+    EXPECT_LE(made->stats.triangles, 500u);
+}
+
 // A stretch takes a good part of a second for 100,000 triangles.
 TEST_F(MovingLights, TakeTheSafeTestWhereNobodyWaits) {
     Session session = session_under(orbiting);
@@ -84,10 +97,36 @@ TEST_F(MovingLights, TakeTheSafeTestWhereNobodyWaits) {
     EXPECT_EQ(made->fold_tests.front(), FoldTest::luebke_hallen_safe);
 }
 
-TEST_F(MovingLights, ThatGoWithTheCameraTakeTheSafeTest) {
-    Session session = session_under(R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.6}]})");
-    const auto made = require(session.simplify(view_of(session), {}));
-    EXPECT_EQ(made->fold_tests.front(), FoldTest::luebke_hallen_safe);
+constexpr const char* on_the_camera = R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.6}]})";
+constexpr const char* glossy = R"({"ambient": 0.1, "material": {"specular": 0.08, "shininess": 30},
+    "lights": [{"type": "directional", "direction": [0.1, 0.4, 0.9], "intensity": 0.6}]})";
+
+// In a single picture the eye is known, and nothing shows of what is folded for it; fewer triangles are left than by bounds.
+TEST_F(MovingLights, ThatFollowTheEyeAreKnownInPictures) {
+    for (const char* const text : {on_the_camera, glossy}) {
+        Session session = session_under(text);
+        expect_invisible(session, {0});
+        const vdtree::View view = view_of(session);
+        const auto measured = require(session.simplify(view, {.purpose = Purpose::picture}));
+        const auto bounded =
+            require(session.simplify(view, {.fold_test = FoldTest::luebke_hallen_safe, .purpose = Purpose::picture}));
+        EXPECT_LT(measured->stats.triangles, bounded->stats.triangles);
+        // From elsewhere a highlight is elsewhere.
+        const vdtree::View aside = session.frame({1, 0.3, 0.2}, 0.3, view);
+        expect_invisible(session, {0}, aside);
+    }
+}
+
+TEST_F(MovingLights, ThatFollowTheEyeTakeTheSafeTestInMeshesAndOnPaths) {
+    for (const char* const text : {on_the_camera, glossy}) {
+        Session session = session_under(text);
+        const auto mesh = require(session.simplify(view_of(session), {}));
+        EXPECT_EQ(mesh->fold_tests.front(), FoldTest::luebke_hallen_safe);
+        Follower follower(session);
+        const auto report = require(follower.follow(view_of(session), {.purpose = Purpose::picture}));
+        EXPECT_EQ(report->fold_tests.front(), FoldTest::luebke_hallen_safe);
+        EXPECT_FALSE(session.simplify(view_of(session), {.fold_test = FoldTest::error}));
+    }
 }
 
 } // namespace unseen::session::moving_lights_test

@@ -289,6 +289,7 @@ TEST(LitFolds, RefuseWhatTheyDoNotKnow) {
     ASSERT_FALSE(highlights);
     EXPECT_EQ(highlights.error().code, ErrorCode::unsupported);
     EXPECT_THAT(highlights.error().message, HasSubstr("highlights"));
+    EXPECT_TRUE(folds->under(tree, shiny, glm::dvec3(0, 0, 5)));
     EXPECT_FALSE(folds->under(other, one_light({0, 0, 1})));
     EXPECT_FALSE(folds->under(tree, Lighting()));
     int told = 0;

@@ -21,11 +21,20 @@ bool has_lit_errors(const Sight& sight) {
     return sight.cache.lit_folds || perception::has_lit_folds(sight.object.tree);
 }
 
-// Why the test `error` cannot look at lights that move; null where it can, or where they stand still.
-const char* why_lights_are_not_known(const Sight& sight) {
-    if (!sight.lighting || sight.lights->stands_still()) return nullptr;
-    if (!sight.stretch) return "the test error does not know lights that go with the camera";
-    if (casts_shadows(sight)) return "the test error does not know shadows of lights that move";
+// Why the test `error` cannot look at these lights; null where it can, and without lights.
+const char* why_lights_are_not_known(const Sight& sight, const Request& request) {
+    if (!sight.lighting) return nullptr;
+    const bool has_one_view = sight.memory.has_one_view && request.purpose == Purpose::picture;
+    if (sight.lighting->specular > 0) {
+        if (!has_one_view) return "the test error knows highlights in single pictures alone, for these follow the eye";
+        if (sight.stretch) return "the test error does not know highlights of lights that move";
+        if (!sight.object.tree.texture().relief.empty())
+            return "the test error does not know highlights of normal maps";
+    }
+    if (sight.lights->stands_still()) return nullptr;
+    if (!sight.stretch && !has_one_view)
+        return "the test error knows lights that go with the camera in single pictures alone";
+    if (sight.stretch && casts_shadows(sight)) return "the test error does not know shadows of lights that move";
     return nullptr;
 }
 
@@ -35,15 +44,13 @@ struct Choice {
 };
 
 // Chooses a perceptual test that handles this scene.
-Choice suitable_test(Sight& sight, bool may_measure) {
+Choice suitable_test(Sight& sight, const Request& request, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
-    if (const char* const why = why_lights_are_not_known(sight)) return {FoldTest::luebke_hallen_safe, why};
+    if (const char* const why = why_lights_are_not_known(sight, request)) return {FoldTest::luebke_hallen_safe, why};
     if (sight.stretch && !may_measure)
         return {
             FoldTest::luebke_hallen_safe,
             "the test error takes a moment for each stretch of time in which lights move, and nobody waits for that"};
-    if (sight.lighting && sight.lighting->specular > 0)
-        return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
     if (sight.lighting && !knows_lit_texture(sight))
         return {FoldTest::luebke_hallen_safe,
                 "under lights the test error does not know textures over vertices of several hues"};
@@ -58,18 +65,13 @@ Choice suitable_test(Sight& sight, bool may_measure) {
 }
 
 // Whether a test knows what it would have to look at.
-Result<void> check_knowledge(Sight& sight, FoldTest test, bool shown) {
+Result<void> check_knowledge(Sight& sight, FoldTest test, const Request& request) {
     if (!is_perceptual(test)) return {};
-    if (sight.lighting && test == FoldTest::error && sight.lighting->specular > 0)
-        return invalid_field(
-            "{request.fold_test = }{} knows only lights of {scene.lights} that make no highlights: use "
-            "{request.fold_test = }luebke-hallen-safe.",
-            {name_of(test)});
-    if (const char* const why = why_lights_are_not_known(sight); why && test == FoldTest::error)
+    if (const char* const why = why_lights_are_not_known(sight, request); why && test == FoldTest::error)
         return invalid_field("{request.fold_test = }{} cannot be taken under {scene.lights}, for {}: use "
                              "{request.fold_test = }luebke-hallen-safe.",
                              {name_of(test), why});
-    if (sight.lighting && shown && test != FoldTest::error)
+    if (sight.lighting && !request.shown.empty() && test != FoldTest::error)
         return invalid_field("{request.shown} and {scene.lights} go together with {request.fold_test = }error alone.");
     if (sight.lighting && test == FoldTest::error && !knows_lit_texture(sight))
         return invalid_field(
@@ -88,11 +90,11 @@ Result<Decision> decide(Sight& sight, const Request& request) {
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
     // The full model needs no measuring, so what is measured already does not decide its test.
-    Choice choice = suitable_test(sight, !folds || request.may_measure);
+    Choice choice = suitable_test(sight, request, !folds || request.may_measure);
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
-    if (const auto known = check_knowledge(sight, choice.test, !request.shown.empty()); !known) return known.error();
+    if (const auto known = check_knowledge(sight, choice.test, request); !known) return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure && !(sight.lighting && has_lit_errors(sight)))
         return invalid_field(

@@ -62,6 +62,7 @@ struct Key {
     std::shared_ptr<const vdtree::Lighting> still_lights = {};         // of the test by errors, as the next
     std::shared_ptr<const std::vector<vdtree::Lighting>> stretch = {}; // of lights that move
     bool is_lit = false;
+    std::optional<glm::dvec3> eye = {};                   // of highlights, which follow it
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     vdtree::View lens = {};
     bool operator==(const Key&) const = default;

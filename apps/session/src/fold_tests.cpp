@@ -62,8 +62,9 @@ Criterion make_error(Sight& sight, const Key& key) {
         lightings.insert(lightings.begin(), *sight.lighting);
     }
     std::vector<perception::TreeAsLit> all;
+    const glm::dvec3 eye = vdtree::eye_in_tree(tree, sight.view, sight.object.placement);
     for (vdtree::Lighting& lighting : lightings) {
-        auto lit = sight.cache.lit_folds->under(tree, lighting);
+        auto lit = sight.cache.lit_folds->under(tree, lighting, eye);
         if (!lit) return lit.error();
         all.push_back({std::move(*lit), std::move(lighting)});
     }
@@ -167,6 +168,7 @@ Key key_of(const Sight& sight, const Decision& decision) {
     key.is_lit = sight.lighting != nullptr;
     if (decision.test == FoldTest::error && sight.stretch) key.stretch = sight.stretch;
     else if (decision.test == FoldTest::error) key.still_lights = sight.lighting;
+    if (key.still_lights && key.still_lights->specular > 0) key.eye = sight.view.eye;
     key.csf = sight.csf;
     if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
     return key;

@@ -90,6 +90,8 @@ public:
         return report;
     }
 
+    void expect_one_view() { shadows_.has_one_view = true; }
+
     // In every cut, whatever the goal.
     vdtree::Index locked_triangles() const {
         vdtree::Index sum = 0;
@@ -305,6 +307,7 @@ Result<Simplification> Session::simplify(const vdtree::View& view, const Request
     Request once = request;
     once.hysteresis = 1; // with no cut before, nothing is to keep still
     Follower follower(*this);
+    follower.state_->expect_one_view();
     auto report = follower.follow(view, once);
     if (!report) return report.error();
     Simplification result{std::move(*report), {}};

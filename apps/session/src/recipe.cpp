@@ -177,7 +177,8 @@ Result<vdtree::DistanceCriterion> add_up(Sight& sight, const Decision& decision,
     if (!shown) return shown.error();
     std::optional<vdtree::VertexTree> lit;
     if (sight.lighting) {
-        auto under = sight.cache.lit_folds->under(tree, *sight.lighting);
+        auto under = sight.cache.lit_folds->under(tree, *sight.lighting,
+                                                  vdtree::eye_in_tree(tree, sight.view, sight.object.placement));
         if (!under) return under.error();
         lit = under->share();
     }

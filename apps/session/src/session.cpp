@@ -442,7 +442,7 @@ vdtree::View Session::default_view() const {
 Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std::size_t object) const {
     if (const auto valid = validate(request); !valid) return valid.error();
     if (const auto there = check_object(state_->scene, object); !there) return there.error();
-    ShadowMemory none;
+    ShadowMemory none{.has_one_view = true};
     auto sights = state_->look(view, none);
     if (!sights) return sights.error();
     const auto decision = decide((*sights)[object], request);
@@ -451,7 +451,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
 }
 
 Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
-    ShadowMemory none;
+    ShadowMemory none{.has_one_view = true};
     auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;

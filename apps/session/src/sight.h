@@ -60,6 +60,7 @@ struct ShadowState {
 
 // What a follower keeps of the views that it has seen, so that shadows do not flicker. A single view begins anew.
 struct ShadowMemory {
+    bool has_one_view = false; // and no other will follow
     std::vector<ShadowState> of_objects = {};
     std::shared_ptr<const ShadowReach> reach = {}; // of the last views
 };

@@ -285,15 +285,20 @@ Result<VertexTree> LitFolds::with_attributes(const VertexTree& tree) const {
     return with;
 }
 
-Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& lighting) const {
+Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& lighting,
+                                   std::optional<glm::dvec3> eye) const {
     if (const auto valid = validate(lighting); !valid) return valid.error();
-    if (lighting.specular > 0)
-        return unsupported("What folds change of highlights is not measured, for these follow the eye.");
+    const bool has_highlights = lighting.specular > 0;
+    if (has_highlights && !eye)
+        return unsupported("What folds change of highlights is known for one eye alone, which these follow.");
     if (state_->folds.size() != tree.interior_count())
         return invalid_argument("What folds change under lights was measured of another tree.");
+    Lighting matt = lighting, glossy = lighting; // without highlights, and these alone
+    matt.specular = 0;
+    glossy.ambient = 0;
     const auto lit = tree.shaded(
         [&](WedgeId wedge) {
-            return static_cast<float>(lit_luminance(lighting, glm::dvec3(tree.positions()[wedge]),
+            return static_cast<float>(lit_luminance(matt, glm::dvec3(tree.positions()[wedge]),
                                                     glm::dvec3(glm::vec3(tree.normals()[wedge])),
                                                     static_cast<double>(albedo_of(tree, wedge)), glm::dvec3(0)));
         },
@@ -317,6 +322,13 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
             most += reach.most * direction_bound(lighting.lights[i], ring);
             uneven += reach.uneven * cone.albedo.hi;
         }
+        float highlights = 0; // from the darkest to the brightest
+        if (has_highlights) {
+            VertexCone black = cone;
+            black.albedo = {0, 0};
+            const LuminanceRange range = lit_range(glossy, black, ring, *eye);
+            if (range.hi > least_lit) highlights = range.hi - range.lo;
+        }
         const LitRecord& record = state_->folds[node];
         const auto combined = [&](auto&& value) {
             float of_axes = 0;
@@ -328,16 +340,18 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
         for (const auto& [length, its] : lengths) fold.*its = record.*length;
         fold.gap = record.gap, fold.sine = record.sine;
         const auto set = [&](float& to, float value) { to = std::min(1.0f, value); }; // luminances end there
-        set(fold.largest_luminance, uneven + combined([](const Shades& s) { return s.largest; }));
-        set(fold.mean_luminance, uneven + combined([](const Shades& s) { return s.mean; }));
+        set(fold.largest_luminance, uneven + highlights + combined([](const Shades& s) { return s.largest; }));
+        set(fold.mean_luminance, uneven + highlights + combined([](const Shades& s) { return s.mean; }));
         for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
             for (std::size_t band = 0; band < measurement::picture_bands; ++band)
-                set(fold.amplitudes[size][band], combined([&](const Shades& s) { return s.amplitudes[size][band]; }));
+                set(fold.amplitudes[size][band],
+                    highlights / 2 + combined([&](const Shades& s) { return s.amplitudes[size][band]; }));
         float& widest = fold.amplitudes[measurement::picture_sizes.size() - 1][measurement::picture_bands - 1];
         set(widest, widest + uneven);
     });
     MeasuredFolds measured{std::move(folds), state_->facing, state_->textures};
     if (const auto added = add_luminance_bias(*lit, state_->texture.get(), measured); !added) return added.error();
+    if (has_highlights) return with_records(*lit, std::move(measured), state_->stage_of, {}); // these know none
     return with_records(*lit, std::move(measured), state_->stage_of,
                         state_->stages.under(illumination_of(lighting, tree)));
 }

@@ -75,10 +75,13 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.shown.clear();
     // What a budget leaves may be far off the mesh, and then its picture does not tell what of the mesh is shown.
     Request first = request;
-    if (goes_by_sum(request) && options.folds_hidden) first.goal = Goal::imperceptible();
+    const bool has_other_goal = goes_by_sum(request) && options.folds_hidden;
+    if (has_other_goal) first.goal = Goal::imperceptible();
     auto all = session.simplify(view, first);
     if (!all) return all;
     if (const char* why = why_pictures_tell_nothing(session, request, *all)) {
+        if (has_other_goal) all = session.simplify(view, request);
+        if (!all) return all;
         all->passes = {{"occlusion", false, why}, {"shadows", false, why}};
         return all;
     }

@@ -26,7 +26,7 @@ constexpr double moved_share = 0.02;
 // Nor, under lights that move, in so many of its tests.
 constexpr int tests_until_retried = 16;
 // By modern maps so much of the disc around an object may differ visibly.
-constexpr double most_of_object = 0.01;
+constexpr double most_of_object = 0.001;
 
 Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
 

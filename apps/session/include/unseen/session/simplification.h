@@ -20,7 +20,8 @@ struct Effect {
 
 // For one object. The default fold test is `error`, if the tree has the errors of its folds or they may be measured.
 // Otherwise it is luebke-hallen-safe, and also where `error` cannot see everything: with colours that count, textures
-// over vertices of several hues, lights that move, and highlights. For goals in pixels it is `extent`.
+// over vertices of several hues under lights, shadows of lights that move, and, but in a single picture, lights that go with
+// the camera and highlights. For goals in pixels it is `extent`.
 struct Plan {
     FoldTest fold_test = FoldTest::error;
     std::string why = {};  // why this test and not `error`; empty if it is `error` or was asked for

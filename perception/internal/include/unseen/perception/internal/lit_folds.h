@@ -2,6 +2,8 @@
 // own light is not the scene's.
 #pragma once
 
+#include <optional>
+
 #include <unseen/vdtree/lighting.h>
 
 namespace unseen::perception {
@@ -27,10 +29,12 @@ public:
 
     // The tree under these lights, which stand still: luminances are lit_luminance() of leaves and proxies, and folds
     // change what they do at most from whichever side the light comes. For error_distances(), whose cuts are the given
-    // tree's. Near lights fall off within a ring, and spots end there: what that adds is bounded, too. `tree`: the
-    // measured one, or another handle. Fails where validate() does, and on highlights (unsupported),
-    // which follow the eye. Cost: some 0.3 us a node, in parallel.
-    Result<vdtree::VertexTree> under(const vdtree::VertexTree& tree, const vdtree::Lighting& lighting) const;
+    // tree's. Near lights fall off within a ring, and spots end there: what that adds is bounded, too. Highlights follow
+    // the eye: for one eye (relative to the tree's origin), a fold counts as a change by the whole range that highlights
+    // have over its ring, and there are no stages. `tree`: the measured one, or another handle. Fails where validate()
+    // does, and on highlights without an eye (unsupported). Cost: some 0.3 us a node, in parallel.
+    Result<vdtree::VertexTree> under(const vdtree::VertexTree& tree, const vdtree::Lighting& lighting,
+                                     std::optional<glm::dvec3> eye = {}) const;
 
 private:
     struct State;
