@@ -303,6 +303,14 @@ public:
         return entry->second ? &*entry->second : nullptr;
     }
 
+    // Whether an image of it could not be decoded.
+    bool lacks_images(const Material& material) {
+        for (const auto& bytes :
+             {material.image_bytes, material.normal_map, material.emission_map, material.opacity_map})
+            if (bytes && !image_of(bytes, material)) return true;
+        return false;
+    }
+
     // Sentences on the images that could not be decoded, the triangles that are drawn without, and light beyond white.
     void warn(std::uint64_t triangles, std::vector<Message>& warnings) const {
         if (is_too_bright_)
@@ -313,9 +321,9 @@ public:
         if (first.ends_with('.')) first.pop_back();
         const std::string count = complaints_.size() == 1 ? "" : "the first of " + std::to_string(complaints_.size());
         warnings.push_back(
-            Message::of("{} the colour of the material alone, as an image could not be decoded ({}{}); "
+            Message::of("{} drawn without an image of the material, which could not be decoded ({}{}); "
                         "{load.texture} names another image.",
-                        {std::to_string(triangles) + (triangles == 1 ? " triangle shows" : " triangles show"),
+                        {std::to_string(triangles) + (triangles == 1 ? " triangle is" : " triangles are"),
                          count.empty() ? "" : count + ": ", first}));
     }
 
@@ -461,11 +469,14 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
     Textures textures(read.uvs_from_top);
     static const Texture white{1, 1, vdtree::Wrap::clamp, vdtree::Wrap::clamp, {{255, 255, 255, 255}}};
     std::vector<const Texture*> of_material(read.materials.size() + 1, &white); // the last: no material
+    std::vector<std::uint64_t> triangles(read.materials.size());
+    for (const std::size_t m : of_triangle)
+        if (has_maps(m)) ++triangles[m];
     std::uint64_t lost = 0;
-    for (const std::size_t m : of_triangle) {
-        if (!has_maps(m) || of_material[m] != &white) continue;
+    for (std::size_t m = 0; m < triangles.size(); ++m) {
+        if (triangles[m] == 0) continue;
         if (const Texture* texture = textures.of(read.materials[m], tints[m])) of_material[m] = texture;
-        else ++lost;
+        if (textures.lacks_images(read.materials[m])) lost += triangles[m];
     }
     textures.warn(lost, read.warnings);
     if (std::all_of(of_material.begin(), of_material.end(), [](const Texture* image) { return image == &white; }))
