@@ -151,7 +151,10 @@ bool is_there() {
     vec2 uv = bounded_uv();
     float alpha = texture(surface_image, uv, lod_bias).a;
 #ifdef BLENDS
-    return alpha >= least_share;
+    // One sample a pixel: by pixels, in a pattern that no eye finds (Jimenez 2014, "interleaved gradient noise").
+    float share = least_share < 0.0 ? fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))))
+                                    : least_share;
+    return alpha > 0.0 && alpha >= share;
 #else
     float level = textureQueryLod(surface_image, uv).y + lod_bias;
     return alpha >= mix(0.5, least_share, clamp(level, 0.0, 1.0));
@@ -186,13 +189,11 @@ vec3 tilted(vec3 n) {
     vec3 p = cross(along, n), q = cross(n, across);
     vec3 of_u = p * uv_across.x + q * uv_along.x, of_v = p * uv_across.y + q * uv_along.y;
     float size = max(dot(of_u, of_u), dot(of_v, of_v));
-    if (!(size > 0.0))
-        return n;
     float side = dot(cross(across, along), n) < 0.0 ? -1.0 : 1.0; // seen from behind, or where y grows downward
     vec3 map = texture(relief_image, bounded_uv(), lod_bias).xyz;
-    vec3 sum = side * inversesqrt(size) * (of_u * map.x + of_v * map.y) + n * map.z;
+    vec3 sum = side * inversesqrt(max(size, 1e-30)) * (of_u * map.x + of_v * map.y) + n * map.z;
     float squared = dot(sum, sum);
-    return squared > 0.0 ? sum * inversesqrt(squared) : n;
+    return size > 0.0 && squared > 0.0 ? sum * inversesqrt(squared) : n; // a zero n stays zero
 }
 
 #ifndef LIT
@@ -272,14 +273,12 @@ void main() {
     float highlight = 0.0;
 #if defined(RELIEF) && defined(LIT)
     vec4 hue = result;
-    vec3 n = surface_normal();
-    vec2 lit = lit_luminance(n == vec3(0) ? n : tilted(n), surface_place, surface_normal_and_albedo.w);
+    float albedo = surface_normal_and_albedo.w;
+    vec2 lit = lit_luminance(tilted(surface_normal()), surface_place, albedo >= 0.0 ? min(albedo, 1.0) : 0.0);
     result = hue * lit.x;
     highlight = lit.y;
 #elif defined(RELIEF)
-    vec3 n = surface_normal();
-    if (n != vec3(0))
-        result *= brightening(n);
+    result *= brightening(surface_normal());
 #elif defined(TEXTURED) && defined(LIT)
     highlight = surface_highlight;
 #endif

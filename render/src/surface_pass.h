@@ -55,7 +55,7 @@ public:
     // `sample_count`: of draws that will be averaged, each of which stands for so small a part of a pixel. `only`:
     // nothing else is touched. `least_share`: of a texel finer than that part, to be drawn where it is cut out in part.
     void draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count = 1,
-              const PixelBox* only = nullptr, float least_share = 0.5f) const;
+              const PixelBox* only = nullptr, float least_share = SurfaceTexture::by_pixels) const;
 
     // Draws nothing but what an occlusion query counts: where the items are at the target's depth, and do not look like
     // the picture that is bound. `compared`: as compare.frag has it.
@@ -83,7 +83,8 @@ private:
         : view_(camera.view), tile_(camera.tile), attachment_(attachment), mask_(camera.shadow_mask), output_(output),
           shadows_(camera.shadows ? &camera.shadows->impl() : nullptr) {}
     static Cull cull_for(vdtree::Closedness closedness, bool eye_inside);
-    void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias, float least_share = 0.5f) const;
+    void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias,
+                   float least_share = SurfaceTexture::by_pixels) const;
     void set_colours(const PreparedItem& item) const;
 
     vdtree::View view_;

@@ -110,10 +110,6 @@ GLint gl_wrap(vdtree::Wrap wrap) {
     return GL_REPEAT;
 }
 
-} // namespace
-
-namespace {
-
 // Half floats, and not codes: decoding sRGB in hardware and drivers is off by up to a fifth of a percent, and coarse levels
 // would be rounded to codes.
 Result<Texture2d> create_image(const char* label, const vdtree::TextureView& texture, int levels, bool has_alpha) {
@@ -184,7 +180,8 @@ void SurfaceTexture::describe(unsigned vertex_array) const {
 void SurfaceTexture::bind(const Program& program, float lod_bias, float least_share) const {
     program.set(lod_bias_location, lod_bias);
     program.set(uv_bounds_location, glm::vec4(box_.lo, box_.hi)); // the least of all vertices, then the largest
-    if (has_cut_outs_) program.set(least_share_location, least_share);
+    constexpr float half = 0.5f;
+    if (has_cut_outs_) program.set(least_share_location, least_share < 0 && !blends_ ? half : least_share);
     const auto put = [](unsigned binding, const Texture2d& image) {
         glBindTextureUnit(binding, image.id());
         glBindSampler(binding, 0); // a window's other users may have put one there

@@ -21,6 +21,8 @@ public:
     static Result<SurfaceTexture> create(const vdtree::TextureView& texture, std::span<const glm::vec2> uvs);
 
     void describe(unsigned vertex_array) const; // the coordinates, as surface.vert takes them
+    // In place of a share: of pixels with one sample.
+    static constexpr float by_pixels = -1;
     // The maps, as surface.frag takes them. `least_share`: see SurfacePass::draw(); of programs that cut out.
     void bind(const Program& program, float lod_bias, float least_share) const;
 

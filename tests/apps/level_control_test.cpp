@@ -393,6 +393,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_THAT(refused({.layers = 0}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.layers = 17}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.upper_share = 0.1, .lower_share = 0.2}), HasSubstr("shares"));
+    EXPECT_THAT(refused({.object_share = 2}), HasSubstr("share"));
     EXPECT_THAT(refused({.fade_frames = -1}), HasSubstr("fade"));
     EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));
 }

@@ -257,6 +257,22 @@ TEST_F(MaterialCommandTest, WhatAlphaLeavesOutIsNotDrawn) {
     }
 }
 
+// Green of a normal map is up: light from above brightens what it tilts there.
+TEST_F(MaterialCommandTest, GreenOfNormalMapsIsUp) {
+    const auto map = [&](float green) {
+        const Image tilt{1, 1, 3, {128.0f / 255, green / 255, 230.0f / 255}};
+        EXPECT_TRUE(unseen::perception::write_image(path("n.png"), tilt));
+        write_text(path("in.mtl"), "newmtl m\nKd 0.5 0.5 0.5\nnorm n.png\n");
+        write_text(path("in.obj"), "mtllib in.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\n"
+                                   "vt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n");
+        succeed({"render", "in.obj", "--full", "--size", "32", "--light", "0", "1", "1", "-o", "o.pfm"});
+        const auto picture = require(unseen::perception::read_image(path("o.pfm")));
+        return unseen::perception::to_luminance(*picture, {}).at(16, 16);
+    };
+    EXPECT_GT(map(204), 1.2 * map(128));
+    EXPECT_LT(map(52), 0.7 * map(128));
+}
+
 // The same images and colours in MTL: what stops light in part, by a number and by an image's alpha; light of its own.
 TEST_F(MaterialCommandTest, ObjectsBlendAndShine) {
     write_text(path("half.png"), half_there);

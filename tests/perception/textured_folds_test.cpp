@@ -135,6 +135,50 @@ TEST(TexturedFolds, CountTheirMapsOfNormalsAndLight) {
     }
 }
 
+// Under lights, too, where trees are shaded anew.
+TEST(TexturedFolds, CountTheirNormalMapsUnderLights) {
+    Mesh mesh = textures::textured_grid(20, textures::checkerboard(512, 512, 4, 128, 129));
+    for (glm::vec2& uv : mesh.uvs) uv.x = uv.x * uv.x;
+    const auto contrast_of = [](const Mesh& m) {
+        const VertexTree tree = support::built(m);
+        const VertexTree lit = *require(require(LitFolds::measure(tree))->with_attributes(tree));
+        float most = 0;
+        for (const FoldTexture& t : lit.attribute<FoldTexture>("lit_texture"))
+            most = std::max(most, *std::max_element(std::begin(t.contrast), std::end(t.contrast)));
+        return most;
+    };
+    const float even = contrast_of(mesh);
+    for (const Texel& texel : textures::checkerboard(512, 512, 4, 40, 216).texels)
+        mesh.texture.relief.push_back({texel[0], 128, 220, 255});
+    EXPECT_GT(contrast_of(mesh), 5 * even);
+}
+
+// What shines is as bright as it shines, also in the ranges that outlines are held against.
+TEST(TexturedFolds, RangesHoldWhatShines) {
+    Mesh mesh = textures::textured_grid(4, textures::checkerboard(8, 8, 4, 60, 60));
+    const VertexTree dark = support::built(mesh);
+    mesh.texture.emission.assign(64, Texel{0, 0, 0, 255});
+    for (std::size_t i = 0; i < 32; ++i) mesh.texture.emission[i] = {240, 240, 240, 255};
+    const VertexTree tree = support::built(mesh);
+    const auto light = static_cast<float>(linear_luminance({240, 240, 240, 255}));
+    EXPECT_NEAR(tree.luminance_range().hi, dark.luminance_range().hi + light, 1e-3f);
+    EXPECT_NEAR(tree.luminance_range().lo, dark.luminance_range().lo, 1e-3f);
+    EXPECT_TRUE(verify(tree)) << verify(tree).error().message;
+    mesh.texture.emission.assign(64, Texel{240, 240, 240, 255});
+    EXPECT_NEAR(support::built(mesh).luminance_range().lo, dark.luminance_range().lo + light, 1e-3f);
+}
+
+// Coordinates beyond all texels, of maps that triangles are looked at for.
+TEST(ShownTexels, TakeCoordinatesThatAreNowhere) {
+    Mesh mesh = textures::textured_grid(4, textures::checkerboard(8, 8, 4, 60, 60));
+    mesh.texture.relief = mesh.texture.emission = mesh.texture.texels;
+    for (const float far : {1e37f, -1e20f, 3e6f}) {
+        mesh.uvs[3] = {0, far};
+        const ShownTexels shown(support::built(mesh));
+        EXPECT_TRUE(std::isfinite(shown.luminance(0)));
+    }
+}
+
 // On a plane an even texture slides nowhere, whatever it shows; squeezed to one side, it does.
 TEST(TexturedFolds, SlideWhereTheTextureIsUneven) {
     const Texture texture = textures::checkerboard(512, 512, 4, 0, 255);

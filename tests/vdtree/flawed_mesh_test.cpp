@@ -118,7 +118,7 @@ const std::vector<Case>& cases() {
          {{"a.obj", "mtllib a.mtl\n" + textured}, {"a.mtl", mtl("gone.png") + "bump gone.png\nnorm n.png\n"}},
          "a.obj",
          2,
-         {"2 images were not read, so 2 triangles show the colour of the material alone; the first: "
+         {"2 images were not read, so 2 triangles are drawn without an image of the material; the first: "
           "'gone.png' is neither beside the file that names it nor beside the mesh; read.search_folder",
           "what materials have of bump maps is not drawn: what is said of visibility does not know it."}},
         {"light of its own",
@@ -187,7 +187,7 @@ const std::vector<Case>& cases() {
          {{"a.glb", glb(R"({"extensions":{"EXT_texture_webp":{"source":0}}})")}},
          "a.glb",
          1,
-         {"1 image was not read, so 1 triangle shows the colour of the material alone: texture 0 is an image of "
+         {"1 image was not read, so 1 triangle is drawn without an image of the material: texture 0 is an image of "
           "the extension EXT_texture_webp, which is not decoded."}},
         {"one of KTX2 that is required",
          {{"a.glb",
@@ -227,7 +227,8 @@ const std::vector<Case>& cases() {
               "extensions":{"KHR_texture_transform":{"scale":[2,2]}}}})")}},
          "a.glb",
          1,
-         {"of emission with coordinates of their own and normal maps with coordinates of their own is not drawn"},
+         {"of emission with coordinates or a sampler of their own and normal maps with coordinates or a sampler of "
+          "their own"},
          picture},
         {"an emission that is no colour",
          {{"a.glb", glb(R"({"source":0})", R"({"bufferView":2,"mimeType":"image/png"})", R"([{"mesh":0}])", "",

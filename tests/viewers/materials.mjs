@@ -8,7 +8,7 @@ import {patch, png, turn, write_glb} from './gltf.mjs';
 import {draw_with_three, luminances} from './three.mjs';
 
 const [unseen, npm, folder] = process.argv.slice(2);
-const most_mean = 0.02; // of white: the difference over what is drawn
+const most_mean = 0.005; // of white: the difference over what is drawn
 const size = 256, black = 0.5, white = 100, background = 20; // pixels, cd/m2
 
 // ---- models

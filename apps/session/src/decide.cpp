@@ -24,7 +24,7 @@ bool has_lit_errors(const Sight& sight) {
 // Why the test `error` cannot look at these lights; null where it can, and without lights.
 const char* why_lights_are_not_known(const Sight& sight, const Request& request) {
     if (!sight.lighting) return nullptr;
-    const bool has_one_view = sight.memory.has_one_view && request.purpose == Purpose::picture;
+    const bool has_one_view = sight.memory.has_one_view && request.purpose == Purpose::picture && request.may_measure;
     if (sight.lighting->specular > 0) {
         if (!has_one_view) return "the test error knows highlights in single pictures alone, for these follow the eye";
         if (sight.stretch) return "the test error does not know highlights of lights that move";

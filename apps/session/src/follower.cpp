@@ -62,6 +62,7 @@ public:
         if (const auto taken = take_up_trees(); !taken) return taken.error();
         const bool folds = request.goal.kind != Goal::Kind::full;
         tell_of_locks(request.goal);
+        tell_of_maps(*prepared);
         if (folds) {
             if (const auto made = make_recipes(*prepared); !made) return made.error();
         } else {
@@ -281,8 +282,24 @@ private:
                         {grouped(locked), grouped(goal.triangles)}));
     }
 
+    // That the tests of 2001 look at the vertices' light and the texture alone.
+    void tell_of_maps(const Prepared& prepared) {
+        if (has_told_of_maps_ || !session_->messages.warning) return;
+        for (std::size_t i = 0; i < prepared.decisions.size(); ++i) {
+            const Decision& decision = prepared.decisions[i];
+            const vdtree::TextureView texture = prepared.sights[i].object.tree.texture();
+            const bool has_maps = !texture.relief.empty() || !texture.emission.empty();
+            if (!has_maps || !is_perceptual(decision) || decision.test == FoldTest::error) continue;
+            has_told_of_maps_ = true;
+            session_->messages.warning("the fold test " + name_of(decision.test) +
+                                       " knows no normal maps and little of emission: what is said of visibility does "
+                                       "not know them.");
+            return;
+        }
+    }
+
     std::shared_ptr<Session::State> session_;
-    bool has_told_of_locks_ = false;
+    bool has_told_of_locks_ = false, has_told_of_maps_ = false;
     std::vector<Followed> objects_;
     ShadowMemory shadows_;
     std::optional<double> glide_s_;

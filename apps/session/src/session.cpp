@@ -451,7 +451,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
 }
 
 Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
-    ShadowMemory none{.has_one_view = true};
+    ShadowMemory none;
     auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;
@@ -464,7 +464,7 @@ Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& reque
     if (request.goal.kind == Goal::Kind::full)
         return invalid_field("{request.goal = full} folds nothing, so there is nothing to cut by.");
     if (const auto there = check_object(state_->scene, object); !there) return there.error();
-    ShadowMemory none;
+    ShadowMemory none{.has_one_view = true};
     auto prepared = state_->prepare(view, request, none);
     if (!prepared) return prepared.error();
     return make_recipe(prepared->sights[object], prepared->decisions[object]);

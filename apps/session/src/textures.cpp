@@ -248,14 +248,15 @@ void cut_out(Texture& texture, std::optional<float> cutoff) {
     for (vdtree::Texel& texel : texture.texels) texel[3] = stretched[texel[3]];
 }
 
-void set_alpha(Texture& texture, const Material& material, const Texture* opacity) {
-    if (!material.blends && opacity == nullptr) return cut_out(texture, material.alpha_cutoff);
+// `opacity`: a map of as many texels, or empty.
+void set_alpha(Texture& texture, const Material& material, std::span<const vdtree::Texel> opacity) {
+    if (!material.blends && opacity.empty()) return cut_out(texture, material.alpha_cutoff);
     const auto is_whole = [](vdtree::Texel texel) { return texel[3] == 255; };
-    const bool by_alpha = opacity != nullptr && !std::ranges::all_of(opacity->texels, is_whole);
+    const bool by_alpha = !std::ranges::all_of(opacity, is_whole);
     for (std::size_t i = 0; i < texture.texels.size(); ++i) {
         std::uint8_t& alpha = texture.texels[i][3];
-        if (opacity != nullptr) {
-            const vdtree::Texel& of = opacity->texels[i];
+        if (!opacity.empty()) {
+            const vdtree::Texel& of = opacity[i];
             alpha = by_alpha
                         ? of[3]
                         : static_cast<std::uint8_t>(std::lround(rec709_luminance(glm::dvec3(of[0], of[1], of[2]))));
@@ -357,7 +358,7 @@ private:
                              *const light = image_of(material.emission_map, material),
                              *const opacity = image_of(material.opacity_map, material);
         const bool shines = material.shines() && (light || !material.emission_map);
-        if (!colour && !normals && !opacity && !shines && !material.blends) return std::nullopt;
+        if (!colour && !normals && !opacity && !shines && !material.blends && tint == glm::vec3(1)) return std::nullopt;
         Texture made{1, 1, material.wrap_u, material.wrap_v, {}};
         for (const Texture* image : {colour, normals, light, opacity}) {
             if (!image) continue;
@@ -365,22 +366,20 @@ private:
             made.height = std::max(made.height, image->height);
         }
         const std::uint64_t texels = std::uint64_t{made.width} * made.height;
-        if (std::max(made.width, made.height) > vdtree::largest_texture_side ||
-            !spends(texels, "the maps of material '" + material.name + "'"))
+        if (!made_texels_.spend(texels)) {
+            complaints_.push_back(
+                "the maps of material '" + material.name +
+                "', as large as its largest one, have with others more than 2^29 pixels in all; scale "
+                "them down.");
             return std::nullopt;
+        }
         constexpr vdtree::Texel white{255, 255, 255, 255};
         const auto fitted = [&](const Texture* image) {
             return image ? resized(*image, made) : std::vector<vdtree::Texel>(texels, white);
         };
         made.texels = fitted(colour);
         if (tint != glm::vec3(1)) scale_light(made.texels, tint);
-        if (opacity) {
-            Texture alpha = made;
-            alpha.texels = fitted(opacity);
-            set_alpha(made, material, &alpha);
-        } else {
-            set_alpha(made, material, nullptr);
-        }
+        set_alpha(made, material, opacity ? fitted(opacity) : std::vector<vdtree::Texel>());
         if (normals) {
             made.relief = fitted(normals);
             scale_relief(made.relief, material.normal_scale, from_top_);
@@ -419,7 +418,8 @@ private:
     }
 
     bool from_top_, is_too_bright_ = false;
-    Budget texels_{0, 0, std::uint64_t{1} << 29};
+    static constexpr std::uint64_t most_texels = std::uint64_t{1} << 29; // of all images, and of all textures
+    Budget texels_{0, 0, most_texels}, made_texels_{0, 0, most_texels};
     std::map<const std::string*, std::optional<Texture>> images_;
     std::map<std::pair<Maps, std::array<float, 3>>, std::optional<Texture>> textures_;
     std::vector<std::string> complaints_;
@@ -484,7 +484,7 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
     constexpr meshio::UvMap middle{glm::dmat2(0), glm::dvec2(0.5)};
     std::vector<meshio::UvMap> maps(of_material.size(), middle);
     for (std::size_t m = 0; m < read.materials.size(); ++m)
-        if (of_material[m] != &white) maps[m] = read.materials[m].uv_map;
+        if (const Texture* of = of_material[m]; of->width > 1 || of->height > 1) maps[m] = read.materials[m].uv_map;
 
     std::vector<AtlasPart> parts;
     std::map<const Texture*, std::size_t> part_of;

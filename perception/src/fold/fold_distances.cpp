@@ -561,8 +561,9 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
     const vdtree::LuminanceRange range =
         vdtree::lit_range(lighting, bounds.cones()[root], bounds.sphere(tree, root), eye);
     constexpr float steps = 32;
+    const float brightest = tree.texture().emission.empty() ? range.hi : 1.0f; // what shines may be white
     return {std::floor(steps * std::min(range.lo, background)) / steps,
-            std::ceil(steps * std::max(range.hi, background)) / steps};
+            std::ceil(steps * std::max(brightest, background)) / steps};
 }
 
 } // namespace unseen::perception

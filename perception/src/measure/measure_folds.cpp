@@ -45,10 +45,9 @@ std::optional<glm::vec3> common_tint(const VertexTree& tree) {
     return tint ? *tint : glm::vec3(1);
 }
 
-} // namespace
-
-std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
-    if (tree.texture().empty()) {
+// `texels`: those of the tree, where it has a texture.
+std::shared_ptr<const TextureDetail> detail_of(const VertexTree& tree, const std::optional<ShownTexels>& texels) {
+    if (!texels) {
         if (!has_detail(tree)) return nullptr;
         // Alone: a thread that waits here must not begin another measurement, which would wait for this.
         static const auto stand_in = tbb::this_task_arena::isolate(
@@ -56,10 +55,16 @@ std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
         return stand_in;
     }
     const glm::vec3 tint = common_tint(tree).value_or(glm::vec3(1));
-    const ShownTexels texels(tree);
-    TextureDetail detail(texels, tint);
-    if (texels.are_alike()) detail = TextureDetail::stand_in(detail.at(0, glm::vec2(0)));
+    TextureDetail detail(*texels, tint);
+    if (texels->are_alike()) detail = TextureDetail::stand_in(detail.at(detail.level_count() - 1, glm::vec2(0)));
     return std::make_shared<const TextureDetail>(std::move(detail));
+}
+
+} // namespace
+
+std::shared_ptr<const TextureDetail> texture_detail_of(const VertexTree& tree) {
+    if (tree.texture().empty()) return detail_of(tree, std::nullopt);
+    return detail_of(tree, ShownTexels(tree));
 }
 
 bool has_detail(const VertexTree& tree) {
@@ -102,7 +107,8 @@ struct Colours {
 };
 
 // Nothing of grey trees. `detail`: of the tree's texture, to which the colours are added.
-std::optional<Colours> colours_of(const VertexTree& tree, std::shared_ptr<const TextureDetail>& detail) {
+std::optional<Colours> colours_of(const VertexTree& tree, const std::optional<ShownTexels>& texels,
+                                  std::shared_ptr<const TextureDetail>& detail) {
     if (!has_colours(tree)) return std::nullopt;
     Colours of{std::vector<glm::vec3>(tree.wedge_count())};
     const auto colours = tree.colours();
@@ -111,15 +117,14 @@ std::optional<Colours> colours_of(const VertexTree& tree, std::shared_ptr<const 
         of.rgb[wedge] = colours.empty() ? glm::vec3(luminance) : drawn_colour(colours[wedge], luminance);
     }
     if (!detail) return of;
-    if (tree.texture().empty()) {
+    if (!texels) {
         of.texture.assign(3, detail);
         return of;
     }
-    const ShownTexels texels(tree);
-    const bool are_alike = texels.are_alike();
+    const bool are_alike = texels->are_alike();
     for (int k = 0; k < 3; ++k)
         of.texture.push_back(std::make_shared<const TextureDetail>(
-            are_alike ? TextureDetail::stand_in(texels.colour(0)[k]) : TextureDetail::of_primary(texels, k)));
+            are_alike ? TextureDetail::stand_in(texels->colour(0)[k]) : TextureDetail::of_primary(*texels, k)));
     if (!are_alike) {
         TextureDetail with_colours = *detail;
         with_colours.include_colours(of.texture);
@@ -189,10 +194,10 @@ void put_together(std::vector<MeasuredFolds>& found) {
     found.resize(1);
 }
 
-// Without shifts of the mean. `dark`: of textured trees, by tree, what their luminance is where the texture is black.
-// `up_to`: the share of the whole that this is.
-Result<Measured> measure(std::span<const VertexTree> trees, std::span<const float> dark, int threads, double up_to,
-                         MeasuringProgress& progress) {
+// Without shifts of the mean. `own`: the tree that they are of, in its own light. `dark`: of textured trees, by tree, what
+// their luminance is where the texture is black. `up_to`: the share of the whole that this is.
+Result<Measured> measure(const VertexTree& own, std::span<const VertexTree> trees, std::span<const float> dark,
+                         int threads, double up_to, MeasuringProgress& progress) {
     const bool is_textured = has_detail(trees.front());
     assert(trees.size() == 1 || trees.size() == 4 || (trees.size() == 3 && !is_textured));
     Measured all;
@@ -204,8 +209,9 @@ Result<Measured> measure(std::span<const VertexTree> trees, std::span<const floa
         all.in_units.push_back(std::move(*measured));
     }
     const NodeId nodes = trees.front().interior_count();
-    all.texture = texture_detail_of(trees.front());
-    if (trees.size() == 1) all.colours = colours_of(trees.front(), all.texture);
+    const std::optional<ShownTexels> texels = own.texture().empty() ? std::nullopt : std::optional<ShownTexels>(own);
+    all.texture = detail_of(own, texels);
+    if (trees.size() == 1) all.colours = colours_of(own, texels, all.texture);
     all.found.resize(all.colours ? 3 : trees.size());
     for (MeasuredFolds& found : all.found) {
         found.folds.resize(nodes), found.facing.resize(nodes);
@@ -299,7 +305,7 @@ std::vector<FoldError> errors_in_any_light(const Measured& measured, float to_li
 Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
     MeasuringProgress told(progress);
     constexpr float dark = 0;
-    auto measured = measure(std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
+    auto measured = measure(tree, std::span(&tree, 1), std::span(&dark, 1), threads, before_stages, told);
     if (!measured) return measured.error();
     std::vector<FoldError>& errors = measured->errors.front();
     std::vector<FoldStage> stages;
@@ -330,7 +336,7 @@ Result<MeasuredShadings> measure_shadings(const VertexTree& tree, std::span<cons
         shaded.push_back(std::move(*as_shaded));
     }
     MeasuringProgress told(progress);
-    auto measured = measure(shaded, dark, threads, before_stages, told);
+    auto measured = measure(tree, shaded, dark, threads, before_stages, told);
     if (!measured) return measured.error();
     std::vector<FoldError> errors = errors_in_any_light(*measured, to_light);
     MeasuredShadings all;

@@ -14,7 +14,9 @@ using namespace vdtree;
 
 namespace {
 
-constexpr std::int64_t most_looks = 1 << 16; // at a triangle, which may repeat the image any number of times
+// Looks at all triangles together, over texels. Where triangles show texels more often, they are looked at as much less
+// densely, but each this often.
+constexpr double looks_a_texel = 16, least_looks = 16;
 // A vertex that no light reaches shows no relief, and its luminance divides nothing.
 constexpr float least_light = 0.01f;
 
@@ -72,26 +74,39 @@ Sums halved(const Sums& fine) {
     return coarse;
 }
 
-// Calls look(texel's column, row, weights of the corners) for the middles of texels in a triangle, and for its own.
+// The box around a triangle, in texels.
+struct Box {
+    glm::dvec2 low, size;
+
+    explicit Box(const std::array<Corner, 3>& c) {
+        const glm::dvec2 p(c[0].texel), q(c[1].texel), r(c[2].texel);
+        low = glm::floor(glm::min(glm::min(p, q), r));
+        size = glm::floor(glm::max(glm::max(p, q), r)) - low + 1.0;
+    }
+    bool is_sound() const {                  // NaN is not
+        constexpr double farthest = 1 << 23; // texels; beyond, floats cannot tell them apart
+        return std::abs(low.x) < farthest && std::abs(low.y) < farthest && size.x < farthest && size.y < farthest;
+    }
+    double texels() const { return size.x * size.y; }
+};
+
+// Calls look(texel's column, row, weights of the corners) for the middles of texels in a triangle, about `most` of its box's,
+// and for its own.
 template <class Look>
-void for_each_texel(const std::array<Corner, 3>& c, Look&& look) {
+void for_each_texel(const std::array<Corner, 3>& c, const Box& box, double most, Look&& look) {
     const glm::dvec2 a(c[0].texel), b = glm::dvec2(c[1].texel) - a, d = glm::dvec2(c[2].texel) - a;
-    const glm::dvec2 low = glm::floor(a + glm::min(glm::min(b, d), glm::dvec2(0))),
-                     high = glm::floor(a + glm::max(glm::max(b, d), glm::dvec2(0)));
-    constexpr double farthest = 1 << 23; // texels; beyond, floats cannot tell them apart
-    if (!(std::max(std::abs(low.x), std::abs(low.y)) < farthest) ||
-        !(std::max(std::abs(high.x), std::abs(high.y)) < farthest))
-        return;
     const auto texel = [](double at) { return static_cast<std::int64_t>(std::floor(at)); };
     const glm::dvec2 middle = a + (b + d) / 3.0;
     look(texel(middle.x), texel(middle.y), glm::vec3(1.0f / 3));
     const double area = b.x * d.y - b.y * d.x;
     if (area == 0) return;
-    const glm::dvec2 size = high - low + 1.0;
-    const auto step =
-        static_cast<std::int64_t>(std::ceil(std::sqrt(size.x * size.y / static_cast<double>(most_looks))));
-    for (std::int64_t y = texel(low.y); y <= texel(high.y); y += step)
-        for (std::int64_t x = texel(low.x); x <= texel(high.x); x += step) {
+    const glm::dvec2 low = box.low, size = box.size, high = low + size - 1.0;
+    const double rows = std::clamp(std::sqrt(most * size.y / size.x), 1.0, size.y),
+                 columns = std::clamp(most / rows, 1.0, size.x);
+    const auto step_x = static_cast<std::int64_t>(std::ceil(size.x / columns)),
+               step_y = static_cast<std::int64_t>(std::ceil(size.y / rows));
+    for (std::int64_t y = texel(low.y); y <= texel(high.y); y += step_y)
+        for (std::int64_t x = texel(low.x); x <= texel(high.x); x += step_x) {
             const glm::dvec2 at = glm::dvec2(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5) - a;
             const double v = (at.x * d.y - at.y * d.x) / area, w = (b.x * at.y - b.y * at.x) / area, u = 1 - v - w;
             if (u >= 0 && v >= 0 && w >= 0) look(x, y, glm::vec3(u, v, w));
@@ -102,25 +117,36 @@ void for_each_texel(const std::array<Corner, 3>& c, Look&& look) {
 
 ShownTexels::ShownTexels(const VertexTree& tree) : texture_(tree.texture()) {
     const bool has_relief = !texture_.relief.empty() && !tree.is_prelit();
-    if (has_relief || !texture_.emission.empty()) look_at_triangles(tree);
+    if (has_relief || !texture_.emission.empty()) look_at_triangles(tree, has_relief);
 }
 
-void ShownTexels::look_at_triangles(const VertexTree& tree) {
+void ShownTexels::look_at_triangles(const VertexTree& tree, bool has_relief) {
     std::vector<Sums> levels = {{texture_.width, texture_.height, {}}};
     levels[0].of.resize(texture_.texels.size());
     const glm::vec2 size(static_cast<float>(texture_.width), static_cast<float>(texture_.height));
     const TreeGeometry& g = *tree.data().geometry;
     const WedgeId first = links_of(g).wedge_of_leaf(0);
-    const bool has_relief = !texture_.relief.empty() && !tree.is_prelit();
-    for (const Triangle& t : g.triangles) {
+    const auto corners_of = [&](const Triangle& t) {
         std::array<Corner, 3> corners;
         for (std::size_t k = 0; k < 3; ++k) {
             const WedgeId wedge = first + t[k];
             corners[k] = {tree.positions()[wedge], tree.normals()[wedge], tree.uvs()[wedge] * size,
                           tree.luminance()[wedge]};
         }
+        return corners;
+    };
+    const auto all = static_cast<double>(texture_.texels.size());
+    double shown = 0; // texels, by all triangles
+    for (const Triangle& t : g.triangles)
+        if (const Box box(corners_of(t)); box.is_sound()) shown += std::min(box.texels(), all);
+    const double share = std::min(1.0, looks_a_texel * all / std::max(shown, 1.0));
+    for (const Triangle& t : g.triangles) {
+        const std::array<Corner, 3> corners = corners_of(t);
+        const Box box(corners);
+        if (!box.is_sound()) continue;
+        const double looks = std::max(share * std::min(box.texels(), all), least_looks);
         const Frame frame(corners);
-        for_each_texel(corners, [&](std::int64_t x, std::int64_t y, glm::vec3 weights) {
+        for_each_texel(corners, box, looks, [&](std::int64_t x, std::int64_t y, glm::vec3 weights) {
             const auto column = static_cast<std::uint32_t>(wrapped_texel(x, texture_.width, texture_.wrap_u)),
                        row = static_cast<std::uint32_t>(wrapped_texel(y, texture_.height, texture_.wrap_v));
             Sum here{1, 0, 1};

@@ -11,8 +11,8 @@ namespace unseen::perception {
 // tree's vertices are lit by. Under other lights that stands for what a normal map does there.
 class ShownTexels {
 public:
-    // The tree must have a texture. Cost: nothing, or with a normal map or emission a few looks at each texel that a
-    // triangle covers, and 8 bytes for each texel.
+    // The tree must have a texture. Cost: nothing, or with a normal map or emission 16 looks for each texel or triangle
+    // at most, of 50 ns, 8 bytes for each texel, and 16 more meanwhile.
     explicit ShownTexels(const vdtree::VertexTree& tree);
     ShownTexels(const vdtree::TextureView& colours) : texture_(colours) {} // alone; valid, and not empty
 
@@ -22,7 +22,7 @@ public:
     double luminance(std::size_t texel) const;
 
 private:
-    void look_at_triangles(const vdtree::VertexTree& tree);
+    void look_at_triangles(const vdtree::VertexTree& tree, bool has_relief);
 
     struct Place {
         float brightening = 1, shade = 1;

@@ -132,7 +132,10 @@ public:
             }
         };
         try_to([&] { read_surface(of_file, material, lost); });
-        if (material.is_unlit) return material; // by its colour alone
+        if (material.is_unlit) { // by its colour alone
+            material.undrawn.erase("metalness"), material.undrawn.erase("occlusion maps");
+            return material;
+        }
         try_to([&] { read_relief(of_file, material, lost); });
         try_to([&] { read_emission(of_file, material, lost); });
         return material;
@@ -168,7 +171,7 @@ private:
                  ".");
         if (mode != nullptr && *mode == "MASK") cut_out(of_file, material);
         material.uv_map = transform_of(*texture);
-        add_wrap(*texture, material);
+        std::tie(material.wrap_u, material.wrap_v) = wrapping_of(*texture);
         if (const auto image = image_of(*texture, material, lost)) {
             material.image = decode_percent(image->uri);
             material.image_bytes = image->bytes;
@@ -204,14 +207,15 @@ private:
     std::shared_ptr<const std::string> further_map(const json& of_file, const json& texture, const char* name,
                                                    Material& material, LostImages& lost) {
         const json& leading = leading_texture(of_file);
+        const Wrapping of_leading = wrapping_of(leading), own = wrapping_of(texture);
         if (!uv_set_of(texture) || uv_set_of(texture) != uv_set_of(leading) ||
-            transform_of(texture) != transform_of(leading)) {
-            material.undrawn.insert(std::string(name) + " with coordinates of their own");
+            transform_of(texture) != transform_of(leading) || own != of_leading) {
+            material.undrawn.insert(std::string(name) + " with coordinates or a sampler of their own");
             return nullptr;
         }
         if (&texture == &leading) {
             material.uv_map = transform_of(texture);
-            add_wrap(texture, material);
+            std::tie(material.wrap_u, material.wrap_v) = own;
         }
         const auto image = image_of(texture, material, lost);
         return image ? image->bytes : nullptr;
@@ -253,15 +257,17 @@ private:
         return array[index];
     }
 
-    void add_wrap(const json& info, Material& material) {
+    using Wrapping = std::pair<Wrap, Wrap>;
+    Wrapping wrapping_of(const json& info) {
         const std::string of_material = where_;
+        Wrapping found{Wrap::repeat, Wrap::repeat};
         const json& texture = element("textures", info, "index");
         if (member(texture, "sampler") != nullptr) {
             const json& sampler = element("samplers", texture, "sampler");
-            material.wrap_u = wrap(sampler, "wrapS");
-            material.wrap_v = wrap(sampler, "wrapT");
+            found = {wrap(sampler, "wrapS"), wrap(sampler, "wrapT")};
         }
         where_ = of_material;
+        return found;
     }
 
     // None: it was not found or is of no known kind, which is noted.

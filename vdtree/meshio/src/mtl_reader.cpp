@@ -1,4 +1,5 @@
-// Wavefront MTL: of each material its diffuse colour, its opacity and its diffuse image, and the names of all images.
+// Wavefront MTL: of each material its diffuse colour, its opacity and its emission, with the images of these and of normals,
+// and the names of all images.
 #include "mtl_reader.h"
 #include "text_scanner.h"
 
@@ -34,6 +35,8 @@ public:
             else if (keyword == "Tr") read_alpha(rest, true);
             else if (keyword == "Ke") read_emission(rest);
         }
+        for (Material& m : contents_.materials) // Ke may stand behind map_Ke
+            if (dark_.contains(m.name)) m.emission = glm::vec3(0);
         if (odd_lines_ > 0)
             contents_.warnings.push_back(name_ + ": " + first_odd_ +
                                          (odd_lines_ == 1 ? "."
@@ -144,7 +147,7 @@ private:
         Wrap wrap = Wrap::repeat;
         skip_options(rest, [&](std::string_view option, std::string_view value) {
             if (option == "-clamp") wrap = value == "on" ? Wrap::clamp : Wrap::repeat;
-            if (is_colour && (option == "-s" || option == "-o" || option == "-t"))
+            if ((is_colour || further) && (option == "-s" || option == "-o" || option == "-t" || option == "-bm"))
                 note_odd(in_quotes(option) + " of an image was ignored");
         });
         if (rest.empty()) {
@@ -158,6 +161,7 @@ private:
             material().image_bytes = image.bytes;
         }
         if (further) *further = image.bytes;
+        if (keyword == "map_Ke" && further && !image.bytes) dark_.insert(material().name);
         if (!image.bytes) {
             contents_.lost.add(image.why);
             if (is_colour || further) contents_.lost.materials.insert(material().name);
@@ -183,6 +187,7 @@ private:
     const std::filesystem::path& folder_;
     MtlContents& contents_;
     std::unordered_set<std::string> names_, uris_; // of all materials and images so far
+    std::unordered_set<std::string> dark_;         // materials whose image of emission was not found
     bool is_open_ = false;
     std::uint64_t line_ = 0, odd_lines_ = 0;
     std::string first_odd_;

@@ -130,8 +130,8 @@ void warn_of_lost_images(const LostImages& lost, std::span<const MeshRange> rang
             triangles += range.triangle_count;
     std::string warning = counted_were(lost.whys.size(), "image") + " not read";
     if (!lost.materials.empty())
-        warning += text_of(", so ", triangles, triangles == 1 ? " triangle shows" : " triangles show",
-                           " the colour of the material alone");
+        warning += text_of(", so ", triangles, triangles == 1 ? " triangle is" : " triangles are",
+                           " drawn without an image of the material");
     warnings.push_back(warning + (lost.whys.size() == 1 ? ": " : "; the first: ") + lost.whys.front() + ".");
 }
 

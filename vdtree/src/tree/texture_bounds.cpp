@@ -58,10 +58,16 @@ std::vector<UvBox> bound_footprints(const TreeGeometry& g, const TreeParts& part
     return boxes;
 }
 
-std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreeParts& parts) {
+PackedRange sum(PackedRange a, PackedRange b) {
+    return {down(double{0} + a.lo.value + b.lo.value), up(double{0} + a.hi.value + b.hi.value)};
+}
+
+namespace {
+
+std::vector<PackedRange> bound_ring_map(const TreeGeometry& g, const TreeParts& parts, const TextureView& map) {
     const TreeLinks tree = links_of(g);
     const std::vector<UvBox> boxes = bound_footprints(g, parts);
-    const TexturePyramid pyramid(g.texture_view());
+    const TexturePyramid pyramid(map);
     std::vector<PackedRange> ranges(tree.interior(), empty_range);
     parallel_loop(std::size_t{0}, ranges.size(), [&](std::size_t i) {
         const NodeId node = static_cast<NodeId>(i);
@@ -72,6 +78,16 @@ std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreePar
     for (NodeId node = tree.interior(); node-- > 1;)
         ranges[tree.parents[node]] = unite(ranges[tree.parents[node]], ranges[node]);
     return ranges;
+}
+
+} // namespace
+
+std::vector<PackedRange> bound_ring_texture(const TreeGeometry& g, const TreeParts& parts) {
+    return bound_ring_map(g, parts, g.texture_view());
+}
+
+std::vector<PackedRange> bound_ring_emission(const TreeGeometry& g, const TreeParts& parts) {
+    return bound_ring_map(g, parts, g.emission_view());
 }
 
 } // namespace unseen::vdtree

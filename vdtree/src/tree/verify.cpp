@@ -73,7 +73,7 @@ private:
         if (!pyramid_) return;
         const PackedRange texture = texture_of({w});
         expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
-        expect(contains(l_.ring_range[node], product(shade_of({w}), texture)),
+        expect(contains(l_.ring_range[node], drawn(shade_of({w}), texture, {w})),
                "the ring's luminance does not contain what its proxy shows.");
     }
 
@@ -134,8 +134,9 @@ private:
         const glm::dvec3 normal = glm::cross(b - a, c - a);
         const int cell = normal_cell(normal);
         const PackedRange texture = pyramid_ ? texture_of({first + t[0], first + t[1], first + t[2]}) : PackedRange{};
-        const PackedRange shown =
-            pyramid_ ? product(shade_of({first + t[0], first + t[1], first + t[2]}), texture) : PackedRange{};
+        const PackedRange shown = pyramid_ ? drawn(shade_of({first + t[0], first + t[1], first + t[2]}), texture,
+                                                   {first + t[0], first + t[1], first + t[2]})
+                                           : PackedRange{};
         const bool shows_through = !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) {
             return !(g_.colours[first + leaf].a >= 1);
         });
@@ -162,10 +163,15 @@ private:
     }
 
     // Luminance ranges of the texture over the box of these vertices, and of the vertices themselves.
-    PackedRange texture_of(std::initializer_list<WedgeId> wedges) const {
+    PackedRange range_over(const TexturePyramid& map, std::initializer_list<WedgeId> wedges) const {
         UvBox box;
         for (const WedgeId w : wedges) box.include(g_.uvs[w]);
-        return pyramid_->range(box);
+        return map.range(box);
+    }
+    PackedRange texture_of(std::initializer_list<WedgeId> wedges) const { return range_over(*pyramid_, wedges); }
+    PackedRange drawn(PackedRange shade, PackedRange texture, std::initializer_list<WedgeId> wedges) const {
+        const PackedRange own = product(shade, texture);
+        return emission_ ? sum(own, range_over(*emission_, wedges)) : own;
     }
     PackedRange shade_of(std::initializer_list<WedgeId> wedges) const {
         PackedRange range = empty_range;
@@ -198,6 +204,8 @@ private:
     const TreeLuminance& l_;
     const std::optional<TexturePyramid> pyramid_ =
         l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
+    const std::optional<TexturePyramid> emission_ =
+        l_.textured && !g_.emission.empty() ? std::optional<TexturePyramid>(g_.emission_view()) : std::nullopt;
     std::string fault_;
 };
 

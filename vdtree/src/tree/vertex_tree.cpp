@@ -144,6 +144,7 @@ struct InteriorShader {
     bool has_given; // luminances of proxies are the caller's
     LuminanceArrays<Vector>& out;
     std::vector<PackedRange>& of_vertices; // the rings' ranges without the texture; empty without one
+    std::span<const PackedRange> emission; // by node; empty: none
 
     void operator()(NodeId node) const {
         const bool textured = !of_vertices.empty();
@@ -172,6 +173,7 @@ struct InteriorShader {
         if (textured) {
             of_vertices[node] = ring;
             ring = product(ring, g.ring_texture[node]);
+            if (!emission.empty()) ring = sum(ring, emission[node]);
         }
         out.ring_range[node] = ring;
         out.adaptation[node] = std::max(adaptation, middle(ring));
@@ -199,17 +201,20 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(first), runs);
 
     std::vector<PackedRange> of_vertices(textured ? interior : 0);
-    const InteriorShader shade{g, tree, shades, leaf, sums, given != nullptr, out, of_vertices};
+    const auto emission = textured && !g.emission.empty() ? bound_ring_emission(g, parts) : std::vector<PackedRange>();
+    const InteriorShader shade{g, tree, shades, leaf, sums, given != nullptr, out, of_vertices, emission};
     parts.bottom_up([&] { return [&](NodeId node) { shade(node); }; });
 
     PackedRange drawn = leaf.corners;
     if (given) drawn = unite(drawn, out.support_range[VertexTree::root()]); // proxies may go beyond
+    if (textured) drawn = product(drawn, g.ring_texture[VertexTree::root()]);
+    if (!emission.empty()) drawn = sum(drawn, emission[VertexTree::root()]);
     return {
         {std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range), std::move(out.adaptation)},
         light,
         prelit,
         textured,
-        textured ? product(drawn, g.ring_texture[VertexTree::root()]) : drawn};
+        drawn};
 }
 
 TreeLuminance copy_of(const TreeLuminance& light) {

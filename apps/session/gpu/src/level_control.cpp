@@ -25,8 +25,6 @@ namespace {
 constexpr double moved_share = 0.02;
 // Nor, under lights that move, in so many of its tests.
 constexpr int tests_until_retried = 16;
-// By modern maps so much of the disc around an object may differ visibly.
-constexpr double most_of_object = 0.001;
 
 Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
 
@@ -34,6 +32,7 @@ Result<void> check(const LevelControlOptions& o) {
     if (!(o.bias > 0 && std::isfinite(o.bias))) return bad_option("the bias must be above 0 and finite");
     if (!(o.lower_share >= 0 && o.upper_share >= o.lower_share && o.upper_share <= 1))
         return bad_option("shares of pixels lie between 0 and 1, and the lower one is not above the upper one");
+    if (!(o.object_share >= 0 && o.object_share <= 1)) return bad_option("an object's share lies between 0 and 1");
     if (o.frames_a_layer < 1) return bad_option("objects are tested every frame at most");
     if (o.fade_frames < 0) return bad_option("a fade cannot last less than no frame");
     return {};
@@ -237,11 +236,10 @@ struct LevelControl::Impl {
         subject.is_open = false;
         test.pixels = pixels;
         const double all = static_cast<double>(passes->width) * static_cast<double>(passes->height);
-        // The paper counts pixels of the window, whatever the object's size. A small one may then differ all over.
         const double of_object = pixels_of(subject.sphere, view);
         const double upper = options.maps == MapRecipe::rpg99
                                  ? options.upper_share * all
-                                 : std::min(options.upper_share * all, most_of_object * of_object);
+                                 : std::min(options.upper_share * all, options.object_share * of_object);
         const bool is_too_coarse = static_cast<double>(pixels) > upper,
                    could_be_coarser = static_cast<double>(pixels) * options.upper_share < options.lower_share * upper;
         const int worst = subject.levels->chain.size() - 1;

@@ -18,7 +18,7 @@ using Index = std::uint32_t;
 using Triangle = std::array<Index, 3>;
 constexpr bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-// RGB encoded as sRGB, and alpha: nothing is drawn where it is below a half, so that what lies behind shows through.
+// RGB encoded as sRGB, and alpha: what is drawn of it, see TextureView::blends; behind the rest is seen what lies there.
 using Texel = std::array<std::uint8_t, 4>;
 
 // What lies beyond the coordinates 0..1: the image again, its border, or the image mirrored at every border.

@@ -59,7 +59,8 @@ struct Material {
     std::shared_ptr<const std::string> image_bytes = {};
     vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
     UvMap uv_map = {}; // from the vertices' texture coordinates to those of the image
-    // Texels of the image whose alpha is less are not there; none: alpha does not count. Above 1: none of them is.
+    // Texels of the image whose alpha is less are not there; none: alpha does not count, unless it blends. Above 1: none of
+    // them is.
     std::optional<float> alpha_cutoff = {};
     bool blends = false;   // alpha, times the image's, is the share of light that it stops; without a cut-off
     bool is_unlit = false; // KHR_materials_unlit: it looks as it is, whatever the light
@@ -69,7 +70,7 @@ struct Material {
     float normal_scale = 1;                              // of x and y of the normal map
     glm::vec3 emission =
         glm::vec3(0); // linear RGB of light that it sends out, times the map's; 1 is the display's white
-    // What else the file says of how it looks, which nothing here draws or judges: "normal maps", "emission", ...
+    // What else the file says of how it looks, which nothing here draws or judges: "metalness", "bump maps", ...
     std::set<std::string> undrawn = {};
 
     bool has_image() const { return image_bytes != nullptr; }

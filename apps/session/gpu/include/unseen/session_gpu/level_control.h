@@ -49,6 +49,9 @@ struct LevelControlOptions {
     // Shares of all pixels that differ visibly: an object gets a better level above the upper, a coarser one below the
     // lower.
     double upper_share = 450.0 / (512 * 512), lower_share = 170.0 / (512 * 512);
+    // With modern maps the upper one is at most this share of the disc around the object: a small one may not differ all
+    // over. The paper has no such limit.
+    double object_share = 0.001;
     // Objects of the nearest layer are tested every so many frames, of the second every twice so many.
     int frames_a_layer = 4;
     int fade_frames = 0; // that two levels of an object share its pixels for where it changes; no tests meanwhile

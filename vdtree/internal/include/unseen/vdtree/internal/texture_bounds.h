@@ -14,9 +14,11 @@ std::vector<UvBox> bound_footprints(const TreeGeometry& geometry, const TreePart
 
 // By interior node: the texture's luminance over the footprints of its wedges. Grows up the tree.
 std::vector<PackedRange> bound_ring_texture(const TreeGeometry& geometry, const TreeParts& parts);
+std::vector<PackedRange> bound_ring_emission(const TreeGeometry& geometry, const TreeParts& parts); // there must be one
 
 // The range of luminances multiplied by a texture, rounded outward.
 PackedRange product(PackedRange luminance, PackedRange texture);
+PackedRange sum(PackedRange a, PackedRange b); // cut off at white
 
 // The least and the largest channel of a vertex's colour as it is drawn, scaled to its luminance: a texture of the
 // luminance T comes out between these times T. Rounded outward.

@@ -107,6 +107,12 @@ struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
         return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v,
                 texels,           !blends.empty(),   emission,          relief};
     }
+    // As a texture by itself; there must be one.
+    TextureView emission_view() const {
+        TextureView view = texture_view();
+        view.texels = emission;
+        return view;
+    }
 };
 
 template <template <class> class Storage>
