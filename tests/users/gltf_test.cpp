@@ -35,7 +35,7 @@ protected:
                     const bool is_place = attribute == "POSITION" || attribute == "NORMAL"; // proxies may lie outside
                     if (is_place) continue;
                     // Coordinates continue beyond a chart's border where its outline is drawn straight.
-                    const float beyond = is_whole || !attribute.starts_with("TEXCOORD") ? rounding : 0.01f * size;
+                    const float beyond = is_whole || !attribute.starts_with("TEXCOORD") ? rounding : 0.02f * size;
                     EXPECT_GE(left.lo[k], box.lo[k] - beyond);
                     EXPECT_LE(left.hi[k], box.hi[k] + beyond);
                 }
