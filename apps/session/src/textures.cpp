@@ -484,7 +484,8 @@ Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_
     constexpr meshio::UvMap middle{glm::dmat2(0), glm::dvec2(0.5)};
     std::vector<meshio::UvMap> maps(of_material.size(), middle);
     for (std::size_t m = 0; m < read.materials.size(); ++m)
-        if (const Texture* of = of_material[m]; of->width > 1 || of->height > 1) maps[m] = read.materials[m].uv_map;
+        if (const Texture* of = of_material[m]; of->width > 1 || of->height > 1 || !of->relief.empty())
+            maps[m] = read.materials[m].uv_map; // else it is alike everywhere
 
     std::vector<AtlasPart> parts;
     std::map<const Texture*, std::size_t> part_of;
