@@ -241,7 +241,7 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
         }
         EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt", "--texture", image.name}), HasSubstr(image.name));
     }
-    EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).err.find("colour of the material"),
+    EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).err.find("image of the material"),
               std::string::npos);
 }
 
