@@ -6,6 +6,7 @@
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/parallel.h>
 #include <unseen/vdtree/internal/texture_pyramid.h>
+#include <unseen/vdtree/internal/tree_parts.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::perception {
