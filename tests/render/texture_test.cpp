@@ -309,7 +309,7 @@ TEST_F(Textured, CutOutsCoverTheShareThatIsThere) {
         }
 }
 
-// Of samples as many are stopped as alpha says, also where texels are wide.
+// Alpha says how many of a pixel's samples are drawn, also where texels are wide.
 TEST_F(Textured, AlphaIsAShareWhereItBlends) {
     for (const int alpha : {0, 64, 200, 255}) {
         Texture texture{2, 2, {}, {}, {}};

@@ -266,7 +266,7 @@ void set_alpha(Texture& texture, const Material& material, std::span<const vdtre
     texture.blends = !std::ranges::all_of(texture.texels, is_whole);
 }
 
-// What all texels of a map become, by axis or code.
+// Scales x and y of the normals, and turns y around where the image's rows run downward: green is up.
 void scale_relief(std::vector<vdtree::Texel>& relief, float scale, bool from_top) {
     for (vdtree::Texel& texel : relief) {
         glm::vec3 normal = vdtree::relief_normal(texel) * glm::vec3(scale, from_top ? -scale : scale, 1);

@@ -161,6 +161,13 @@ glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
     return glm::vec3(glm::min(reached, glm::dvec3(1)));
 }
 
+// From the darkest highlight in the ring to the brightest. `glossy`: lights without ambient light.
+float spread_of_highlights(const Lighting& glossy, VertexCone cone, const Sphere& ring, glm::dvec3 eye) {
+    cone.albedo = {0, 0}; // so that highlights are all that there is
+    const LuminanceRange range = lit_range(glossy, cone, ring, eye);
+    return range.hi > least_lit ? range.hi - range.lo : 0;
+}
+
 Illumination illumination_of(const Lighting& lighting, const VertexTree& tree) {
     Illumination all{static_cast<float>(lighting.ambient), 0, 0};
     const Sphere sphere = tree.bounds()[VertexTree::root()].ring;
@@ -322,13 +329,7 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
             most += reach.most * direction_bound(lighting.lights[i], ring);
             uneven += reach.uneven * cone.albedo.hi;
         }
-        float highlights = 0; // from the darkest to the brightest
-        if (has_highlights) {
-            VertexCone black = cone;
-            black.albedo = {0, 0};
-            const LuminanceRange range = lit_range(glossy, black, ring, *eye);
-            if (range.hi > least_lit) highlights = range.hi - range.lo;
-        }
+        const float highlights = has_highlights ? spread_of_highlights(glossy, cone, ring, *eye) : 0;
         const LitRecord& record = state_->folds[node];
         const auto combined = [&](auto&& value) {
             float of_axes = 0;

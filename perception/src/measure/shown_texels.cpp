@@ -21,12 +21,6 @@ constexpr double looks_a_texel = 16, least_looks = 16;
 // A vertex that no light reaches shows no relief, and its luminance divides nothing.
 constexpr float least_light = 0.01f;
 
-// Of white, in a tree's own light: what vertex_luminance() does without the colour.
-float white_under(const Light& light, glm::vec3 normal) {
-    const float facing = glm::dot(normal, light.direction);
-    return light.ambient + (1 - light.ambient) * std::max(facing, light.fill * -facing);
-}
-
 struct Corner {
     glm::vec3 place, normal;
     glm::vec2 texel; // texture coordinates, in texels
@@ -136,6 +130,9 @@ void ShownTexels::look_at_triangles(const VertexTree& tree, bool has_relief) {
         }
         return corners;
     };
+    const auto light_on = [&](glm::vec3 normal) {
+        return vertex_luminance(normal, nullptr, tree.light(), false, true);
+    };
     const auto all = static_cast<double>(texture_.texels.size());
     double shown = 0; // texels, by all triangles
     for (const Triangle& t : g.triangles)
@@ -160,8 +157,7 @@ void ShownTexels::look_at_triangles(const VertexTree& tree, bool has_relief) {
             if (has_relief && length > 0) {
                 normal /= length;
                 const glm::vec3 map = relief_normal(texture_.relief[std::size_t{row} * texture_.width + column]);
-                here.brightening = white_under(tree.light(), frame.tilted(normal, map)) /
-                                   std::max(white_under(tree.light(), normal), least_light);
+                here.brightening = light_on(frame.tilted(normal, map)) / std::max(light_on(normal), least_light);
             }
             levels[0].at(column, row) += here;
         });
