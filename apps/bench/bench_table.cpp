@@ -1,5 +1,6 @@
 #include "bench_table.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -28,9 +29,13 @@ void BenchTable::add_to(Json& json) const {
 
 BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows) {
     BenchTable table{title, {{"measure"}, {"measured"}, {"unit"}, {"target"}}};
+    const bool has_machine = std::ranges::any_of(rows, [](const BenchRow& row) { return row.machine_ms.has_value(); });
+    if (has_machine) table.columns.push_back({"fixed loop, ms"});
     for (const BenchRow& row : rows) {
-        table.rows.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
-                              row.target ? rounded(*row.target, 4) : ""});
+        auto& cells = table.rows.emplace_back();
+        cells = {row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
+                 row.target ? rounded(*row.target, 4) : ""};
+        if (has_machine) cells.push_back(row.machine_ms ? with_decimals(*row.machine_ms, 2) : "");
         if (!row.note.empty()) table.notes.push_back(row.name + ": " + row.note);
     }
     return table;
@@ -44,7 +49,8 @@ Json to_json(const std::vector<BenchRow>& rows) {
                         {"value", number(row.value)},
                         {"unit", row.unit},
                         {"target", number(row.target)},
-                        {"note", row.note}});
+                        {"note", row.note},
+                        {"machine_ms", number(row.machine_ms)}});
     return json;
 }
 

@@ -45,6 +45,7 @@ struct BenchRow {
     int decimals = 0;
     std::optional<double> target = {}; // in the value's unit
     std::string note = {};
+    std::optional<double> machine_ms = {}; // what a fixed loop took beside it, so that runs compare
 };
 BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows);
 Json to_json(const std::vector<BenchRow>& rows);

@@ -28,10 +28,9 @@ namespace fs = std::filesystem;
 
 constexpr vdtree::Index wanted_active = 100'000; // triangles of the cuts that are measured
 constexpr vdtree::Index budget_triangles = 100'000;
-constexpr double most_of_mesh = 0.5;                 // at small meshes: so much of them is active
-constexpr double fill = 0.9;                         // of the window's height
-constexpr std::array orbit_steps = {0.1, 1., 5.};    // degrees a frame
-constexpr std::array orbit_targets = {30, 150, 450}; // us
+constexpr double most_of_mesh = 0.5;              // at small meshes: so much of them is active
+constexpr double fill = 0.9;                      // of the window's height
+constexpr std::array orbit_steps = {0.1, 1., 5.}; // degrees a frame
 
 // "0.9 M", "70 k"
 std::string size_name(std::uint64_t triangles) {
@@ -147,10 +146,10 @@ vdtree::VertexTree with_errors(const BenchFolder& shop, const NamedMesh& base, c
 
 // ---- cuts
 
-// A model in the window of the default display, whose eye goes around the vertical axis.
+// A model in the window of the default display, whose eye goes around the vertical axis. A gaze goes with it.
 class Subject {
 public:
-    explicit Subject(const vdtree::VertexTree& tree, FoldTest test = FoldTest::luebke_hallen, bool with_gaze = false)
+    explicit Subject(const vdtree::VertexTree& tree, FoldTest test = FoldTest::error, bool with_gaze = false)
         : tree(tree) {
         window_.fov_y_degrees = perception::physical_field(options_.display, window_.height).value();
         const vdtree::LuminanceRange range = tree.luminance_range();
@@ -162,10 +161,8 @@ public:
                                                      : perception::luebke_hallen_distances(tree, view(0), options_));
     }
 
-    // All of the model is in the window: there is nothing to cull.
-    vdtree::Viewpoint at(double degrees) const {
-        return perception::viewpoint_of(tree, view(degrees), options_, {}, false);
-    }
+    // All of the model is in the window, but a frustum has to find that out.
+    vdtree::Viewpoint at(double degrees) const { return perception::viewpoint_of(tree, view(degrees), options_); }
     // The cut and its index buffer, as a renderer would ask for them.
     vdtree::AdjustStats follow(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint,
                                const vdtree::FollowOptions& options) const {
@@ -220,6 +217,24 @@ private:
     vdtree::View window_;
     std::optional<vdtree::DistanceCriterion> criterion_;
 };
+
+// The speed of this machine just now, which others may share: arithmetic that takes a millisecond or so, and reads at
+// random from 64 MB.
+double machine_ms() {
+    constexpr std::size_t words = std::size_t{1} << 24;
+    static const std::vector<std::uint32_t> memory = [] {
+        std::vector<std::uint32_t> values(words);
+        std::mt19937 random(1);
+        for (std::uint32_t& value : values) value = static_cast<std::uint32_t>(random());
+        return values;
+    }();
+    return 1e3 * median_seconds(3, [] {
+               std::uint32_t at = 1;
+               for (int i = 0; i < 20'000; ++i) at = memory[at % words] ^ (at * 2654435761u);
+               [[maybe_unused]] static volatile std::uint32_t kept;
+               kept = at;
+           });
+}
 
 struct OrbitFigures {
     double median_us = 0, us_of_99 = 0, changes = 0, tests = 0, triangles = 0, writes = 0;
@@ -329,7 +344,7 @@ public:
 private:
     void add(const std::string& name, const std::string& unit, std::optional<double> value, int decimals,
              std::optional<double> target, const std::string& note = {}) {
-        rows_.push_back({name, unit, value, decimals, target, note});
+        rows_.push_back({name, unit, value, decimals, target, note, machine_ms()});
     }
 
     // The size that the table is about: the mesh itself, or the nearest that is measured.
@@ -352,7 +367,7 @@ private:
         const vdtree::VertexTree tree = tree_of_size(shop_, base_, size, json);
         print_note("measuring cuts at " + size_name(size) + " triangles ...");
         const Pinned pinned;
-        Subject subject(tree);
+        Subject subject(tree, FoldTest::luebke_hallen);
         // The same at all sizes that have it.
         const auto smaller =
             static_cast<double>(std::min<std::size_t>(tree.triangle_count(), base_.mesh.triangles.size()));
@@ -374,36 +389,61 @@ private:
 
     void add_main_rows(const Subject& subject, vdtree::Index active, const std::vector<OrbitFigures>& orbits,
                        const Json& json, const Json* far) {
-        const std::string how = grouped(active) + " active triangles, perceptual test with silhouettes, no gaze, " +
-                                rounded(fill * 100, 2) + "% of the window's height; folds cost up to " +
-                                rounded(static_cast<double>(subject.threshold), 4) + " so that so many are left";
+        const vdtree::VertexTree measured = with_errors(shop_, base_, subject.tree);
+        const Subject users = add_orbits(measured, active);
         for (std::size_t i = 0; i < orbits.size(); ++i)
-            add("cut + index buffer, " + shortest(orbit_steps[i]) + " degrees a frame", "us", orbits[i].median_us, 1,
-                orbit_targets[i],
-                how + "; " + rounded(orbits[i].changes, 4) + " changes and " + rounded(orbits[i].tests, 4) +
-                    " tests a frame");
-        const OrbitFigures gazing = measure_orbit(Subject(subject.tree, FoldTest::luebke_hallen, true), 1, frames_ / 2);
-        add("the same, gaze " + shortest(session::usual_degrees_aside) + " degrees aside, 1 degree a frame", "us",
-            gazing.median_us, 1, {}, rounded(gazing.triangles, 6) + " active triangles, threshold 1");
-        add_errors(subject.tree, active);
+            add_orbit("luebke-hallen, ", orbits[i], orbit_steps[i], std::array{44, 345, 1200}[i],
+                      "folds cost up to " + rounded(static_cast<double>(subject.threshold), 4));
         add_growth(orbits, far);
-        add("still view", "us", still_us(subject, options_.quick ? 20 : 200), 3, 1);
-        add("teleport, " + name_of_size(main_size()), "ms", json["teleport_ms"].get<double>(), 2, 3,
-            "to the other side");
-        if (far) add("teleport, " + name_of_size(far_size()), "ms", (*far)["teleport_ms"].get<double>(), 2, 8);
-        add_budgets(subject);
-        add("full perceptual tests", "M/s", subject.full_tests_per_second(options_.quick ? 10 : 60) / 1e6, 1, 60,
+        add("still view", "us", still_us(users, options_.quick ? 20 : 200), 3, 1);
+        add_jumps(users, json, far);
+        add_budgets(users);
+        add("full perceptual tests", "M/s", users.full_tests_per_second(options_.quick ? 10 : 60) / 1e6, 1, 60,
             "from scratch, every node of the tree, in order");
-        add_memory(subject, how);
+        add_memory(users);
     }
 
-    void add_errors(const vdtree::VertexTree& plain, vdtree::Index active) {
-        const vdtree::VertexTree measured = with_errors(shop_, base_, plain);
-        Subject subject(measured, FoldTest::error);
-        const vdtree::Index triangles = subject.aim_for(active);
-        const OrbitFigures f = measure_orbit(subject, 1, frames_);
-        add("fold test error, 1 degree a frame, without frustum", "us", f.median_us, 1, {},
-            grouped(triangles) + " active triangles, all in the window; " + rounded(f.changes, 4) + " changes a frame");
+    // What users run: the default fold test, what is imperceptible and so many triangles, without a gaze and with one.
+    Subject add_orbits(const vdtree::VertexTree& tree, vdtree::Index active) {
+        Subject users(tree), gazing(tree, FoldTest::error, true);
+        const Subject imperceptible(tree), gazing_imperceptible(tree, FoldTest::error, true);
+        users.aim_for(active);
+        gazing.aim_for(active);
+        const std::string aside = "gaze " + shortest(session::usual_degrees_aside) + " degrees aside, ";
+        const auto add_all = [&](const std::string& name, const Subject& of, std::array<double, 3> targets) {
+            std::array<double, 3> found{};
+            for (std::size_t i = 0; i < orbit_steps.size(); ++i) {
+                const OrbitFigures f = measure_orbit(of, orbit_steps[i], frames_);
+                add_orbit(name, f, orbit_steps[i], targets[i],
+                          "folds cost up to " + rounded(static_cast<double>(of.threshold), 4));
+                found[i] = 2 * f.median_us;
+            }
+            return found;
+        };
+        const auto twice = add_all("", users, {10, 40, 150});
+        add_all(aside, gazing, twice);
+        const auto twice_imperceptible = add_all("imperceptible, ", imperceptible, {50, 300, 1200});
+        add_all("imperceptible, " + aside, gazing_imperceptible, twice_imperceptible);
+        return users;
+    }
+
+    void add_orbit(const std::string& name, const OrbitFigures& f, double step, double target, const std::string& how) {
+        add(name + shortest(step) + " degrees a frame", "us", f.median_us, 1, target,
+            rounded(f.triangles, 6) + " active triangles, " + how + "; " + rounded(f.changes, 4) + " changes, " +
+                rounded(f.tests, 4) + " tests and " + rounded(f.writes, 4) + " writes to the index buffer a frame");
+    }
+
+    void add_jumps(const Subject& users, const Json& json, const Json* far) {
+        const int jumps = options_.quick ? 6 : 40;
+        add("jump, " + name_of_size(main_size()), "ms", teleport_ms(users, jumps), 2, 2, "to the other side");
+        if (far)
+            add("jump, " + name_of_size(far_size()), "ms", (*far)["teleport_ms"].get<double>(), 2, 5,
+                "luebke-hallen; " + rounded(json["teleport_ms"].get<double>(), 3) + " ms at " +
+                    name_of_size(main_size()));
+        Subject gazing(users.tree, FoldTest::error, true);
+        const vdtree::Index active = gazing.aim_for(wanted_active);
+        add("jump with a gaze, " + name_of_size(main_size()), "ms", teleport_ms(gazing, jumps), 2, 5,
+            grouped(active) + " active triangles; to the other side, and the gaze with it");
     }
 
     // From the mesh's size to the largest up to 14 M.
@@ -435,7 +475,7 @@ private:
             "changes undone within " + std::to_string(flicker_frames) + " frames");
     }
 
-    void add_memory(const Subject& subject, const std::string& how) {
+    void add_memory(const Subject& subject) {
         const auto bytes = [&](const vdtree::Cut& cut) {
             return static_cast<double>(subject.tree.byte_size() + cut.byte_size()) / subject.tree.triangle_count();
         };
@@ -447,7 +487,7 @@ private:
         vdtree::Cut cut(subject.tree), whole(subject.tree);
         subject.follow(cut, subject.at(0));
         add("resident bytes a triangle, without patch lists", "B", bytes(cut), 1, 100, "tree, cut and index buffer");
-        add("with patch lists", "B", patched(cut, subject.threshold), 1, 140, how);
+        add("with patch lists", "B", patched(cut, subject.threshold), 1, 140);
         add("with patch lists, all triangles active", "B", patched(whole, std::numeric_limits<float>::min()), 1, {},
             "nothing folds");
     }

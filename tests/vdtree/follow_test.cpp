@@ -115,7 +115,7 @@ void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCan
     const double distance = glm::length(to_eye), radius = of.sphere.radius, gap = distance - radius;
     if (std::abs(gap) < 1e-3 * distance) return; // too near to tell in floats
     double eccentricity = 0;
-    if (viewpoint.gaze && gap > 0) {
+    if (viewpoint.gaze && radius < 0.95 * distance) { // see nearly_inside
         const double angle = std::acos(std::clamp(-glm::dot(to_eye, *viewpoint.gaze) / distance, -1.0, 1.0));
         eccentricity = std::max(angle - std::asin(radius / distance), 0.0);
     }

@@ -136,15 +136,17 @@ private:
         settler_.front().set_longest_slack(distance_to_root(viewpoint) + root_radius());
         settler_.watch_nothing();
         look_from(viewpoint);
-        settler_.front().use(tester_->has_moving_lights(), tester_->has_planes());
+        settler_.front().use(tester_->uses_gaze(), tester_->has_moving_lights(), tester_->has_planes());
         settler_.front().move_to(viewpoint.eye, 0);
+        if (tester_->uses_gaze()) settler_.front().look(*viewpoint.gaze);
     }
 
     void move_to(const Viewpoint& viewpoint, const Motion& motion) {
         look_from(viewpoint);
-        // With a gaze, directions count, too: coming nearer does not make up for them.
-        if (tester_->uses_gaze()) settler_.front().advance(motion.position, motion.facing);
-        else settler_.front().move_to(viewpoint.eye, motion.facing);
+        settler_.front().move_to(viewpoint.eye, motion.facing);
+        // While it stands still nothing is due by it, not even what any motion would make due.
+        if (tester_->uses_gaze() && motion.position > 0)
+            settler_.front().turn_gaze(gaze_motion(tree_, viewpoint_, viewpoint));
         // Where lights stand still nothing is due by them, not even what any motion would make due.
         if (motion.light > 0) settler_.front().advance_lights(motion.light);
         settler_.front().advance_planes(motion.planes, tester_->view());
@@ -294,7 +296,7 @@ private:
         threshold_ = std::max(threshold_ * factor, least_threshold);
         tester_->set_threshold(threshold_);
         const double share = factor > 1 ? factor - 1 : 1 / factor - 1;
-        settler_.front().advance(2 * share * settler_.front().longest_slack(), 0);
+        settler_.front().advance(2 * share * settler_.front().longest_slack());
         settle_due(cut);
     }
 

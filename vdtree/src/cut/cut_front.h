@@ -3,7 +3,8 @@
 // Every test says, besides its verdict, the *slack*: how far the eye may move before the test can come out otherwise. A
 // clock adds up what motions use of slacks; at the node's *deadline* its slack is used up, and it is *due* to be tested
 // again. There are clocks for what a motion does to distances (the position clock; by blocks, see below), to what rings
-// face (the facing clock: the eye's path), and, where there are such, to heights over planes of frusta and to the light.
+// face (the facing clock: the eye's path), and, where there are such, to eccentricities (by blocks, too), to heights over
+// planes of frusta and to the light.
 //
 // The *rounding margin* (mesh units) is more than the rounding of any node's test. An unfolded node speaks for its
 // ancestors, whose tests round in their own way: so its slacks are shortened by the margin, and where a verdict stands by
@@ -18,6 +19,7 @@
 
 #include <unseen/vdtree/internal/node_bits.h>
 
+#include "cut/gaze_deadlines.h"
 #include "cut/kernel/fold_tester.h"
 #include "cut/side_deadlines.h"
 
@@ -28,7 +30,7 @@ namespace unseen::vdtree {
 // around it. That tells far more than a bound on the eye's path. A full block is split in two, by node numbers.
 //
 // Every slot has a deadline for the distance when it grows (where the node is unfolded) or shrinks (where it is folded),
-// one for the facing clock, and perhaps others for the lights' and the planes'. Every block knows the earliest ones.
+// one for the facing clock, and perhaps others for the gaze, the lights' clock and the planes'. Every block knows the earliest ones.
 class CutFront {
 public:
     using Slot = std::uint32_t;
@@ -50,6 +52,7 @@ public:
         used_.clear();
         unfolded_.clear();
         blocks_.for_each([](auto& values, float) { values.clear(); });
+        gaze_.clear();
         lights_.clear();
         planes_.clear();
         free_blocks_.clear();
@@ -62,7 +65,8 @@ public:
     }
 
     // Only while it is empty.
-    void use(bool lights, bool planes) noexcept {
+    void use(bool gaze, bool lights, bool planes) noexcept {
+        gaze_.use(gaze);
         lights_.use(lights);
         planes_.use(planes);
     }
@@ -75,6 +79,7 @@ public:
         used_.reserve(blocks);
         unfolded_.reserve(blocks);
         blocks_.for_each([&](auto& values, float) { values.reserve(whole_registers(blocks)); });
+        gaze_.reserve(blocks);
         lights_.reserve(blocks);
         planes_.reserve(blocks);
     }
@@ -93,6 +98,7 @@ public:
         if (slot == no_slot) return;
         prefetch(deadlines_[slot / block_slots].position);
         prefetch(deadlines_[slot / block_slots].facing);
+        gaze_.prefetch(slot / block_slots);
         lights_.prefetch(slot / block_slots);
         planes_.prefetch(slot / block_slots);
     }
@@ -133,6 +139,7 @@ public:
         const BlockId block = static_cast<BlockId>(slot / block_slots);
         const std::size_t place = slot % block_slots;
         deadlines_[block].position[place] = deadlines_[block].facing[place] = never_due;
+        gaze_.remove(block, place);
         lights_.remove(block, place);
         planes_.remove(block, place);
         used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
@@ -148,7 +155,8 @@ public:
     void set_rounding_margin(float margin) noexcept { rounding_margin_ = margin; }
     bool is_within_rounding(const Verdict& verdict) const noexcept {
         return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.plane_slack, verdict.light_slack}) >
-                 rounding_margin_);
+                     rounding_margin_ &&
+                 verdict.gaze_slack > gaze_rounding);
     }
 
     // From verdicts just found: when the slot is due. Verdict{} makes it due now. The second for up to sixteen slots.
@@ -157,8 +165,8 @@ public:
         const float margin = verdict.unfolded ? rounding_margin_ : 0;
         const auto less_margin = [&](float slack) { return std::max(slack - margin, 0.0f); };
         set_left(slot, {less_margin(std::min(verdict.position_slack, static_cast<float>(longest_slack_))),
-                        less_margin(verdict.facing_slack), less_margin(verdict.plane_slack),
-                        less_margin(verdict.light_slack), verdict.unfolded});
+                        gaze_slack_of(verdict.gaze_slack, verdict.unfolded), less_margin(verdict.facing_slack),
+                        less_margin(verdict.plane_slack), less_margin(verdict.light_slack), verdict.unfolded});
     }
 
     void set_deadlines(std::span<const Slot> slots, const TestBatch& tested) {
@@ -179,6 +187,7 @@ public:
             const auto less_margin = [&](float slack) {
                 return std::max(slack - (unfolded ? rounding_margin_ : 0), 0.0f);
             };
+            gaze_.set(block, place, unfolded, gaze_slack_of(tested.gaze_slack[i], unfolded));
             lights_.set(block, place, unfolded, less_margin(tested.light_slack[i]));
             planes_.set(block, place, unfolded, less_margin(tested.plane_slack[i]));
         }
@@ -199,13 +208,19 @@ public:
         deadline_kernel.move_blocks(eye_high_, eye_low_, rounded_up(path), blocks_);
     }
 
-    // All distances may have changed by so much, whichever way; the facing clock goes on.
-    void advance(double position, double facing) { set_clocks(position_clock_ + position, facing_clock_ + facing); }
-    // What is due by these is due by the facing clock from then on. Planes: heights over those of `view` may have changed by
-    // so much; what is unfolded in blocks wholly inside a frustum needs no test.
+    // All distances may have changed by so much, whichever way.
+    void advance(double position) { set_clocks(position_clock_ + position, facing_clock_); }
+    // What is due by these is due by the facing clock from then on. The gaze: moves with the eye, or alone. Planes: heights
+    // over those of `view` may have changed by so much; what is unfolded in blocks wholly inside a frustum needs no test.
+    void look(const glm::dvec3& gaze) { gaze_.look(gaze); } // only while it is empty
+    void turn_gaze(const GazeMotion& motion) {
+        gaze_.turn(motion, blocks_, looked_at_);
+        hand_over(gaze_);
+    }
     void advance_lights(double light) {
         if (!lights_.is_used()) return;
         lights_.advance(light);
+        lights_.find_due_blocks(looked_at_);
         hand_over(lights_);
     }
 
@@ -213,6 +228,7 @@ public:
         if (!planes_.is_used()) return;
         planes_.advance(planes);
         deadline_kernel.keep_inside(view, rounding_margin_, planes_.clock(), blocks_, planes_.earliest_unfolded());
+        planes_.find_due_blocks(looked_at_);
         hand_over(planes_);
     }
 
@@ -221,18 +237,22 @@ public:
     void restart_clocks(double longest) {
         lights_.restart(longest);
         planes_.restart(longest);
-        if (!(std::max({position_clock_, facing_clock_, path_}) > longest) && moves_ < most_moves) return;
+        if (!(std::max({position_clock_, facing_clock_, path_}) > longest) && moves_ < most_moves &&
+            !gaze_.is_to_restart())
+            return;
         const double position = position_clock_, facing = facing_clock_;
         for (BlockId block = 0; block < deadlines_.size(); ++block) {
             std::array<Verdict, block_slots> left;
             for_each_used(block, [&](Slot slot) { left[slot % block_slots] = left_of(slot); });
             blocks_.error[block] = 0;
+            gaze_.restart_block(block);
             reset_earliest(block);
             set_clocks(0, 0);
             for_each_used(block, [&](Slot slot) { set_left(slot, left[slot % block_slots]); });
             set_clocks(position, facing);
         }
         set_clocks(0, 0);
+        gaze_.end_restart();
         path_ = 0;
         moves_ = 0;
     }
@@ -266,7 +286,7 @@ public:
     std::uint64_t byte_size() const noexcept {
         return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() +
                sizeof(SlotDeadlines) * deadlines_.capacity() + 2 * sizeof(std::uint16_t) * used_.capacity() +
-               blocks_.byte_size() + lights_.byte_size() + planes_.byte_size();
+               blocks_.byte_size() + gaze_.byte_size() + lights_.byte_size() + planes_.byte_size();
     }
 
 private:
@@ -286,6 +306,7 @@ private:
             candidates_.resize(candidates_.size() + block_slots);
             blocks_.for_each(
                 [&](auto& values, float fill) { values.resize(whole_registers(deadlines_.size()), fill); });
+            gaze_.push_back();
             lights_.push_back();
             planes_.push_back();
         } else {
@@ -305,6 +326,7 @@ private:
             left.position_slack - sum_rounding * (passed + distance + std::min(left.position_slack, distance));
         set_verdict(block, place, left.unfolded, passed + slack + (left.unfolded ? distance : -distance),
                     (facing_clock_float_.early + left.facing_slack) * just_less);
+        gaze_.set(block, place, left.unfolded, left.gaze_slack);
         lights_.set(block, place, left.unfolded, left.light_slack);
         planes_.set(block, place, left.unfolded, left.plane_slack);
     }
@@ -315,8 +337,12 @@ private:
         const float passed = blocks_.error[block] + position_clock_float_, distance = blocks_.distance[block];
         const float position = (deadlines_[block].position[place] - passed) + (unfolded ? -distance : distance) -
                                sum_rounding * (passed + distance);
-        return {std::max(position, 0.0f), std::max(deadlines_[block].facing[place] - facing_clock_float_.early, 0.0f),
-                planes_.left(block, place), lights_.left(block, place), unfolded};
+        return {std::max(position, 0.0f),
+                gaze_.left(block, place, unfolded),
+                std::max(deadlines_[block].facing[place] - facing_clock_float_.early, 0.0f),
+                planes_.left(block, place),
+                lights_.left(block, place),
+                unfolded};
     }
 
     // With the deadlines of the two clocks that always count.
@@ -340,6 +366,7 @@ private:
         });
         const glm::vec3 centre = 0.5f * lowest + 0.5f * highest;
         blocks_.set_sphere(block, centre, 0, distance_to(centre));
+        gaze_.place(block, glm::vec3(glm::dvec3(centre) - eye_));
         for_each_used(block, [&](Slot slot) { include(block, candidates_[slot]); });
     }
 
@@ -365,6 +392,7 @@ private:
 
     void reset_earliest(BlockId block) {
         blocks_.set_earliest(block, never_due, never_due, never_due);
+        gaze_.reset_earliest(block);
         lights_.reset_earliest(block);
         planes_.reset_earliest(block);
     }
@@ -396,6 +424,9 @@ private:
         return std::sqrt(square);
     }
 
+    // Unfolded nodes speak for their ancestors here, too.
+    static float gaze_slack_of(float slack, bool is_unfolded) { return slack - (is_unfolded ? gaze_rounding : 0); }
+
     void set_clocks(double position, double facing) {
         position_clock_ = position;
         facing_clock_ = facing;
@@ -403,8 +434,9 @@ private:
         facing_clock_float_ = kernel_clock(facing);
     }
 
-    void hand_over(SideDeadlines& side) {
-        side.find_due_blocks(looked_at_);
+    // What is due in the blocks that are looked at.
+    template <class Side>
+    void hand_over(Side& side) {
         for (std::size_t i = 0; i < looked_at_.size(); ++i) {
             constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
             if (i + ahead < looked_at_.size()) {
@@ -432,6 +464,7 @@ private:
     std::vector<std::uint16_t> used_;     // a bit a slot
     std::vector<std::uint16_t> unfolded_; // likewise: growing distances change the verdict, else shrinking ones
     BlockArrays blocks_;                  // deadlines: not later than any slot's
+    GazeDeadlines gaze_;
     SideDeadlines lights_, planes_;
     std::vector<BlockId> free_blocks_, looked_at_;
     std::vector<std::uint64_t> due_blocks_;

@@ -90,7 +90,7 @@ public:
     // Makes the block's slots that are due the facing clock's: due at once by that one, and not any more by this.
     // `unfolded`: a bit a slot. Returns whether there are any.
     bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues) {
-        return deadline_kernel.hand_over(clock_.late, unfolded, slots_[block].slots, dues.facing,
+        return deadline_kernel.hand_over(clock_.late, clock_.late, unfolded, slots_[block].slots, dues.facing,
                                          earliest_unfolded_[block], earliest_folded_[block]);
     }
 

@@ -48,6 +48,24 @@ struct BlockArrays {
     std::uint64_t byte_size() const noexcept { return 9 * sizeof(float) * x.capacity(); }
 };
 
+// By block: the angle between the gaze and its sphere's centre, how much more than that may have changed for a node, and its
+// earliest deadlines, for angles that grow, or shrink. Radians.
+struct GazeArrays {
+    std::vector<float> angle, error, outward, inward;
+
+    template <class F>
+    void for_each(F&& f) {
+        f(angle, 0.0f), f(error, 0.0f), f(outward, never_due), f(inward, never_due);
+    }
+};
+// How the eye and the gaze move, with a turn of the world after which the gaze is what it was before.
+struct GazeMotion {
+    float from_high[3], from_low[3], to_high[3], to_low[3]; // the eye; see KernelView
+    float gaze[3];                                          // after it; unit
+    float turn[3][3];                                       // rows
+    float turned = 0;                                       // by this angle
+};
+
 // The deadlines of a block's slots; of slots that are not used: infinite.
 struct alignas(64) SlotDeadlines {
     float position[block_slots];
@@ -81,6 +99,9 @@ struct DeadlineKernel {
     // The eye goes by `path` to a new place.
     void (*move_blocks)(const float (&eye_high)[3], const float (&eye_low)[3], float path,
                         BlockArrays& blocks) noexcept;
+    // The eye and the gaze move. One bit a block: a deadline has come. Returns the largest error.
+    float (*turn_blocks)(const GazeMotion& motion, const BlockArrays& spheres, GazeArrays& blocks,
+                         std::uint64_t* due) noexcept;
     // Defers deadlines by planes, one a block, that have come although the block is wholly inside a frustum: to when the
     // centre of one of its nodes may be less than `margin` inside: more than the rounding of any node's test, and of this.
     void (*keep_inside)(const KernelView& view, float margin, const KernelClock& clock, const BlockArrays& blocks,
@@ -91,10 +112,11 @@ struct DeadlineKernel {
                                   const SlotDeadlines* dues, const std::uint16_t* unfolded, BlockArrays& blocks,
                                   std::uint32_t* due) noexcept;
     void (*find_deadlines)(const TestBatch& tested, DeadlineBatch& dues) noexcept;
-    // Makes those of a block's slots that are due by another clock due at once by the facing clock, and no more by that one,
-    // and finds the earliest of the others: those that are unfolded, a bit a slot, and the rest. Returns whether any was.
-    bool (*hand_over)(float clock, std::uint32_t unfolded, float* deadlines, float* facing, float& earliest_unfolded,
-                      float& earliest_folded) noexcept;
+    // Makes those of a block's slots that are due by other clocks due at once by the facing clock, and no more by those, and
+    // finds the earliest of the others: those that are unfolded, a bit a slot, and the rest; they have a clock each. Returns
+    // whether any was.
+    bool (*hand_over)(float clock_of_unfolded, float clock_of_folded, std::uint32_t unfolded, float* deadlines,
+                      float* facing, float& earliest_unfolded, float& earliest_folded) noexcept;
     // One bit a block: a deadline has come.
     void (*find_due_blocks)(float position_clock, float facing_clock, const BlockArrays& blocks,
                             std::uint64_t* due) noexcept;

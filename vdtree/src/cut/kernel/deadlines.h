@@ -21,6 +21,58 @@ void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float pa
     }
 }
 
+// Let p and q be points as far apart as the radius r, seen from the eye before and after a motion, each turned so that the
+// gaze is the same. While q goes a straight way of length s, at least D from the eye even for points r beside it, its angle
+// from the gaze changes by its gradient, of length 1/D at most. Along p's way the gradient differs by r times the Hessian,
+// whose norm is max(1, cot angle) / D^2; and p goes another way than q by the turn times r.
+float turn_blocks(const GazeMotion& motion, const BlockArrays& spheres, GazeArrays& blocks,
+                  std::uint64_t* due) noexcept {
+    constexpr float full_turn = 2 * pi;    // no two angles change less alike than that
+    constexpr float up = 1 + 5e-7f;        // small steps must not be lost in the sum's rounding
+    constexpr float angle_inexact = 4e-6f; // of two angles, and of the turned gaze
+    const Floats none = all(never_due);
+    Floats largest{};
+    for (std::size_t first = 0; first < spheres.x.size(); first += 64) {
+        std::uint64_t bits = 0;
+        for (std::size_t i = first; i < std::min(first + 64, spheres.x.size()); i += width) {
+            const Floats centre[3] = {load(&spheres.x[i]), load(&spheres.y[i]), load(&spheres.z[i])};
+            Floats before[3], after[3];
+            for (int k = 0; k < 3; ++k) {
+                before[k] = (motion.from_high[k] - centre[k]) + motion.from_low[k];
+                after[k] = (motion.to_high[k] - centre[k]) + motion.to_low[k];
+            }
+            Floats square_before{}, square_after{}, square_step{};
+            for (int k = 0; k < 3; ++k) {
+                const float(&row)[3] = motion.turn[k];
+                const Floats step = (row[0] * after[0] + row[1] * after[1] + row[2] * after[2]) - before[k];
+                square_before += before[k] * before[k], square_after += after[k] * after[k], square_step += step * step;
+            }
+            const Floats radius = load(&spheres.radius[i]), was = load(&blocks.angle[i]);
+            const Floats far_after = root_of(square_after), nearest = min_of(root_of(square_before), far_after);
+            const Floats step = root_of(square_step) + 1e-6f * nearest;
+            const Floats room = max_of(nearest - 0.5f * step - radius, all(least_length)), inverse = 1 / room;
+            const Floats angle = angle_from(motion.gaze, after, far_after);
+            // The least angle from the gaze, or from its opposite, of any point on the way.
+            const Floats least =
+                min_of(min_of(was, angle), pi - max_of(was, angle)) - (step + pi / 2 * radius) * inverse;
+            const Floats turned = motion.turned * radius * inverse;
+            const Floats bend =
+                step * radius * inverse * inverse * max_of(all(1), 1 / max_of(least, all(least_length)));
+            const Floats more =
+                min_of(min_of(least > 0 ? bend + turned : all(full_turn), 2 * step * inverse + turned), all(full_turn));
+            const Floats error = (load(&blocks.error[i]) + more + angle_inexact) * up;
+            store(&blocks.angle[i], angle);
+            store(&blocks.error[i], error);
+            const Floats outward = load(&blocks.outward[i]), inward = load(&blocks.inward[i]);
+            const Ints is_due = (outward <= error + angle) | (inward <= error - angle);
+            largest = min_of(outward, inward) < none ? max_of(largest, error) : largest;
+            bits |= std::uint64_t{bits_of(is_due)} << (i - first);
+        }
+        due[first / 64] = bits;
+    }
+    return -least_of(-largest);
+}
+
 void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockArrays& blocks,
                  float* deadlines) noexcept {
     for (std::size_t i = 0; i < blocks.x.size(); i += width) {
@@ -88,14 +140,15 @@ void find_deadlines(const TestBatch& tested, DeadlineBatch& dues) noexcept {
     }
 }
 
-bool hand_over(float clock, std::uint32_t unfolded, float* deadlines, float* facing, float& earliest_unfolded,
-               float& earliest_folded) noexcept {
+bool hand_over(float clock_of_unfolded, float clock_of_folded, std::uint32_t unfolded, float* deadlines, float* facing,
+               float& earliest_unfolded, float& earliest_folded) noexcept {
     const Floats none = all(never_due);
     Floats of_unfolded = none, of_folded = none;
     bool any_due = false;
     for (std::size_t i = 0; i < block_slots; i += width) {
         const Floats due = load(deadlines + i);
-        const Ints is_due = due <= clock, unfolds = mask_of(unfolded, i);
+        const Ints unfolds = mask_of(unfolded, i);
+        const Ints is_due = due <= (unfolds ? all(clock_of_unfolded) : all(clock_of_folded));
         any_due |= any(is_due);
         store(facing + i, is_due ? -none : load(facing + i));
         store(deadlines + i, is_due ? none : due);

@@ -44,7 +44,8 @@ struct KernelView {
     std::int32_t bins = 1;
     float bins_per_radian = 0;
     float inverse_threshold = 1;
-    float turn_per_length = 0; // radians that the gaze may turn while the position clock advances by 1
+    float length_per_turn =
+        1; // what a change of eccentricity by a radian is worth, in lengths: for the choice of slacks
 
     // Whose facing has to be found out: nodes within their silhouette's distance but not the interior's, and ...
     bool near_ones_too = false; // ... nodes within the interior's, too, or
@@ -93,6 +94,7 @@ static_assert(sizeof(FoldCandidate) == 64);
 // units, 0 or more.
 struct Verdict {
     float position_slack = 0;
+    float gaze_slack = 0; // radians of eccentricity; negative: none is known; without a gaze: huge
     float facing_slack = 0;
     float plane_slack = 0; // without planes: huge
     float light_slack = 0; // without lights that move: huge
@@ -101,20 +103,20 @@ struct Verdict {
 
 // Verdicts on up to sixteen candidates.
 struct TestBatch {
-    alignas(64) float position_slack[kernel_lanes], facing_slack[kernel_lanes];
+    alignas(64) float position_slack[kernel_lanes], gaze_slack[kernel_lanes], facing_slack[kernel_lanes];
     alignas(64) float plane_slack[kernel_lanes], light_slack[kernel_lanes];
     std::uint32_t unfolded = 0; // a bit a lane
 
     Verdict operator[](std::size_t lane) const noexcept {
-        return {position_slack[lane], facing_slack[lane], plane_slack[lane], light_slack[lane],
-                ((unfolded >> lane) & 1) != 0};
+        return {position_slack[lane], gaze_slack[lane],  facing_slack[lane],
+                plane_slack[lane],    light_slack[lane], ((unfolded >> lane) & 1) != 0};
     }
 };
 // Up to sixteen nodes, and what their verdicts are made of; see Measures and Verdicts in measure.h and decide.h.
 struct FoldBatch {
     alignas(64) float radius[kernel_lanes], length[kernel_lanes], silhouette_length[kernel_lanes];
     alignas(64) std::int32_t interior_row[kernel_lanes], silhouette_row[kernel_lanes];
-    alignas(64) float distance[kernel_lanes], gap[kernel_lanes], eccentricity[kernel_lanes];
+    alignas(64) float distance[kernel_lanes], gap[kernel_lanes], angle[kernel_lanes], eccentricity[kernel_lanes];
     alignas(64) std::int32_t bin[kernel_lanes];
     alignas(64) float interior[kernel_lanes], silhouette[kernel_lanes], height[kernel_lanes], uncovered[kernel_lanes];
     alignas(64) float facing_slack[kernel_lanes]; // without the other slacks' share in it
@@ -151,5 +153,7 @@ extern const FoldKernel fold_kernel;
 // Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this
 // share of the distance and the radius.
 inline constexpr float test_rounding = 2e-5f;
+// Radians, the same for eccentricities: a dozen roundings of two angles.
+inline constexpr float gaze_rounding = 1e-5f;
 
 } // namespace unseen::vdtree

@@ -16,6 +16,25 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
+// In two floats each.
+void split(const glm::dvec3& point, float (&high)[3], float (&low)[3]) {
+    for (int k = 0; k < 3; ++k) {
+        high[k] = static_cast<float>(point[k]);
+        low[k] = static_cast<float>(point[k] - static_cast<double>(high[k]));
+    }
+}
+
+// The least rotation from one unit direction to another.
+glm::dquat rotation_between(const glm::dvec3& a, const glm::dvec3& b) {
+    const double cosine = glm::dot(a, b);
+    if (cosine > -1 + 1e-12) return glm::normalize(glm::dquat(1 + cosine, glm::cross(a, b)));
+    const glm::dvec3 other = std::abs(a.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    return {0, glm::normalize(glm::cross(a, other))};
+}
+double angle_of(const glm::dquat& rotation) {
+    return 2 * std::atan2(glm::length(glm::dvec3(rotation.x, rotation.y, rotation.z)), std::abs(rotation.w));
+}
+
 std::array<const FoldCandidate*, kernel_lanes> lanes_of(std::span<const FoldCandidate> batch) {
     std::array<const FoldCandidate*, kernel_lanes> lanes{};
     for (std::size_t i = 0; i < batch.size(); ++i) lanes[i] = &batch[i];
@@ -56,15 +75,14 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
-    for (int k = 0; k < 3; ++k) {
-        view_.eye_high[k] = static_cast<float>(viewpoint.eye[k]);
-        view_.eye_low[k] = static_cast<float>(viewpoint.eye[k] - static_cast<double>(view_.eye_high[k]));
-    }
+    split(viewpoint.eye, view_.eye_high, view_.eye_low);
     view_.spread = std::nextafter(static_cast<float>(viewpoint.eye_spread),
                                   viewpoint.eye_spread > 0 ? infinity : 0.0f); // not less than it is
     view_.has_gaze = viewpoint.gaze.has_value() && criterion_.uses_gaze();
-    if (view_.has_gaze)
-        for (int k = 0; k < 3; ++k) view_.gaze[k] = static_cast<float>((*viewpoint.gaze)[k]);
+    if (view_.has_gaze) {
+        const glm::vec3 gaze(glm::normalize(*viewpoint.gaze));
+        for (int k = 0; k < 3; ++k) view_.gaze[k] = gaze[k];
+    }
     view_.planes.clear();
     view_.first_plane.clear();
     for (const Frustum& frustum : viewpoint.frusta) {
@@ -81,7 +99,7 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         const glm::vec3 towards(glm::dvec3(occluder.centre) - viewpoint.eye);
         view_.occluders.push_back({{towards.x, towards.y, towards.z}, occluder.radius});
     }
-    view_.turn_per_length = static_cast<float>(1 / length_per_radian);
+    view_.length_per_turn = static_cast<float>(length_per_radian / 2);
     costs_view_ = view_;
     costs_view_.everybody = true;
     if (lit_) lit_->look_from(viewpoint, length_per_radian);
@@ -281,6 +299,32 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const
                               switch_distance(batch.silhouette_row[i]);
         batch.silhouette[i] = std::max(batch.interior[i], outline);
     }
+}
+
+// The world may turn so that the gaze comes back alone, or the eye around the tree first. What makes the tree move less is
+// better.
+GazeMotion gaze_motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to) {
+    const Sphere& root = tree.bounds()[VertexTree::root()].ring;
+    const glm::dvec3 before = glm::dvec3(root.centre) - from.eye, after = glm::dvec3(root.centre) - to.eye;
+    const glm::dvec3 gaze_before = glm::normalize(*from.gaze), gaze = glm::normalize(*to.gaze);
+    glm::dquat turn = rotation_between(gaze, gaze_before);
+    const auto move_of = [&](const glm::dquat& q) {
+        return glm::length(q * after - before) + angle_of(q) * static_cast<double>(root.radius);
+    };
+    if (glm::length(before) > 0 && glm::length(after) > 0) {
+        const glm::dquat around = rotation_between(glm::normalize(after), glm::normalize(before));
+        const glm::dquat other = rotation_between(around * gaze, gaze_before) * around;
+        if (move_of(other) < move_of(turn)) turn = other;
+    }
+    GazeMotion motion;
+    split(from.eye, motion.from_high, motion.from_low);
+    split(to.eye, motion.to_high, motion.to_low);
+    for (int k = 0; k < 3; ++k) motion.gaze[k] = static_cast<float>(gaze[k]);
+    const glm::dmat3 columns = glm::mat3_cast(turn);
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) motion.turn[row][column] = static_cast<float>(columns[column][row]);
+    motion.turned = rounded_up(angle_of(turn));
+    return motion;
 }
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to,

@@ -10,6 +10,7 @@
 #include <unseen/vdtree/vertex_tree.h>
 
 #include "cut/budget.h"
+#include "cut/kernel/deadline_kernel.h"
 #include "cut/kernel/fold_kernel.h"
 #include "cut/kernel/lit_tester.h"
 
@@ -22,6 +23,9 @@ struct Motion {
     double planes = 0;   // bounds the change of the height of any node's centre over any plane of the frusta
     double light = 0;    // of the lights, in lengths; see light_weight
 };
+
+// The same, for angles between a gaze and what the tree holds.
+GazeMotion gaze_motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to);
 
 class FoldTester final : public CostSource {
 public:
@@ -36,8 +40,8 @@ public:
         view_.inverse_threshold = costs_view_.inverse_threshold = 1 / threshold;
     }
 
-    // `length_per_radian` is what a rotation of the gaze counts as on the position clock; any positive value will do, and
-    // it must be the same for verdicts and motions.
+    // `length_per_radian` is what turns of lights count as on their clock, and about what turns of the gaze are worth; any
+    // positive value will do, and it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
     // From the current viewpoint.

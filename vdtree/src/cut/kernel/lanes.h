@@ -33,14 +33,18 @@ UNSEEN_INLINE void store(float* to, const Floats& v) { std::memcpy(to, &v, sizeo
 UNSEEN_INLINE void store(std::int32_t* to, const Ints& v) { std::memcpy(to, &v, sizeof v); }
 UNSEEN_INLINE Floats root_of(const Floats& square) { return Vectors::root_of(square); }
 
-// Abramowitz and Stegun 4.4.46; error below 2e-8 radians but for the cosine's own.
-UNSEEN_INLINE Floats angle_of_cosine(const Floats& cosine) {
-    const Floats x = min_of(abs_of(cosine), all(1));
+// The angle whose cosine is 1 - versine, up to a right one: Abramowitz and Stegun 4.4.46; error below 2e-8 radians but for
+// the versine's own.
+UNSEEN_INLINE Floats angle_of_versine(const Floats& versine) {
+    const Floats x = 1 - versine;
     Floats series = all(-0.0012624911f);
     for (const float term :
          {0.0066700901f, -0.0170881256f, 0.0308918810f, -0.0501743046f, 0.0889789874f, -0.2145988016f, 1.5707963050f})
         series = series * x + term;
-    const Floats angle = root_of(1 - x) * series;
+    return root_of(versine) * series;
+}
+UNSEEN_INLINE Floats angle_of_cosine(const Floats& cosine) {
+    const Floats angle = angle_of_versine(1 - min_of(abs_of(cosine), all(1)));
     return cosine < 0 ? pi - angle : angle;
 }
 

@@ -4,6 +4,23 @@
 // reach beyond the ring, by no more than their own size.
 constexpr float occluded_radii = 2;
 
+// From so many radii over the distance on, an eye counts as inside the sphere: nearer its half angle would go by the
+// rounding of the distance.
+constexpr float nearly_inside = 0.95f;
+
+// Angles of points from a unit direction, given their vectors to the eye and their distances; error below 1e-6 radians.
+UNSEEN_INLINE Floats angle_from(const float (&gaze)[3], const Floats (&to_eye)[3], const Floats& distance) {
+    const Floats inverse = 1 / max_of(distance, all(least_length));
+    Floats ahead{}, behind{}; // squares of the ways to the direction, and to its opposite, on the unit sphere
+    for (int k = 0; k < 3; ++k) {
+        const Floats back = to_eye[k] * inverse, sum = back + gaze[k], difference = back - gaze[k];
+        ahead += sum * sum, behind += difference * difference;
+    }
+    const Ints is_behind = behind < ahead;
+    const Floats angle = angle_of_versine(0.5f * min_of(ahead, behind));
+    return is_behind ? pi - angle : angle;
+}
+
 // Entries of a table at rows and bins, looked up lane by lane.
 UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const Ints& rows, const Ints& bins) {
     const Ints at = view.bins == 1 ? rows : rows * view.bins + bins;
@@ -28,7 +45,8 @@ struct Measures {
     Floats to_eye[3];            // from the centre
     Floats distance;             // of the centre
     Floats gap;                  // of the sphere: distance - radius
-    Floats eccentricity;         // radians, of the sphere's nearest point; 0 from inside, and without gaze
+    Floats angle;                // radians, of the centre from the gaze; 0 without one
+    Floats eccentricity;         // radians, of the sphere's nearest point; 0 from nearly_inside on, and without gaze
     Ints bin;                    // of eccentricity
     Floats interior, silhouette; // the distances within which the node unfolds
     Floats height;               // of the sphere's top over the lowest plane of the best frustum
@@ -83,13 +101,13 @@ UNSEEN_INLINE Measures measures_of(const KernelView& view, const Nodes& of) {
     m.distance = root_of(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
     m.gap = m.distance - of.radius;
     m.bin = Ints{};
-    m.eccentricity = all(0);
+    m.angle = m.eccentricity = all(0);
     if (view.has_gaze) {
         const Floats inverse = 1 / max_of(m.distance, all(least_length));
-        const Floats towards = -(e[0] * view.gaze[0] + e[1] * view.gaze[1] + e[2] * view.gaze[2]) * inverse;
         const Floats half_angle = pi / 2 - angle_of_cosine(of.radius * inverse);
-        const Floats eccentricity = max_of(angle_of_cosine(towards) - half_angle, all(0));
-        m.eccentricity = m.distance > of.radius ? eccentricity : all(0);
+        m.angle = angle_from(view.gaze, m.to_eye, m.distance);
+        const Floats eccentricity = max_of(m.angle - half_angle, all(0));
+        m.eccentricity = of.radius < nearly_inside * m.distance ? eccentricity : all(0);
         m.bin = __builtin_convertvector(
             min_of(m.eccentricity * view.bins_per_radian, all(static_cast<float>(view.bins - 1))), Ints);
     }

@@ -45,6 +45,7 @@ void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const>
         store(batch.silhouette_row + first, of.nodes.silhouette_row);
         store(batch.distance + first, m.distance);
         store(batch.gap + first, m.gap);
+        store(batch.angle + first, m.angle);
         store(batch.eccentricity + first, m.eccentricity);
         store(batch.bin + first, m.bin);
         store(batch.interior + first, m.interior);
@@ -71,8 +72,8 @@ UNSEEN_INLINE Nodes stored_nodes(const FoldBatch& batch, std::size_t first) {
 }
 UNSEEN_INLINE Measures stored_measures(const FoldBatch& batch, std::size_t first) {
     Measures m{};
-    m.distance = load(batch.distance + first), m.gap = load(batch.gap + first),
-    m.eccentricity = load(batch.eccentricity + first);
+    m.distance = load(batch.distance + first), m.gap = load(batch.gap + first);
+    m.angle = load(batch.angle + first), m.eccentricity = load(batch.eccentricity + first);
     m.bin = load(batch.bin + first);
     m.interior = load(batch.interior + first), m.silhouette = load(batch.silhouette + first);
     m.height = load(batch.height + first), m.uncovered = load(batch.uncovered + first);
@@ -106,5 +107,5 @@ void find_batch_costs(const KernelView& view, const CostTables& tables, const Fo
 
 constexpr FoldKernel fold_table{test,   find_verdicts, find_slacks, find_batch_costs,
                                 decide, decide_range,  find_costs,  find_cost_bounds};
-constexpr DeadlineKernel deadline_table{move_blocks,    keep_inside, look_at_blocks,
+constexpr DeadlineKernel deadline_table{move_blocks,    turn_blocks, keep_inside,    look_at_blocks,
                                         find_deadlines, hand_over,   find_due_blocks};
