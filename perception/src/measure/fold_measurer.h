@@ -123,7 +123,7 @@ private:
 
     const Point& leaf_point(Index leaf) const { return points_[tree_.wedge_of_leaf(leaf)]; }
 
-    // Triangles with a corner in the support that the children, folded, leave.
+    // Triangles with a corner in the support that the nodes below, folded, leave.
     std::vector<Index> crossing(NodeId node) {
         std::vector<Index> all;
         tree_.for_each_child(node, [&](NodeId child) {
@@ -132,8 +132,10 @@ private:
                 all.insert(all.end(), around.begin(), around.end());
                 return;
             }
+            // Those that vanish below come from where their third corner is, too.
+            const Index vanished = first_triangle_[node + 1], end = first_triangle_[tree_.subtree_end()[node]];
             for (const Index t : crossing_[child])
-                if (t < first_triangle_[child] || t >= first_triangle_[child + 1]) all.push_back(t);
+                if (t < vanished || t >= end) all.push_back(t);
             std::vector<Index>().swap(crossing_[child]);
         });
         std::sort(all.begin(), all.end());

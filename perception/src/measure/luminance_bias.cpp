@@ -86,7 +86,7 @@ private:
         for (NodeId n = 0; n < interior_; ++n) sequence[n] = n;
         std::sort(sequence.begin(), sequence.end(),
                   [&](NodeId a, NodeId b) { return order_[a] != order_[b] ? order_[a] < order_[b] : a > b; });
-        for (const NodeId node : sequence) {
+        mesh_.fold_all(sequence, [&](NodeId node) {
             glm::vec3 light(0), of_vertices(0);
             float area = 0;
             mean_texture_ = textures_.empty() ? 1.0f : textures_[node].mean;
@@ -100,7 +100,7 @@ private:
                 area += glm::length(mesh_.vector_area(t));
             }
             light_[node] = textures_.empty() ? light : of_vertices + from_slide(node, light - of_vertices, area);
-        }
+        });
         for (NodeId node = interior_; node-- > 1;) light_[parents_[node]] += light_[node];
     }
 

@@ -29,7 +29,7 @@ public:
         std::sort(sequence.begin(), sequence.end(), [&](NodeId a, NodeId b) {
             return support[a].radius != support[b].radius ? support[a].radius < support[b].radius : a > b;
         });
-        for (const NodeId node : sequence) fold(node);
+        mesh_.fold_all(sequence, [&](NodeId node) { fold(node); });
         std::vector<Unorm16> packed(luminance_.size());
         for (WedgeId w = 0; w < tree_.wedge_count(); ++w)
             packed[w] = w < tree_.interior_wedge_count() ? Unorm16::nearest(static_cast<double>(luminance_[w]))

@@ -17,6 +17,32 @@ public:
             for (NodeId& corner : corners_[t]) around_[corner = tree.place_of_leaf(corner)].push_back(t);
     }
 
+    // Calls use(node) for all nodes, which folds them. All comes out as if they folded in the order of their ranks, of which
+    // no parent's is below a child's. But that order goes all over the mesh with every step. Here it holds where it matters,
+    // among nodes that share a triangle, and the rest goes piece by piece, so that the caches hold what is next.
+    template <class Use>
+    void fold_all(std::span<const NodeId> in_order, Use&& use) {
+        std::vector<Index> ranks(in_order.size());
+        for (Index rank = 0; rank < in_order.size(); ++rank) ranks[in_order[rank]] = rank;
+        std::vector<bool> is_folded(in_order.size());
+        std::vector<NodeId> waiting;
+        for (NodeId next = tree_.interior_count(); next-- > 0;) {
+            waiting.push_back(next);
+            while (!waiting.empty()) {
+                const NodeId node = waiting.back();
+                const NodeId before = is_folded[node] ? no_node : folds_before(node, ranks, is_folded);
+                if (before != no_node) {
+                    waiting.push_back(before);
+                    continue;
+                }
+                waiting.pop_back();
+                if (is_folded[node]) continue;
+                use(node);
+                is_folded[node] = true;
+            }
+        }
+    }
+
     // Folds a node whose interior children have been folded. Calls leave(triangle) for each triangle that is drawn
     // around the children; what it becomes is in ring() afterwards. Cost: the triangles around the node.
     template <class F>
@@ -55,6 +81,23 @@ public:
     }
 
 private:
+    // A child that has not folded yet, or a node of a lower rank that shares a triangle; no_node where there is none.
+    NodeId folds_before(NodeId node, std::span<const Index> ranks, const std::vector<bool>& is_folded) const {
+        const auto parents = tree_.parents();
+        NodeId found = no_node;
+        tree_.for_each_child(node, [&](NodeId child) {
+            if (found != no_node) return;
+            if (!tree_.is_place(child) && !is_folded[child]) found = child;
+            for (const Index t : around_[child]) {
+                if (!are_distinct(corners_[t])) continue; // else it is drawn, and no corner's parent has folded
+                for (const NodeId corner : corners_[t])
+                    if (ranks[parents[corner]] < ranks[node]) found = parents[corner];
+                if (found != no_node) return;
+            }
+        });
+        return found;
+    }
+
     static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
 
     const SoundTree& tree_;
