@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <future>
 #include <limits>
 #include <utility>
 
@@ -39,6 +40,12 @@ constexpr double text_line_px = 18;                   // where the screen's scal
 constexpr double lines_of_window = 56;                // ... and never less than this share of the window's height
 constexpr std::chrono::milliseconds times_shown{250}; // numbers that change faster cannot be read
 constexpr std::chrono::seconds message_shown{6};
+// Pictures of a moving view that come later than this are replaced by coarse ones, until it has rested so long.
+constexpr double latest_ms = 50;
+constexpr double rest_seconds = 0.15;
+constexpr double first_draft = 30'000, least_draft = 2'000, most_draft = 1e6; // triangles
+// Larger models begin with a coarse picture: what others need takes a second for some 700,000 triangles.
+constexpr std::uint64_t soon_made = 200'000;
 constexpr double most_margin_deg = 89; // beyond, a gaze may be anywhere on the screen, and its ring is none
 
 std::uint32_t budget_of(std::uint64_t triangles) {
@@ -69,19 +76,49 @@ private:
     std::optional<double> frame_ms_, adapt_ms_;
 };
 
+// Cuts that are soon made, of as many triangles as are soon drawn: by the sizes of triangles, which needs nothing that has
+// to be made for an observer first.
+class Draft {
+public:
+    explicit Draft(session::Session session) : session_(std::move(session)), follower_(session_) {}
+
+    Result<session::Report> follow(const vdtree::View& view) {
+        session::Request request{.goal = Goal::budget(static_cast<vdtree::Index>(triangles_))};
+        request.fold_test = session::FoldTest::extent;
+        request.purpose = session::Purpose::picture;
+        request.may_measure = request.reasons = false;
+        return follower_.follow(view, request);
+    }
+    // So many triangles the next time that a frame takes about as long as it may.
+    void took(double frame_ms) {
+        constexpr double fastest = 2; // change from frame to frame
+        triangles_ = std::clamp(triangles_ * std::clamp(0.8 * latest_ms / frame_ms, 1 / fastest, fastest), least_draft,
+                                most_draft);
+    }
+    session::Session& session() { return session_; }
+    const session::Session& session() const { return session_; }
+    const session::Follower& follower() const { return follower_; }
+
+private:
+    session::Session session_;
+    session::Follower follower_;
+    double triangles_ = first_draft;
+};
+
 class Viewer {
 public:
-    Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
-           session::SceneRenderer renderer)
-        : session_(session), options_(options), context_(context), window_(context.glfw_window()),
-          renderer_(std::move(renderer)), overlay_(context), follower_(session), view_(options.first_view),
-          request_(options.what.request_for(session.triangle_count())), gaze_px_(options.what.gaze_px),
-          draw_(options.draw), gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse),
-          gaze_(std::move(gaze)) {
+    Viewer(session::Session& session, Draft draft, session::GazePlayer gaze, const ViewerOptions& options,
+           render::Context& context, session::SceneRenderer renderer)
+        : session_(session), draft_(std::move(draft)), options_(options), context_(context),
+          window_(context.glfw_window()), renderer_(std::move(renderer)), overlay_(context), follower_(session),
+          view_(options.first_view), request_(options.what.request_for(session.triangle_count())),
+          gaze_px_(options.what.gaze_px), draw_(options.draw),
+          gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse), gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
         request_.reasons = false;
         draw_.background = session.background();
+        is_made_ = session.triangle_count() <= soon_made;
         const Goal& goal = request_.goal;
         budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : budget_of(session.triangle_count() / 4);
         listen();
@@ -97,7 +134,7 @@ public:
             follow_window_size();
             if (needs_frame_ && view_.width > 0 && view_.height > 0) {
                 if (auto drawn = draw_frame(); !drawn) return drawn;
-                ++frame;
+                frame += !is_draft_;
             }
             if (options_.frames > 0) {
                 if (frame >= options_.frames) break;
@@ -106,10 +143,12 @@ public:
             } else if (needs_frame_) {
                 glfwPollEvents();
             } else {
-                glfwWaitEventsTimeout(idle_seconds);
+                glfwWaitEventsTimeout(is_draft_ ? rest_seconds : idle_seconds);
+                needs_frame_ |= is_draft_ && !is_making();
             }
             if (!message_.empty() && Clock::now() > message_end_) say({});
         }
+        glfwHideWindow(window_);
         return options_.screenshot.empty() ? Result<void>() : save_picture(options_.screenshot);
     }
 
@@ -181,16 +220,19 @@ private:
         request_.goal.fill = goal.kind == Goal::Kind::budget && options_.what.request.goal.fill;
         // The full model has no time limit; the others get theirs back.
         request_.milliseconds = goal.kind == Goal::Kind::full ? std::nullopt : options_.what.request.milliseconds;
-        // What was asked for may not do for this goal, or would have to be measured.
-        if (!session_.scene().objects.empty() && !session_.plan(view_, request_)) request_.fold_test.reset();
+        drop_unfit_test();
         gaze_px_.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
+    }
+    // What was asked for may not do for this goal, or would have to be measured.
+    void drop_unfit_test() {
+        if (!session().scene().objects.empty() && !session().plan(view_, request_)) request_.fold_test.reset();
     }
 
     void scale_budget(double factor) {
         const double wanted = std::round(budget_ * factor);
         budget_ = static_cast<std::uint32_t>(
-            std::clamp(wanted, 1.0, static_cast<double>(budget_of(session_.triangle_count()))));
+            std::clamp(wanted, 1.0, static_cast<double>(budget_of(session().triangle_count()))));
         choose(Goal::budget(budget_));
     }
 
@@ -228,7 +270,7 @@ private:
             (px.y * frame.up - px.x * frame.right) * (distance() * height_per_distance() / std::max(1, view_.height));
         view_.eye += shift;
         view_.target += shift;
-        needs_frame_ = true;
+        note_move();
     }
 
     // Around the target: across about the up vector, up and down about the camera's right.
@@ -241,15 +283,20 @@ private:
         glm::dvec3 turned = across * (over * from_target);
         if (std::abs(glm::dot(glm::normalize(turned), up)) > steepest_cosine) turned = across * from_target;
         view.eye = view.target + turned;
-        needs_frame_ = true;
+        note_move();
     }
 
     void on_wheel(double notches) {
-        const double radius = std::max(session_.bounding_sphere().radius, 1e-30);
+        const double radius = std::max(session().bounding_sphere().radius, 1e-30);
         const double wanted =
             std::clamp(distance() * std::pow(zoom_per_notch, notches), nearest_radii * radius, farthest_radii * radius);
         if (view_.orthographic_height) view_.orthographic_height = wanted * height_per_distance();
         else view_.eye = view_.target + glm::normalize(view_.eye - view_.target) * wanted;
+        note_move();
+    }
+
+    void note_move() {
+        last_move_ = Clock::now();
         needs_frame_ = true;
     }
 
@@ -265,16 +312,16 @@ private:
     // Between perspective and parallel, where what is as far as the target keeps its size.
     void switch_projection() {
         vdtree::View view = view_;
-        const std::optional<session::Gaze> gaze = session_.observer().gaze;
+        const std::optional<session::Gaze> gaze = session().observer().gaze;
         if (view.orthographic_height) {
             view.eye = view.target + glm::normalize(view.eye - view.target) * distance();
             view.orthographic_height.reset();
         } else {
             view.orthographic_height = distance() * height_per_distance();
-            session_.set_gaze(std::nullopt); // there is none in parallel views
+            session().set_gaze(std::nullopt); // there is none in parallel views
         }
-        if (const auto ready = session_.prepare(view, request_); !ready) {
-            session_.set_gaze(gaze);
+        if (const auto ready = session().prepare(view, request_); !ready) {
+            session().set_gaze(gaze);
             return say("The view stays as it is: " + ready.error().message, true);
         }
         view_ = view;
@@ -298,29 +345,57 @@ private:
 
     Result<void> draw_frame() {
         needs_frame_ = false;
+        if (making_.valid() && !is_making())
+            if (auto made = finish_making(); !made) return made;
         const auto start = Clock::now();
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
         const double now_s = std::chrono::duration<double>(start - first_frame_).count();
         take_gaze(now_s);
-        session_.set_time(now_s);
-        auto result = follower_.follow(view_, request_);
+        for (session::Session* each : {&draft_.session(), &session()}) each->set_time(now_s);
+        const bool is_moving = vdtree::seconds_since(last_move_) < rest_seconds;
+        is_draft_ = !is_made_ || (is_moving && whole_ms_ > latest_ms);
+        auto result = is_draft_ ? draft_.follow(view_) : follower_.follow(view_, request_);
         if (!result) return result.error();
         const auto drawn = renderer_.draw_to_window(cuts(), view_, draw_);
         if (!drawn) return drawn;
         if (auto done = context_.finish(); !done) return done;
         // The first frame compiles and uploads: its time says nothing of those that follow.
-        if (has_drawn_) times_.add(vdtree::ms_since(start), result->adapt_ms);
+        const double frame_ms = vdtree::ms_since(start);
+        if (has_drawn_) times_.add(frame_ms, result->adapt_ms);
+        if (is_draft_ && has_drawn_) draft_.took(frame_ms);
+        if (!is_draft_) whole_ms_ = frame_ms;
         if (auto shown = show(state_of(*result)); !shown) return shown;
         // What the time limit has left to do, and what glides, goes on in the next frame.
         if (!has_drawn_ || !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||
-            (session_.scene().lights && session_.scene().lights->moves()))
+            (session().scene().lights && session().scene().lights->moves()))
             needs_frame_ = true;
         has_drawn_ = true;
+        if (!is_made_ && !making_.valid()) begin_making();
+        return {};
+    }
+
+    // Makes what the goal needs in this view, once, while drafts are shown: until it is finished the session and the
+    // follower are another thread's.
+    void begin_making() {
+        making_ = std::async(std::launch::async, [this, view = view_, request = request_]() -> Result<void> {
+            const auto made = follower_.follow(view, request);
+            return made ? Result<void>() : made.error();
+        });
+    }
+    bool is_making() const {
+        return making_.valid() && making_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+    }
+    Result<void> finish_making() {
+        const auto made = making_.get();
+        is_made_ = true;
+        if (!made) return made;
+        drop_unfit_test(); // for keys that came in between
         return {};
     }
 
     ViewerState state_of(const session::Report& report) const {
         ViewerState state{.model = options_.model,
+                          .is_draft = is_draft_,
                           .goal = request_.goal,
                           .report = report,
                           .display = display(),
@@ -328,7 +403,7 @@ private:
                           .orthographic_height = view_.orthographic_height};
         if (request_.goal.kind != Goal::Kind::full && !report.fold_tests.empty() &&
             session::is_perceptual(report.fold_tests.front()))
-            state.gaze = session_.observer().gaze;
+            state.gaze = session().observer().gaze;
         state.gaze_source = gaze_follows_pointer_ ? session::GazeSource::mouse
                             : plays_gaze_         ? options_.gaze_source
                                                   : session::GazeSource::none;
@@ -384,10 +459,12 @@ private:
     }
 
     void take_gaze(double now_s) {
-        session_.set_gaze(plays_gaze_ ? gaze_.at(now_s, view_, gaze_px_) : gaze_.around(gaze_px_));
+        session().set_gaze(plays_gaze_ ? gaze_.at(now_s, view_, gaze_px_) : gaze_.around(gaze_px_));
     }
 
     Result<void> save_picture(const std::string& file) {
+        if (making_.valid())
+            if (auto made = finish_making(); !made) return made;
         // Keys that came since the last frame count.
         take_gaze(std::chrono::duration<double>(last_frame_ - first_frame_).count());
         if (const auto result = follower_.follow(view_, request_); !result) return result.error();
@@ -422,12 +499,16 @@ private:
         }
     }
 
-    const perception::Display& display() const { return session_.observer().display; }
+    const perception::Display& display() const { return session().observer().display; }
     std::vector<session::DrawnCut> cuts() const {
-        return session::drawn_cuts(follower_, session_.scene().objects.size());
+        return session::drawn_cuts(is_draft_ ? draft_.follower() : follower_, session().scene().objects.size());
     }
+    // What may be used while another thread makes what the first picture needs.
+    session::Session& session() { return making_.valid() ? draft_.session() : session_; }
+    const session::Session& session() const { return making_.valid() ? draft_.session() : session_; }
 
     session::Session& session_;
+    Draft draft_;
     const ViewerOptions& options_;
     const render::Context& context_;
     GLFWwindow* window_;
@@ -448,7 +529,10 @@ private:
     Clock::time_point first_frame_ = Clock::now();
     bool needs_frame_ = true;
     Clock::time_point last_frame_ = Clock::now();
-    bool has_drawn_ = false;
+    bool has_drawn_ = false, is_draft_ = false;
+    bool is_made_;        // what the goal needs
+    double whole_ms_ = 0; // of the last frame that was no draft
+    Clock::time_point last_move_;
     FrameTimes times_;
     bool shows_overlay_ = true, shows_keys_ = false;
     std::string message_;     // over the picture, until the time
@@ -457,6 +541,7 @@ private:
     std::string title_;
     bool saves_window_ = false; // of the next frame
     int screenshots_ = 0;
+    std::future<Result<void>> making_; // what needs the session and the follower; waited for before these go
 };
 
 } // namespace
@@ -468,11 +553,13 @@ Result<void> run_viewer(render::Context& window, session::Session& session, sess
     const bool lights_move = session.scene().lights && session.scene().lights->moves();
     request.may_measure = request.fold_test || !lights_move; // else the viewer takes a test that needs none
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
-    auto renderer = session::SceneRenderer::create(window, session);
+    auto drafts = session::Session::create(session.scene().share(), session.observer());
+    if (!drafts) return drafts.error();
+    auto renderer = session::SceneRenderer::create(window, *drafts);
     if (!renderer) return renderer.error();
     glfwShowWindow(window.glfw_window());
     if (options.frames == 0) print_note("press h in the window to see its keys.");
-    return Viewer(session, std::move(gaze), options, window, std::move(*renderer)).run();
+    return Viewer(session, Draft(std::move(*drafts)), std::move(gaze), options, window, std::move(*renderer)).run();
 }
 
 } // namespace unseen::app

@@ -39,6 +39,7 @@ std::string gaze_text(const ViewerState& state) {
 } // namespace
 
 std::string viewer_mode(const ViewerState& state) {
+    if (state.is_draft) return "coarse";
     switch (state.goal.kind) {
     case session::Goal::Kind::full: return "whole";
     case session::Goal::Kind::budget: return "budget of " + grouped(state.goal.triangles);
@@ -61,7 +62,9 @@ std::vector<TextLine> viewer_lines(const ViewerState& state) {
     const session::Report& report = state.report;
     std::vector<TextLine> lines = {{triangles_text(report.stats.triangles, report.source_triangles), "shown"},
                                    {viewer_mode(state), "mode"}};
-    if (state.goal.kind != session::Goal::Kind::full) {
+    if (state.is_draft) {
+        lines.back().text += ", for now";
+    } else if (state.goal.kind != session::Goal::Kind::full) {
         lines.push_back({seen_from_text(report, state.display), "visible"});
         if (!report.fold_tests.empty())
             lines.push_back({std::string(session::facts_of(report.fold_tests.front()).title), "fold test"});

@@ -14,7 +14,8 @@ namespace unseen::app {
 
 // What there is to say of a frame.
 struct ViewerState {
-    std::string model; // its file's name
+    std::string model;     // its file's name
+    bool is_draft = false; // coarse, while the view moves or what the goal needs is being made
     session::Goal goal = {};
     session::Report report = {};
     perception::Display display = {};
@@ -26,7 +27,7 @@ struct ViewerState {
     std::optional<double> frame_ms = {}, adapt_ms = {};          // of the last frames; adapt is a part of frame
 };
 
-// "whole", "imperceptible", "gaze-directed", "budget of 10,000", "up to 5 pixels".
+// "whole", "imperceptible", "gaze-directed", "budget of 10,000", "up to 5 pixels", "coarse".
 std::string viewer_mode(const ViewerState& state);
 // "bunny.vdt - imperceptible: 34,294 of 69,666 triangles - Unseen"; before the program's name what still goes on.
 std::string viewer_title(const ViewerState& state);

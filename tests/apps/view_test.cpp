@@ -112,6 +112,37 @@ TEST_F(ViewCommandTest, DraggingTurnsAndTheWheelZooms) {
     EXPECT_LT(background(moved->image), background(still->image) * 9 / 10);
 }
 
+// Half a million triangles, which take longer to draw in software than a picture may while somebody turns them.
+TEST_F(ViewCommandTest, LargeModelsAreCoarseAtFirstAndWhileTheyMove) {
+    write_ball("large.obj", 500, 500);
+    succeed({"build", "large.obj", "-o", "large.vdt", "--clusterer", "octree", "--no-fold-errors"});
+    if (!WindowTest::open({"view", "large.vdt", "--size", "600x600", "--full"}, {"--screenshot", "whole.png"}))
+        GTEST_SKIP() << "no window: " << errors();
+    EXPECT_THAT(window().title_with("whole"), HasSubstr("whole: 499,000 of 499,000"));
+    window().button(Button1, true, 100, 80);
+    std::string title;
+    const auto end = std::chrono::steady_clock::now() + patience;
+    for (int x = 100; title.find("coarse") == std::string::npos && std::chrono::steady_clock::now() < end; ++x) {
+        window().move_to(100 + x % 100, 80, Button1Mask);
+        std::this_thread::sleep_for(poll_pause);
+        title = window().title();
+    }
+    EXPECT_THAT(title, HasSubstr("coarse"));
+    EXPECT_THAT(window().title_with("whole"), HasSubstr("whole: 499,000 of 499,000")); // at rest
+    window().button(Button1, false, 100, 80);
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+    EXPECT_TRUE(unseen::perception::read_image(path("whole.png")));
+
+    // The picture that is asked for is the goal's, not the one that stands in for it.
+    ASSERT_TRUE(WindowTest::open({"view", "large.vdt", "--size", "600x600", "--fold-test", "luebke-hallen"},
+                                 {"--frames", "1", "--screenshot", "goal.png"}));
+    ASSERT_EQ(ended(), 0) << errors();
+    succeed({"render", "large.vdt", "--size", "600x600", "--fold-test", "luebke-hallen", "-o", "render.png"});
+    EXPECT_EQ(require(unseen::perception::read_image(path("goal.png")))->image.values,
+              require(unseen::perception::read_image(path("render.png")))->image.values);
+}
+
 // What is as far as the target keeps its size, so the ball covers about as much in parallel; a gaze needs perspective.
 TEST_F(ViewCommandTest, ParallelViewsZoomAndComeBack) {
     if (!open({"--triangles", "400", "--fill", "0.5"})) GTEST_SKIP() << "no window: " << errors();

@@ -85,6 +85,17 @@ Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
     return scene;
 }
 
+Scene Scene::share() const {
+    const auto shared = [](const std::vector<Object>& objects) {
+        std::vector<Object> handles;
+        for (const Object& of : objects)
+            handles.push_back({of.tree.share(), of.placement, of.name, of.texture_left_out, of.is_relit, of.origin,
+                               of.measurement, of.node, of.mesh});
+        return handles;
+    };
+    return {shared(objects), background, lights, shared(backdrop), camera, source};
+}
+
 Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient,
                             std::optional<double> fill) {
     if (!towards && !ambient && !fill) return {};

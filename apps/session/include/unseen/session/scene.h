@@ -46,6 +46,8 @@ struct Scene {
     static Result<Scene> load(const std::filesystem::path& file, const LoadOptions& options = {});
     static Scene of(vdtree::VertexTree tree, double unit_metres = 1);
 
+    Scene share() const; // another scene of the same trees, which live as long as one of them
+
     bool is_of_file() const noexcept { return source != nullptr; } // of a scene file, not a model
 
     // Relights all objects as vdtree::Light describes, pre-lit ones, too; parameters that are not set stay. `towards`:
