@@ -220,6 +220,7 @@ public:
     void advance_lights(double light) {
         if (!lights_.is_used()) return;
         lights_.advance(light);
+        if (!lights_.may_be_due()) return;
         lights_.find_due_blocks(looked_at_);
         hand_over(lights_);
     }
@@ -227,6 +228,7 @@ public:
     void advance_planes(double planes, const KernelView& view) {
         if (!planes_.is_used()) return;
         planes_.advance(planes);
+        if (!planes_.may_be_due()) return;
         deadline_kernel.keep_inside(view, rounding_margin_, planes_.clock(), blocks_, planes_.earliest_unfolded());
         planes_.find_due_blocks(looked_at_);
         hand_over(planes_);

@@ -19,6 +19,7 @@ public:
         slots_.clear();
         earliest_unfolded_.clear();
         earliest_folded_.clear();
+        next_ = never_due;
         set_clock(0);
     }
     void reserve(std::size_t blocks) {
@@ -46,6 +47,7 @@ public:
         slots_[block].slots[place] = due;
         float& earliest = (is_unfolded ? earliest_unfolded_ : earliest_folded_)[block];
         earliest = std::min(earliest, due);
+        next_ = std::min(next_, due);
     }
     float left(std::size_t block, std::size_t place) const {
         return is_used_ ? std::max(slots_[block].slots[place] - clock_.early, 0.0f) : 0.0f;
@@ -58,6 +60,7 @@ public:
     }
 
     void advance(double motion) { set_clock(now_ + motion); }
+    bool may_be_due() const noexcept { return next_ <= clock_.late; } // false: no block is
     // Sets the clock back to 0 where it has run beyond `longest`, so that deadlines in floats stay fine enough.
     void restart(double longest) {
         if (!(now_ > longest)) return;
@@ -65,6 +68,7 @@ public:
         for (BlockSlots& dues : slots_) std::ranges::for_each(dues.slots, set_back);
         std::ranges::for_each(earliest_unfolded_, set_back);
         std::ranges::for_each(earliest_folded_, set_back);
+        set_back(next_);
         set_clock(0);
     }
     const KernelClock& clock() const noexcept { return clock_; }
@@ -73,25 +77,34 @@ public:
     float* earliest_unfolded() noexcept { return earliest_unfolded_.data(); }
 
     // In order, in place of what was there.
-    void find_due_blocks(std::vector<std::uint32_t>& blocks) const {
+    void find_due_blocks(std::vector<std::uint32_t>& blocks) {
         blocks.clear();
+        next_ = never_due;
         const auto is_due = [&](std::size_t block) {
             return (earliest_unfolded_[block] <= clock_.late) | (earliest_folded_[block] <= clock_.late);
         };
         constexpr std::size_t run = 8; // blocks looked at together: mostly none is due
         for (std::size_t first = 0; first < earliest_folded_.size(); first += run) {
-            bool any = false;
-            for (std::size_t i = 0; i < run; ++i) any |= is_due(first + i);
-            if (!any) continue;
-            for (std::size_t block = first; block < first + run; ++block)
+            float next = never_due;
+            for (std::size_t i = first; i < first + run; ++i)
+                next = std::min(next, std::min(earliest_unfolded_[i], earliest_folded_[i]));
+            if (next > clock_.late) {
+                next_ = std::min(next_, next);
+                continue;
+            }
+            for (std::size_t block = first; block < first + run; ++block) {
                 if (is_due(block)) blocks.push_back(static_cast<std::uint32_t>(block));
+                else next_ = std::min(next_, std::min(earliest_unfolded_[block], earliest_folded_[block]));
+            }
         }
     }
     // Makes the block's slots that are due the facing clock's: due at once by that one, and not any more by this.
     // `unfolded`: a bit a slot. Returns whether there are any.
     bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues) {
-        return deadline_kernel.hand_over(clock_.late, clock_.late, unfolded, slots_[block].slots, dues.facing,
-                                         earliest_unfolded_[block], earliest_folded_[block]);
+        const bool is_any = deadline_kernel.hand_over(clock_.late, clock_.late, unfolded, slots_[block].slots,
+                                                      dues.facing, earliest_unfolded_[block], earliest_folded_[block]);
+        next_ = std::min({next_, earliest_unfolded_[block], earliest_folded_[block]});
+        return is_any;
     }
 
     std::uint64_t byte_size() const noexcept { return (sizeof(BlockSlots) + 2 * sizeof(float)) * slots_.capacity(); }
@@ -110,6 +123,7 @@ private:
     KernelClock clock_;
     std::vector<BlockSlots> slots_; // by block, like the others
     std::vector<float> earliest_unfolded_, earliest_folded_;
+    float next_ = never_due; // not later than any of these
 };
 
 } // namespace unseen::vdtree
