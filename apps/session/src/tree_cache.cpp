@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <mutex>
 #include <system_error>
+#include <unordered_map>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -98,23 +100,69 @@ Result<void> TreeCache::check() const {
     return Error{ErrorCode::invalid_argument, "$UNSEEN_CACHE_SIZE is passed over: " + parse_size(size).error().message};
 }
 
-TreeCache::TreeCache(const CacheOptions& options) : folder_(folder_of(options)), most_bytes_(most_bytes_of(options)) {}
+// What the folder holds, as of the time of its last change.
+struct TreeCache::Listing {
+    std::mutex mutex;
+    std::optional<fs::file_time_type> as_of;
+    std::unordered_multimap<std::string, fs::path> files; // by key
+    std::optional<std::uint64_t> bytes;                   // of all of them
+};
+
+TreeCache::TreeCache(const CacheOptions& options)
+    : folder_(folder_of(options)), most_bytes_(most_bytes_of(options)), listing_(std::make_shared<Listing>()) {}
+
+std::vector<fs::path> TreeCache::files_of(const std::string& key) const {
+    if (!is_on()) return {};
+    Listing& listing = *listing_;
+    const std::lock_guard lock(listing.mutex);
+    std::error_code failure;
+    const fs::file_time_type changed = fs::last_write_time(folder_, failure);
+    if (failure) return {};
+    if (listing.as_of != changed) {
+        listing.files.clear();
+        listing.bytes.reset();
+        for (fs::directory_iterator i(folder_, failure), end; !failure && i != end; i.increment(failure))
+            if (const std::string name = i->path().filename().string(); is_kept(name))
+                listing.files.emplace(name.substr(0, key_digits), i->path());
+        listing.as_of = changed;
+    }
+    std::vector<fs::path> files;
+    for (auto [i, end] = listing.files.equal_range(key); i != end; ++i) files.push_back(i->second);
+    return files;
+}
+
+// That a file has come, and makes room for it.
+void TreeCache::note(const std::string& key, const fs::path& file) const {
+    Listing& listing = *listing_;
+    const std::lock_guard lock(listing.mutex);
+    std::error_code failure;
+    listing.files.emplace(key, file);
+    if (listing.bytes) *listing.bytes += fs::file_size(file, failure);
+    else {
+        listing.bytes = 0;
+        for (const CachedTree& kept : trees()) *listing.bytes += kept.bytes;
+    }
+    listing.as_of = fs::last_write_time(folder_, failure);
+    if (*listing.bytes <= most_bytes_) return;
+    shrink(most_bytes_);
+    listing.as_of.reset();
+}
 
 Result<std::optional<vdtree::VertexTree>> TreeCache::find(const std::string& key, const Progress& progress) const {
-    for (const CachedTree& kept : trees()) {
-        if (!kept.file.filename().string().starts_with(key)) continue;
+    for (const fs::path& file : files_of(key)) {
         std::error_code ignored;
-        if (kept.file.filename().string().substr(key_digits + 1, sum_digits) != sum_of(kept.file)) {
-            fs::remove(kept.file, ignored);
+        if (!fs::is_regular_file(file, ignored)) continue;
+        if (file.filename().string().substr(key_digits + 1, sum_digits) != sum_of(file)) {
+            fs::remove(file, ignored);
             continue;
         }
-        auto tree = vdtree::read_tree(kept.file, progress);
+        auto tree = vdtree::read_tree(file, progress);
         if (tree) {
-            fs::last_write_time(kept.file, fs::file_time_type::clock::now(), ignored);
+            fs::last_write_time(file, fs::file_time_type::clock::now(), ignored);
             return std::optional(std::move(*tree));
         }
         if (tree.error().code == ErrorCode::cancelled) return tree.error();
-        fs::remove(kept.file, ignored);
+        fs::remove(file, ignored);
     }
     return std::optional<vdtree::VertexTree>();
 }
@@ -131,10 +179,11 @@ Result<void> TreeCache::keep(const std::string& key, const fs::path& source, con
     const fs::path file = folder_ / (key + "-" + name);
     if (const auto ready = vdtree::prepare_tree_file(file); !ready) return ready;
     if (const auto written = vdtree::write_tree(file, tree); !written) return written;
-    fs::rename(file, folder_ / (key + "-" + sum_of(file) + "-" + name), failure);
+    const fs::path kept = folder_ / (key + "-" + sum_of(file) + "-" + name);
+    fs::rename(file, kept, failure);
     if (failure)
         return Error{ErrorCode::io_failure, "Cannot rename '" + file.string() + "': " + failure.message() + "."};
-    shrink(most_bytes_);
+    note(key, kept);
     return {};
 }
 

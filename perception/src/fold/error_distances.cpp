@@ -21,8 +21,8 @@ public:
     SwitchDistances(const PatternLevels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
                     const Surround& surround, std::size_t bins, std::size_t added)
         : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround),
-          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
-          discs_(pattern_luminance_count), eyes_(pattern_luminance_count) {
+          bands_(pattern_bands(screen.highest_cpd, model, csf.samples().summation)), bins_(bins),
+          most_patterns_(last_row - added), discs_(pattern_luminance_count), eyes_(pattern_luminance_count) {
         begin();
     }
 
@@ -84,9 +84,9 @@ private:
         auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
         if (eyes.empty()) {
             const double cdm2 = levels_.luminance(luminance);
-            const Dimming dimming(bands_, surround_, cdm2, screen_.highest_cpd, model_);
+            const Dimming dimming(*bands_, surround_, cdm2, screen_.highest_cpd, model_);
             for (std::size_t b = 0; b < bins_; ++b)
-                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, cdm2, screen_, bands_, dimming,
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, cdm2, screen_, *bands_, dimming,
                                   model_);
         }
         return eyes[bin];
@@ -164,7 +164,7 @@ private:
     const CsfTable& csf_;
     const FoldModel& model_;
     const Surround surround_;
-    const PatternBands bands_;
+    const std::shared_ptr<const PatternBands> bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
     bool has_too_few_ = false;

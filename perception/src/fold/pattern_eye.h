@@ -1,6 +1,9 @@
 // What a fold shows, in classes, and from how far such patterns are invisible to an eye at one luminance and eccentricity.
 #pragma once
 
+#include <memory>
+#include <mutex>
+
 #include "fold/fold_factors.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
@@ -125,6 +128,24 @@ struct PatternBands {
         }
     }
 };
+
+// The same once for all trees that are looked at in one way, one after the other: making them takes as long as measuring a
+// hundred nodes.
+inline std::shared_ptr<const PatternBands> pattern_bands(double highest_cpd, const FoldModel& model, double summation) {
+    struct Last {
+        std::mutex mutex;
+        double highest_cpd = 0, summation = 0;
+        FoldModel model;
+        std::shared_ptr<const PatternBands> bands;
+    };
+    static Last last;
+    const std::lock_guard lock(last.mutex);
+    if (!last.bands || last.highest_cpd != highest_cpd || last.summation != summation || !(last.model == model)) {
+        last.bands = std::make_shared<const PatternBands>(highest_cpd, model, summation);
+        last.highest_cpd = highest_cpd, last.summation = summation, last.model = model;
+    }
+    return last.bands;
+}
 
 // By how many octaves the mean light around a pattern of one luminance is less than its own: [width * bands + band], as
 // PatternBands. A band looks at a neighbourhood as wide as its wave, of which the mesh lights no more than it covers of

@@ -22,7 +22,8 @@ Result<ShadowEdges> ShadowEdges::create(const vdtree::View& view, const FoldTest
     const Screen screen(view, options);
     const PatternLevels levels(options.display);
     const CsfTable& csf = csf_of(options);
-    const PatternBands bands(screen.highest_cpd, options.model, csf.samples().summation);
+    const auto shared = pattern_bands(screen.highest_cpd, options.model, csf.samples().summation);
+    const PatternBands& bands = *shared;
     std::map<int, PatternEye> eyes; // by luminance
     // Strips that are lit by `own`, whatever the angle: all that is below the illuminance occurs.
     std::vector<double> widest_strips;

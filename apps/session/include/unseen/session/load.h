@@ -72,8 +72,13 @@ public:
     std::vector<CachedTree> shrink(std::uint64_t most_bytes) const;
 
 private:
+    struct Listing;
+    std::vector<std::filesystem::path> files_of(const std::string& key) const;
+    void note(const std::string& key, const std::filesystem::path& file) const;
+
     std::filesystem::path folder_; // empty: off
     std::uint64_t most_bytes_;
+    std::shared_ptr<Listing> listing_; // of copies, too: a scene of many meshes looks at the folder once
 };
 
 // ---- files
