@@ -196,6 +196,8 @@ private:
         if (in_.one_in(12)) viewpoint_.eye_spread = in_.one_in(2) ? 0 : radius * std::pow(10.0, in_.between(-4, 1));
         if (in_.below(4) == 0) viewpoint_.gaze = in_.direction();
         if (in_.one_in(8)) viewpoint_.gaze = {};
+        if (viewpoint_.gaze && in_.below(3) == 0) // a little
+            viewpoint_.gaze = glm::normalize(*viewpoint_.gaze + std::pow(10.0, in_.between(-5, -1)) * in_.direction());
         if (in_.below(6) == 0) {
             viewpoint_.frusta.assign(in_.below(3), {});
             for (Frustum& frustum : viewpoint_.frusta)

@@ -307,6 +307,108 @@ TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
     if (GetParam().has_small_rings) EXPECT_GT(cut_frames, all_frames / 2);
 }
 
+// A head that goes around the model, walks past it, turns, and looks elsewhere now and then, with a gaze that is fixed to it
+// or trails behind; for both of its eyes every other time.
+TEST_P(Follow, EqualsTheCutFromScratchUnderMotionsOfAHead) {
+    const VertexTree tree = built(GetParam().make());
+    const Sphere sphere = tree.bounding_sphere();
+    const double radius = sphere.radius;
+    const DistanceCriterion criterion = rich_criterion(tree, 4, true);
+    std::mt19937_64 random(37);
+    enum { around, past, turning, looking, motions };
+    for (int motion = 0; motion < motions; ++motion) {
+        const double aside = 0.5 * random_unit(random), up = 0.3 * random_unit(random); // radians
+        double angle = 0, look = 0;
+        glm::dvec3 eye(0, 0.3 * radius, 3.5 * radius);
+        Cut cut(tree);
+        for (int frame = 0; frame < frame_count() / motions; ++frame) {
+            const double pace = std::pow(10.0, -1.5 - 3 * (frame / 25 % 4) / 3.0); // of a radian, or the radius
+            if (motion == around) angle += pace;
+            if (motion == past) eye.x = radius * std::sin(pace * frame);
+            if (motion == turning) look = 0.4 * std::sin(3 * pace * frame);
+            if (motion == looking && frame % 9 == 0) look = random_unit(random) - 0.5;
+            const glm::dquat turn = glm::angleAxis(angle, glm::normalize(glm::dvec3(0.1, 1, 0.2)));
+            const glm::dquat gaze =
+                turn * glm::angleAxis(aside + look, glm::dvec3(0, 1, 0)) * glm::angleAxis(up, glm::dvec3(1, 0, 0));
+            Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) + turn * eye};
+            viewpoint.gaze = gaze * glm::dvec3(0, 0, -1);
+            if (motion % 2 == 1) viewpoint.eye_spread = 0.01 * radius;
+            ASSERT_TRUE(cut.follow(criterion, viewpoint));
+            ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {}))
+                << "motion " << motion << ", frame " << frame;
+        }
+    }
+}
+
+// The eccentricity of what turns with the view stays, so a gaze that is fixed to a camera costs little more than none.
+TEST(FollowGaze, WakesFewNodesWhereItGoesWithTheCamera) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.03));
+    std::array<std::uint64_t, 2> tests{};
+    std::uint64_t watched = 0;
+    constexpr int frames = 90;
+    for (const bool with_gaze : {false, true}) {
+        DistanceCriterion::Parts parts;
+        parts.eccentricity_bins = with_gaze ? 80 : 1;
+        for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
+            parts.switch_distance.push_back(with_gaze ? static_cast<float>(400 * std::exp(-0.04 * double(bin))) : 130);
+        const auto criterion = require(DistanceCriterion::create(tree, std::move(parts)));
+        Cut cut(tree);
+        for (int frame = 0; frame < frames; ++frame) {
+            const glm::dquat turn = glm::angleAxis(frame * M_PI / 180, glm::dvec3(0, 1, 0));
+            Viewpoint viewpoint{.eye = turn * glm::dvec3(0, 0, 8)};
+            if (with_gaze) viewpoint.gaze = turn * glm::normalize(glm::dvec3(0.5, 0.1, -1));
+            const auto stats = require(cut.follow(*criterion, viewpoint));
+            if (frame >= 2) tests[with_gaze] += stats->node_tests;
+        }
+        watched = cut.triangle_count() / 2;
+    }
+    EXPECT_LT(tests[1], 8 * tests[0]);
+    EXPECT_LT(tests[1], frames * watched / 10); // an eighth of what a bound on all motion wakes
+}
+
+// How much more than a block's the angle of a point in it may change, by its motion in doubles.
+TEST(FollowGaze, BlocksBoundHowEccentricitiesOfTheirNodesChange) {
+    std::mt19937_64 random(41);
+    const auto angle = [](const glm::dvec3& a, const glm::dvec3& b) {
+        return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+    };
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    double tightest = std::numeric_limits<double>::infinity();
+    for (int run = 0; run < 4000; ++run) {
+        Viewpoint from{.eye = 5.0 * random_direction(random)}, to = from;
+        from.gaze = run % 4 == 0 ? glm::normalize(-from.eye) : random_direction(random);
+        const double pace = std::pow(10.0, -4 * random_unit(random));
+        const glm::dquat turn = glm::angleAxis(pace, random_direction(random));
+        if (run % 3 != 0) to.eye += pace * random_direction(random);
+        if (run % 3 == 2) to.eye = turn * from.eye;
+        to.gaze = run % 5 == 0 ? *from.gaze : turn * *from.gaze;
+        const GazeMotion motion = gaze_motion(tree, from, to);
+        BlockArrays spheres;
+        GazeArrays blocks;
+        spheres.for_each([](auto& values, float fill) { values.assign(whole_registers(1), fill); });
+        blocks.for_each([](auto& values, float fill) { values.assign(whole_registers(1), fill); });
+        const glm::vec3 centre(random_unit(random) * random_direction(random));
+        const double radius = std::pow(10.0, -3 * random_unit(random));
+        spheres.set_sphere(0, centre, static_cast<float>(radius), 0);
+        const double before = angle(glm::dvec3(centre) - from.eye, *from.gaze);
+        blocks.angle[0] = static_cast<float>(before);
+        blocks.outward[0] = 1e9f; // used
+        std::uint64_t due = 0;
+        deadline_kernel.turn_blocks(motion, spheres, blocks, &due);
+        const double after = angle(glm::dvec3(centre) - to.eye, *to.gaze);
+        ASSERT_NEAR(static_cast<double>(blocks.angle[0]), after, 2e-6) << run;
+        for (int i = 0; i < 20; ++i) {
+            const glm::dvec3 p =
+                glm::dvec3(centre) + radius * (i < 10 ? 1 : random_unit(random)) * random_direction(random);
+            const double change = angle(p - to.eye, *to.gaze) - angle(p - from.eye, *from.gaze) - (after - before);
+            ASSERT_LE(std::abs(change), static_cast<double>(blocks.error[0])) << run;
+            if (std::abs(change) > 1e-4)
+                tightest = std::min(tightest, static_cast<double>(blocks.error[0]) / std::abs(change));
+        }
+    }
+    EXPECT_LT(tightest, 2); // else it would be no use
+}
+
 // What one cut for several eyes keeps: all that the cut of any of them has, whatever the criterion, gazes, back faces and
 // occluders; and it is followed like others.
 TEST_P(Follow, KeepsForAllEyesWithinTheSpreadWhatOneOfThemNeeds) {
