@@ -1,7 +1,7 @@
 // The fold test by errors in distance form: a switch distance table for patches and for strips, and each node's rows.
 #include "fold/error_distances.h"
 
-#include <map>
+#include <unordered_map>
 
 #include <unseen/perception/internal/chroma.h>
 
@@ -170,7 +170,7 @@ private:
     bool has_too_few_ = false;
     std::vector<Discs> discs_;
     std::vector<std::vector<PatternEye>> eyes_; // by luminance; by bin
-    std::map<Pattern, std::uint16_t> rows_;
+    std::unordered_map<Pattern, std::uint16_t, PatternHash> rows_;
     std::vector<float> switch_distance_;
 };
 

@@ -51,8 +51,17 @@ struct Pattern {
     bool is_strip = false;
     Course course = Course::to_and_fro; // of strips
 
-    auto operator<=>(const Pattern&) const = default;
+    bool operator==(const Pattern&) const = default;
     bool is_nothing() const { return largest == no_contrast && bias == no_contrast; }
+};
+struct PatternHash {
+    std::size_t operator()(const Pattern& p) const noexcept {
+        std::uint64_t bits = 0;
+        for (const int value : {p.luminance, p.typical, p.largest, p.bias, p.fading, p.quarters,
+                                static_cast<int>(p.is_strip), static_cast<int>(p.course)})
+            bits = (bits ^ static_cast<std::uint32_t>(value)) * 0x9e3779b97f4a7c15u;
+        return static_cast<std::size_t>(bits ^ (bits >> 32));
+    }
 };
 
 // At least as visible as both.
