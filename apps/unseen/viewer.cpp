@@ -7,6 +7,7 @@
 #include <ctime>
 #include <future>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #define GLFW_INCLUDE_NONE
@@ -118,7 +119,6 @@ public:
         request_.may_measure = false; // nobody waits for that here
         request_.reasons = false;
         draw_.background = session.background();
-        is_made_ = session.triangle_count() <= soon_made;
         const Goal& goal = request_.goal;
         budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : budget_of(session.triangle_count() / 4);
         listen();
@@ -353,7 +353,7 @@ private:
         take_gaze(now_s);
         for (session::Session* each : {&draft_.session(), &session()}) each->set_time(now_s);
         const bool is_moving = vdtree::seconds_since(last_move_) < rest_seconds;
-        is_draft_ = !is_made_ || (is_moving && whole_ms_ > latest_ms);
+        is_draft_ = is_to_be_made() || (is_moving && whole_ms_ > latest_ms);
         auto result = is_draft_ ? draft_.follow(view_) : follower_.follow(view_, request_);
         if (!result) return result.error();
         const auto drawn = renderer_.draw_to_window(cuts(), view_, draw_);
@@ -370,13 +370,31 @@ private:
             (session().scene().lights && session().scene().lights->moves()))
             needs_frame_ = true;
         has_drawn_ = true;
-        if (!is_made_ && !making_.valid()) begin_making();
+        if (is_to_be_made() && !making_.valid()) begin_making();
         return {};
     }
 
-    // Makes what the goal needs in this view, once, while drafts are shown: until it is finished the session and the
-    // follower are another thread's.
+    // What decides the fold test's distances, which take long to make for large models.
+    using Making = std::tuple<Goal::Kind, double, double, std::optional<session::FoldTest>, bool, glm::ivec2, double,
+                              std::optional<double>>;
+    Making making() const {
+        const Goal& goal = request_.goal;
+        return {goal.kind,
+                goal.summed_cost,
+                goal.tolerance_px,
+                request_.fold_test,
+                gaze_px_ || (plays_gaze_ && options_.gaze_source != session::GazeSource::none),
+                {view_.width, view_.height},
+                view_.fov_y_degrees,
+                view_.orthographic_height};
+    }
+    bool is_to_be_made() const {
+        if (making_.valid()) return true;
+        return session_.triangle_count() > soon_made && request_.goal.kind != Goal::Kind::full && made_ != making();
+    }
+    // Makes it, while drafts are shown: until it is finished the session and the follower are another thread's.
     void begin_making() {
+        making_of_ = making();
         making_ = std::async(std::launch::async, [this, view = view_, request = request_]() -> Result<void> {
             const auto made = follower_.follow(view, request);
             return made ? Result<void>() : made.error();
@@ -387,7 +405,7 @@ private:
     }
     Result<void> finish_making() {
         const auto made = making_.get();
-        is_made_ = true;
+        made_ = making_of_;
         if (!made) return made;
         drop_unfit_test(); // for keys that came in between
         return {};
@@ -530,7 +548,8 @@ private:
     bool needs_frame_ = true;
     Clock::time_point last_frame_ = Clock::now();
     bool has_drawn_ = false, is_draft_ = false;
-    bool is_made_;        // what the goal needs
+    std::optional<Making> made_;
+    Making making_of_;
     double whole_ms_ = 0; // of the last frame that was no draft
     Clock::time_point last_move_;
     FrameTimes times_;

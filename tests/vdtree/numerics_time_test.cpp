@@ -232,7 +232,7 @@ struct Watched {
     void set(float slack) {
         constexpr float never = 1e30f;
         for (const NodeId node : {0u, 1u})
-            front.set_deadlines(front.slot_of(node), Verdict{slack, never, never, never, true});
+            front.set_deadlines(front.slot_of(node), Verdict{slack, never, never, never, never, true});
     }
     bool is_due() { return !front.collect_due().empty(); }
 };
@@ -245,12 +245,12 @@ TEST(Numerics, AddingAHundredMillionSmallTerms) {
     // The clock has run for a while, then come the terms.
     float naive_clock = static_cast<float>(begin);
     Watched watched(slack);
-    watched.front.advance(begin, 0);
+    watched.front.advance(begin);
     EXPECT_FALSE(watched.is_due());
     int due_at = 0;
     for (int i = 1; i <= terms; ++i) {
         naive_clock += static_cast<float>(term);
-        watched.front.advance(term, 0);
+        watched.front.advance(term);
         if (i % (terms / 1000) == 0 && due_at == 0 && watched.is_due()) due_at = i;
     }
     EXPECT_EQ(naive_clock, static_cast<float>(begin)) << "half a unit in the last place, and less, is nothing";

@@ -273,6 +273,7 @@ StagePainter::StagePainter(const VertexTree& tree, std::span<const TexturedLight
 template <std::size_t lights>
 std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> triangles,
                                                     const FunctionRef<std::array<float, lights>(WedgeId)>& luminance) {
+    if (triangles.empty()) return {}; // as of the last stage
     surfaces_.clear(lights);
     std::optional<StageCovers> covers;
     for (std::size_t number = 0; number < triangles.size(); ++number) {
