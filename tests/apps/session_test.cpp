@@ -1,5 +1,7 @@
 // The session library: requests that contradict themselves, plans, several objects.
 
+#include <thread>
+
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/fold_measurement.h>
 #include <unseen/session/follower.h>
@@ -348,6 +350,34 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     EXPECT_EQ(folded->fold_tests.front(), FoldTest::error);
     EXPECT_TRUE(perception::has_fold_measurement(follower->cut().tree()));
     EXPECT_LT(folded->stats.triangles, whole->stats.triangles);
+}
+
+// As a viewer shows coarse pictures while another thread makes what the fine ones need.
+TEST(Follower, SessionsOfTheSameTreesMayWorkAtTheSameTime) {
+    session::Scene scene = session::Scene::of(tree_of(shapes::bumpy_sphere(5, 0.03)));
+    const auto coarse = require(Session::create(scene.share())), alone = require(Session::create(scene.share())),
+               fine = require(Session::create(std::move(scene)));
+    const Request goal{
+        .goal = Goal::up_to(30), .fold_test = FoldTest::luebke_hallen, .purpose = session::Purpose::picture};
+    const Request draft{
+        .goal = Goal::budget(2000), .fold_test = FoldTest::extent, .purpose = session::Purpose::picture};
+    const vdtree::View first = fine->default_view();
+    std::vector<vdtree::Index> triangles(12);
+    std::thread maker([&] {
+        session::Follower follower(*fine);
+        for (std::size_t i = 0; i < triangles.size(); ++i)
+            triangles[i] = require(follower.follow(vdtree::orbited(first, 7.0 * double(i)), goal))->stats.triangles;
+    });
+    session::Follower follower(*coarse);
+    for (int i = 0; i < 40; ++i) {
+        const auto report = follower.follow(vdtree::orbited(first, i), draft);
+        ASSERT_TRUE(report);
+        EXPECT_LE(report->stats.triangles, 2000u);
+    }
+    maker.join();
+    session::Follower again(*alone);
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+        EXPECT_EQ(require(again.follow(vdtree::orbited(first, 7.0 * double(i)), goal))->stats.triangles, triangles[i]);
 }
 
 TEST(Observer, ACircleAroundTheGazeIsOneOfAngles) {
