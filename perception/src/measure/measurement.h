@@ -12,7 +12,7 @@
 
 namespace unseen::perception::measurement {
 
-inline constexpr int revision = 9; // one more where the same settings give other numbers
+inline constexpr int revision = 10; // one more where the same settings give other numbers
 
 // ---- points
 // Leaves of a node for its parent: the worst in distance, the worst in luminance.

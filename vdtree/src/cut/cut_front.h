@@ -30,7 +30,8 @@ namespace unseen::vdtree {
 // around it. That tells far more than a bound on the eye's path. A full block is split in two, by node numbers.
 //
 // Every slot has a deadline for the distance when it grows (where the node is unfolded) or shrinks (where it is folded),
-// one for the facing clock, and perhaps others for the gaze, the lights' clock and the planes'. Every block knows the earliest ones.
+// one for the facing clock, and perhaps others for the gaze, the lights' clock and the planes'. Every block knows the
+// earliest ones.
 class CutFront {
 public:
     using Slot = std::uint32_t;

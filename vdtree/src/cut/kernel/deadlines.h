@@ -57,7 +57,7 @@ float turn_blocks(const GazeMotion& motion, const BlockArrays& spheres, GazeArra
                 min_of(min_of(was, angle), pi - max_of(was, angle)) - (step + pi / 2 * radius) * inverse;
             const Floats turned = motion.turned * radius * inverse;
             const Floats bend =
-                step * radius * inverse * inverse * max_of(all(1), 1 / max_of(least, all(least_length)));
+                (step * inverse) * (radius * inverse) * max_of(all(1), 1 / max_of(least, all(least_length)));
             const Floats more =
                 min_of(min_of(least > 0 ? bend + turned : all(full_turn), 2 * step * inverse + turned), all(full_turn));
             const Floats error = (load(&blocks.error[i]) + more + angle_inexact) * up;

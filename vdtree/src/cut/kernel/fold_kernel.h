@@ -45,7 +45,7 @@ struct KernelView {
     float bins_per_radian = 0;
     float inverse_threshold = 1;
     float length_per_turn =
-        1; // what a change of eccentricity by a radian is worth, in lengths: for the choice of slacks
+        1; // by which slacks of eccentricity compare with those of distance, for a choice among them
 
     // Whose facing has to be found out: nodes within their silhouette's distance but not the interior's, and ...
     bool near_ones_too = false; // ... nodes within the interior's, too, or
