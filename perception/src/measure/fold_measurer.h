@@ -123,7 +123,9 @@ private:
 
     const Point& leaf_point(Index leaf) const { return points_[tree_.wedge_of_leaf(leaf)]; }
 
-    // Triangles with a corner in the support that the nodes below, folded, leave.
+    // Triangles with a corner in the support that the children, folded, leave. Those that vanish below them come from where
+    // their third corner is, too, as points at the proxy: parts of few leaves keep these, for the model was fitted so. In
+    // large ones they would be all of the mesh.
     std::vector<Index> crossing(NodeId node) {
         std::vector<Index> all;
         tree_.for_each_child(node, [&](NodeId child) {
@@ -132,8 +134,9 @@ private:
                 all.insert(all.end(), around.begin(), around.end());
                 return;
             }
-            // Those that vanish below come from where their third corner is, too.
-            const Index vanished = first_triangle_[node + 1], end = first_triangle_[tree_.subtree_end()[node]];
+            const bool is_large = leaf_end_[node] - first_leaf_[node] > leaves_of_part;
+            const Index vanished = first_triangle_[is_large ? node + 1 : child],
+                        end = first_triangle_[is_large ? tree_.subtree_end()[node] : child + 1];
             for (const Index t : crossing_[child])
                 if (t < vanished || t >= end) all.push_back(t);
             std::vector<Index>().swap(crossing_[child]);
