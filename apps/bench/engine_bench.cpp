@@ -400,7 +400,7 @@ private:
         add_budgets(users);
         add("full perceptual tests", "M/s", users.full_tests_per_second(options_.quick ? 10 : 60) / 1e6, 1, 60,
             "from scratch, every node of the tree, in order");
-        add_memory(users);
+        add_memory(subject); // without what is measured of folds
     }
 
     // What users run: the default fold test, what is imperceptible and so many triangles, without a gaze and with one.

@@ -93,7 +93,7 @@ public:
     // So many triangles the next time that a frame takes about as long as it may.
     void took(double frame_ms) {
         constexpr double fastest = 2; // change from frame to frame
-        triangles_ = std::clamp(triangles_ * std::clamp(0.8 * latest_ms / frame_ms, 1 / fastest, fastest), least_draft,
+        triangles_ = std::clamp(triangles_ * std::clamp(0.7 * latest_ms / frame_ms, 1 / fastest, fastest), least_draft,
                                 most_draft);
     }
     session::Session& session() { return session_; }
