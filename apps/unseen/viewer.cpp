@@ -348,7 +348,8 @@ private:
         if (making_.valid() && !is_making())
             if (auto made = finish_making(); !made) return made;
         const auto start = Clock::now();
-        follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
+        const double passed_s = std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count();
+        if (!making_.valid()) follower_.let_pass(passed_s);
         const double now_s = std::chrono::duration<double>(start - first_frame_).count();
         take_gaze(now_s);
         for (session::Session* each : {&draft_.session(), &session()}) each->set_time(now_s);

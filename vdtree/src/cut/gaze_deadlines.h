@@ -14,7 +14,6 @@ namespace unseen::vdtree {
 class GazeDeadlines {
 public:
     void use(bool is_used) noexcept { is_used_ = is_used; } // only while there are no blocks
-    bool is_used() const noexcept { return is_used_; }
 
     void clear() {
         slots_.clear();

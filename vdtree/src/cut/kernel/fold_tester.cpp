@@ -354,14 +354,7 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
         const double angle = angle_between(a, b);
         double turned = angle * radius + std::abs(db - da);
         if (from.gaze) {
-            const glm::dvec3 axis = glm::cross(a, b);
-            const double sine = glm::length(axis);
-            glm::dvec3 gaze = *from.gaze;
-            if (sine > 0) { // Rodrigues' formula
-                const glm::dvec3 k = axis / sine;
-                gaze = gaze * std::cos(angle) + glm::cross(k, gaze) * std::sin(angle) +
-                       k * (glm::dot(k, gaze) * (1 - std::cos(angle)));
-            }
+            const glm::dvec3 gaze = rotation_between(a / da, b / db) * *from.gaze;
             turned += length_per_radian * angle_between(gaze, *to.gaze);
         }
         motion.position = std::min(motion.position, turned);
