@@ -218,8 +218,8 @@ private:
     std::optional<vdtree::DistanceCriterion> criterion_;
 };
 
-// The speed of this machine just now, which others may share: arithmetic that takes a millisecond or so, and reads at
-// random from 64 MB.
+// The speed of this machine just now, which others may share: reads at random from 64 MB, each of which waits for the one
+// before.
 double machine_ms() {
     constexpr std::size_t words = std::size_t{1} << 24;
     static const std::vector<std::uint32_t> memory = [] {
@@ -390,13 +390,15 @@ private:
     void add_main_rows(const Subject& subject, vdtree::Index active, const std::vector<OrbitFigures>& orbits,
                        const Json& json, const Json* far) {
         const vdtree::VertexTree measured = with_errors(shop_, base_, subject.tree);
-        const Subject users = add_orbits(measured, active);
+        Subject users(measured), gazing(measured, FoldTest::error, true);
+        users.aim_for(active);
+        gazing.aim_for(active);
+        add_orbits(users, gazing);
         for (std::size_t i = 0; i < orbits.size(); ++i)
-            add_orbit("luebke-hallen, ", orbits[i], orbit_steps[i], std::array{44, 345, 1200}[i],
-                      "folds cost up to " + rounded(static_cast<double>(subject.threshold), 4));
+            add_orbit("luebke-hallen, ", subject, orbits[i], orbit_steps[i], std::array{44, 345, 1200}[i]);
         add_growth(orbits, far);
         add("still view", "us", still_us(users, options_.quick ? 20 : 200), 3, 1);
-        add_jumps(users, json, far);
+        add_jumps(users, gazing, json, far);
         add_budgets(users);
         add("full perceptual tests", "M/s", users.full_tests_per_second(options_.quick ? 10 : 60) / 1e6, 1, 60,
             "from scratch, every node of the tree, in order");
@@ -404,46 +406,39 @@ private:
     }
 
     // What users run: the default fold test, what is imperceptible and so many triangles, without a gaze and with one.
-    Subject add_orbits(const vdtree::VertexTree& tree, vdtree::Index active) {
-        Subject users(tree), gazing(tree, FoldTest::error, true);
-        const Subject imperceptible(tree), gazing_imperceptible(tree, FoldTest::error, true);
-        users.aim_for(active);
-        gazing.aim_for(active);
+    void add_orbits(const Subject& users, const Subject& gazing) {
+        const Subject imperceptible(users.tree), gazing_imperceptible(users.tree, FoldTest::error, true);
         const std::string aside = "gaze " + shortest(session::usual_degrees_aside) + " degrees aside, ";
         const auto add_all = [&](const std::string& name, const Subject& of, std::array<double, 3> targets) {
-            std::array<double, 3> found{};
+            std::array<double, 3> twice{};
             for (std::size_t i = 0; i < orbit_steps.size(); ++i) {
                 const OrbitFigures f = measure_orbit(of, orbit_steps[i], frames_);
-                add_orbit(name, f, orbit_steps[i], targets[i],
-                          "folds cost up to " + rounded(static_cast<double>(of.threshold), 4));
-                found[i] = 2 * f.median_us;
+                add_orbit(name, of, f, orbit_steps[i], targets[i]);
+                twice[i] = 2 * f.median_us;
             }
-            return found;
+            return twice;
         };
-        const auto twice = add_all("", users, {10, 40, 150});
-        add_all(aside, gazing, twice);
-        const auto twice_imperceptible = add_all("imperceptible, ", imperceptible, {50, 300, 1200});
-        add_all("imperceptible, " + aside, gazing_imperceptible, twice_imperceptible);
-        return users;
+        add_all(aside, gazing, add_all("", users, {10, 40, 150}));
+        add_all("imperceptible, " + aside, gazing_imperceptible,
+                add_all("imperceptible, ", imperceptible, {50, 300, 1200}));
     }
 
-    void add_orbit(const std::string& name, const OrbitFigures& f, double step, double target, const std::string& how) {
+    void add_orbit(const std::string& name, const Subject& of, const OrbitFigures& f, double step, double target) {
         add(name + shortest(step) + " degrees a frame", "us", f.median_us, 1, target,
-            rounded(f.triangles, 6) + " active triangles, " + how + "; " + rounded(f.changes, 4) + " changes, " +
+            rounded(f.triangles, 6) + " active triangles, folds cost up to " +
+                rounded(static_cast<double>(of.threshold), 4) + "; " + rounded(f.changes, 4) + " changes, " +
                 rounded(f.tests, 4) + " tests and " + rounded(f.writes, 4) + " writes to the index buffer a frame");
     }
 
-    void add_jumps(const Subject& users, const Json& json, const Json* far) {
+    void add_jumps(const Subject& users, const Subject& gazing, const Json& json, const Json* far) {
         const int jumps = options_.quick ? 6 : 40;
         add("jump, " + name_of_size(main_size()), "ms", teleport_ms(users, jumps), 2, 2, "to the other side");
         if (far)
             add("jump, " + name_of_size(far_size()), "ms", (*far)["teleport_ms"].get<double>(), 2, 5,
                 "luebke-hallen; " + rounded(json["teleport_ms"].get<double>(), 3) + " ms at " +
                     name_of_size(main_size()));
-        Subject gazing(users.tree, FoldTest::error, true);
-        const vdtree::Index active = gazing.aim_for(wanted_active);
         add("jump with a gaze, " + name_of_size(main_size()), "ms", teleport_ms(gazing, jumps), 2, 5,
-            grouped(active) + " active triangles; to the other side, and the gaze with it");
+            "to the other side, and the gaze with it");
     }
 
     // From the mesh's size to the largest up to 14 M.

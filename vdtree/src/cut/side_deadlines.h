@@ -45,8 +45,8 @@ public:
         if (!is_used_) return;
         const float due = (clock_.early + slack) * just_less;
         slots_[block].slots[place] = due;
-        float& earliest = (is_unfolded ? earliest_unfolded_ : earliest_folded_)[block];
-        earliest = std::min(earliest, due);
+        float& of_block = (is_unfolded ? earliest_unfolded_ : earliest_folded_)[block];
+        of_block = std::min(of_block, due);
         next_ = std::min(next_, due);
     }
     float left(std::size_t block, std::size_t place) const {
@@ -80,21 +80,17 @@ public:
     void find_due_blocks(std::vector<std::uint32_t>& blocks) {
         blocks.clear();
         next_ = never_due;
-        const auto is_due = [&](std::size_t block) {
-            return (earliest_unfolded_[block] <= clock_.late) | (earliest_folded_[block] <= clock_.late);
-        };
         constexpr std::size_t run = 8; // blocks looked at together: mostly none is due
         for (std::size_t first = 0; first < earliest_folded_.size(); first += run) {
             float next = never_due;
-            for (std::size_t i = first; i < first + run; ++i)
-                next = std::min(next, std::min(earliest_unfolded_[i], earliest_folded_[i]));
+            for (std::size_t i = first; i < first + run; ++i) next = std::min(next, earliest(i));
             if (next > clock_.late) {
                 next_ = std::min(next_, next);
                 continue;
             }
             for (std::size_t block = first; block < first + run; ++block) {
-                if (is_due(block)) blocks.push_back(static_cast<std::uint32_t>(block));
-                else next_ = std::min(next_, std::min(earliest_unfolded_[block], earliest_folded_[block]));
+                if (earliest(block) <= clock_.late) blocks.push_back(static_cast<std::uint32_t>(block));
+                else next_ = std::min(next_, earliest(block));
             }
         }
     }
@@ -103,7 +99,7 @@ public:
     bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues) {
         const bool is_any = deadline_kernel.hand_over(clock_.late, clock_.late, unfolded, slots_[block].slots,
                                                       dues.facing, earliest_unfolded_[block], earliest_folded_[block]);
-        next_ = std::min({next_, earliest_unfolded_[block], earliest_folded_[block]});
+        next_ = std::min(next_, earliest(block));
         return is_any;
     }
 
@@ -113,6 +109,7 @@ private:
     struct alignas(64) BlockSlots {
         float slots[block_slots];
     };
+    float earliest(std::size_t block) const { return std::min(earliest_unfolded_[block], earliest_folded_[block]); }
     void set_clock(double now) {
         now_ = now;
         clock_ = kernel_clock(now);

@@ -112,9 +112,9 @@ struct DeadlineKernel {
                                   const SlotDeadlines* dues, const std::uint16_t* unfolded, BlockArrays& blocks,
                                   std::uint32_t* due) noexcept;
     void (*find_deadlines)(const TestBatch& tested, DeadlineBatch& dues) noexcept;
-    // Makes those of a block's slots that are due by other clocks due at once by the facing clock, and no more by those, and
-    // finds the earliest of the others: those that are unfolded, a bit a slot, and the rest; they have a clock each. Returns
-    // whether any was.
+    // Makes those of a block's slots that are due by other clocks due at once by the facing clock, and no more by those.
+    // Unfolded slots (a bit each) and folded ones have a clock each. Finds the earliest of what is left of either kind.
+    // Returns whether any was due.
     bool (*hand_over)(float clock_of_unfolded, float clock_of_folded, std::uint32_t unfolded, float* deadlines,
                       float* facing, float& earliest_unfolded, float& earliest_folded) noexcept;
     // One bit a block: a deadline has come.

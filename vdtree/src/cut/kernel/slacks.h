@@ -6,8 +6,9 @@ constexpr float position_rounding = 2e-6f;
 constexpr float facing_rounding = 2e-5f;
 static_assert(position_rounding <= test_rounding && facing_rounding <= test_rounding);
 
-// With a gaze, a verdict holds while the distance and the eccentricity stay where it is right: within the distance of a
-// farther bin and this side of that bin's far edge (inward = 1), or beyond that of a nearer bin and its near edge (-1).
+// With a gaze, a verdict holds while the distance and the eccentricity stay where it is right. An unfolded node (inward =
+// 1) must stay within the distance of a farther bin, and this side of that bin's far edge. A folded one (-1) must stay
+// beyond the distance of a nearer bin, and beyond that bin's near edge.
 // The more bins are looked at, the more the node may turn, and the less the eye may move: the best of a few.
 struct SlackQuery {
     Floats gap, inward, angle, radius, length, other_length;

@@ -89,7 +89,8 @@ private:
             if (found != no_node) return;
             if (!tree_.is_place(child) && !is_folded[child]) found = child;
             for (const Index t : around_[child]) {
-                if (!are_distinct(corners_[t])) continue; // else it is drawn, and no corner's parent has folded
+                if (!are_distinct(corners_[t]))
+                    continue; // not drawn any more; of what is, no corner's parent has folded
                 for (const NodeId corner : corners_[t])
                     if (ranks[parents[corner]] < ranks[node]) found = parents[corner];
                 if (found != no_node) return;
