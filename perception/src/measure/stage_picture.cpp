@@ -275,9 +275,15 @@ std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> tr
                                                     const FunctionRef<std::array<float, lights>(WedgeId)>& luminance) {
     if (triangles.empty()) return {}; // as of the last stage
     surfaces_.clear(lights);
+    // Most triangles of a fine mesh lie between two rows of samples: these are passed over by their corners alone.
+    const bool knows_rows = triangles.size() > positions_.size() / 4;
+    if (knows_rows) find_rows_before();
+    const auto& before = surfaces_.rows_before;
     std::optional<StageCovers> covers;
     for (std::size_t number = 0; number < triangles.size(); ++number) {
         const Triangle& corners = triangles[number];
+        if (knows_rows && before[corners[0]] == before[corners[1]] && before[corners[0]] == before[corners[2]])
+            continue;
         const auto place = footprint(corners);
         if (!place || (covers && covers->repeats(*place))) continue;
         const Shown<lights> t{*place, luminance(corners[0]),      luminance(corners[1]), luminance(corners[2]),
@@ -293,6 +299,24 @@ std::array<StagePicture, lights> StagePainter::draw(std::span<const Triangle> tr
             if (const auto its = footprint(triangles[later])) covers->add(*its, later);
     }
     return cells<lights>();
+}
+
+// As footprint() finds the rows of a triangle, bit for bit.
+void StagePainter::find_rows_before() {
+    surfaces_.rows_before.resize(positions_.size());
+    constexpr std::size_t at_once = width_of<Float4>;
+    for (std::size_t first = 0; first < positions_.size(); first += at_once) {
+        const std::size_t count = std::min(at_once, positions_.size() - first);
+        Float4 up{};
+        for (int axis = 0; axis < 3; ++axis) {
+            Float4 along;
+            for (std::size_t i = 0; i < at_once; ++i) along[i] = positions_[first + std::min(i, count - 1)][axis];
+            const Float4 q = (along - camera_.centre[axis]) * camera_.samples_per_length * camera_.up[axis];
+            up = axis == 0 ? q : up + q;
+        }
+        const Int4 rows = counts_before(up + samples / 2.0f - 0.5f);
+        for (std::size_t i = 0; i < count; ++i) surfaces_.rows_before[first + i] = static_cast<std::uint16_t>(rows[i]);
+    }
 }
 
 // None for what is not seen.

@@ -35,7 +35,8 @@ inline constexpr std::size_t stage_samples = measurement::stage_side * measureme
 struct StageSurfaces {
     std::vector<float> height; // towards the eye; -infinity where nothing is
     std::array<std::vector<float>, LitStages::lights + 1> light;
-    std::size_t drawn = 0; // samples, hidden ones too
+    std::size_t drawn = 0;                  // samples, hidden ones too
+    std::vector<std::uint16_t> rows_before; // by vertex: rows of samples below it; scratch
 
     void clear(std::size_t lights);
 };
@@ -88,6 +89,7 @@ public:
     std::size_t drawn() const { return surfaces_.drawn; } // samples of the last picture, hidden ones too
 
 private:
+    void find_rows_before();
     std::optional<StageFootprint> footprint(const vdtree::Triangle& corners) const;
     template <std::size_t lights>
     std::array<StagePicture, lights> cells() const;
