@@ -431,7 +431,10 @@ void add_check_options(CLI::App& verb, WhatOptions& o, std::vector<Rule>& rules)
                      Rule::excludes,
                      {"--fold-test extent", "--fold-test displacement"},
                      "they do not order folds by what is seen of them"});
-    rules.push_back({"--checked", Rule::excludes, {"--orthographic", "--visibility spheres"}, "it goes by pictures"});
+    rules.push_back({"--checked",
+                     Rule::excludes,
+                     {"--orthographic", "--eyes", "--visibility spheres"},
+                     "it goes by pictures of one eye"});
 }
 
 } // namespace unseen::app

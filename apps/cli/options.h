@@ -54,6 +54,8 @@ struct ViewOptions {
     std::optional<glm::dvec3> direction;       // from the model towards the eye
     std::optional<double> fill;                // share of the window's height
     std::optional<double> fov_degrees;         // vertical
+    double eye_distance = 0;                   // world units; 0: one eye
+    double eye_shift = 0;                      // of the windows, outward, in halves of a window
     bool is_orthographic = false;
     std::optional<double> orthographic_height; // world units; not given: as --fill says
     int width = 1024, height = 1024;           // pixels

@@ -159,6 +159,8 @@ vdtree::View make_view(const session::Session& session, const ViewOptions& optio
         if (options.orthographic_height) view.orthographic_height = options.orthographic_height;
     }
     if (options.up) view.up = *options.up;
+    view.eye_distance = options.eye_distance;
+    if (options.eye_distance > 0) view.shift.x = -options.eye_shift;
     return view;
 }
 

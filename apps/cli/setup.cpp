@@ -55,6 +55,7 @@ const std::vector<Rule>& rules() {
         {"--eye", Rule::excludes, {"--direction", "--fill"}, "give one of them"},
         {"--target", Rule::needs_one_of, {"--eye"}, "without an eye the whole model is framed"},
         {"--fov", Rule::excludes, {"--orthographic"}, "a parallel view has no field of view"},
+        {"--eyes", Rule::excludes, {"--orthographic"}, "a parallel view has no two eyes"},
         {"--prelit", Rule::excludes, {"--light", "--ambient", "--fill-light", "--lights"}, "these light the colours"},
         {"--lights", Rule::excludes, {"--light", "--ambient", "--fill-light"}, "say all of it in the file"},
         {"--texture", Rule::excludes, {"--no-texture"}},
@@ -155,6 +156,24 @@ void Setup::add_view() {
             "A parallel view: the window is METRES high, or fits the model (see --fill)")
         ->type_name("METRES|fit");
     mark(group, parallel);
+    group
+        .add_option_function<std::string>(
+            "--eyes",
+            [&o](const std::string& text) {
+                const std::size_t comma = text.find(',');
+                const auto distance = number_from<double>(std::string_view(text).substr(0, comma));
+                const std::optional<double> shift =
+                    comma == text.npos ? 0.0 : number_from<double>(std::string_view(text).substr(comma + 1));
+                if (!distance || !(*distance > 0) || !std::isfinite(*distance) || !shift || !(std::abs(*shift) < 1))
+                    refuse("--eyes: must be METRES or METRES,SHIFT: above 0, and between -1 and 1, not '" + text +
+                           "'.");
+                o.eye_distance = *distance;
+                o.eye_shift = *shift;
+            },
+            "For both eyes at once, so far apart, which look the same way; SHIFT: by how many halves of a window each "
+            "eye's is shifted outward, as in a headset (default: 0). Pictures are side by side")
+        ->type_name("METRES[,SHIFT]");
+    mark(group, two_eyes);
 }
 
 void Setup::add_display() {

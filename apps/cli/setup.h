@@ -24,6 +24,7 @@ public:
         skip_bad = 128,
         cache = 256,                                                         // --no-cache
         scenes = 512,                                                        // --as: the verb takes scenes
+        two_eyes = 1024,                                                     // --eyes
         model = display | observer | csf | light | files | skip_bad | cache, // of all verbs that look at a model
     };
 

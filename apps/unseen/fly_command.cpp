@@ -297,7 +297,7 @@ Command fly_command(CLI::App& app, Setup& setup) {
     add_geomorph_option(*verb, o.geomorph_seconds, rules);
     add_what_options(*verb, o.what, rules);
     add_moving_gaze_options(*verb, o.gaze, false, rules);
-    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
+    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::two_eyes | Setup::model | Setup::scenes);
     verb->callback([&o, samples = verb->get_option("--samples")] {
         if (samples->empty() && o.judges_changes) o.draw.samples = samples_to_judge;
         if (o.pictures.empty()) return;

@@ -31,11 +31,11 @@ Result<session::Simplification> checked(const WhatOptions& what, session::Sessio
 Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
                                             const vdtree::View& view, const session::Request& request,
                                             const render::Context* context) {
-    const bool is_summed =
-        session::goes_by_sum(request) && request.purpose == session::Purpose::picture && !view.orthographic_height;
+    const bool is_summed = session::goes_by_sum(request) && request.purpose == session::Purpose::picture &&
+                           !view.orthographic_height && view.eye_distance == 0;
     const bool is_by_picture = what.hiding == Hiding::picture || is_summed || what.is_checked;
-    const bool is_by_sides = !is_by_picture && session::goes_by_sum(request) && !request.milliseconds &&
-                             request.goal.kind == session::Goal::Kind::budget;
+    const bool is_by_sides = !is_by_picture && view.eye_distance == 0 && session::goes_by_sum(request) &&
+                             !request.milliseconds && request.goal.kind == session::Goal::Kind::budget;
     if (!is_by_picture && !is_by_sides) return session.simplify(view, request);
     std::optional<render::Context> own;
     if (!context) {

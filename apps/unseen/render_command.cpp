@@ -107,6 +107,7 @@ std::vector<Rule> render_rules() {
         {"--show contrast", Rule::excludes, {"--lights"}, "the map is of the mesh's own light"},
         {"--show eccentricity", Rule::needs_one_of, {"--gaze", "--gaze-mode"}, "without a gaze all of it is foveal"},
         {"--show", Rule::excludes, {"--wireframe", "--samples"}, "a map of folds has neither edges nor samples"},
+        {"--show", Rule::excludes, {"--eyes"}, "a map is of one view"},
         {"--gaze", Rule::excludes, {"--gaze-mode"}},
         {"--tracker", Rule::needs_one_of, {"--gaze", "--gaze-mode"}}};
 }
@@ -134,14 +135,16 @@ Command render_command(CLI::App& app, Setup& setup) {
     add_what_options(*verb, a->what, rules);
     add_hiding_option(*verb, a->what, rules);
     CLI::Option* visibility = verb->get_option("--visibility");
-    visibility->description(visibility->get_description() + "; default: picture, in orthographic views spheres");
+    visibility->description(visibility->get_description() +
+                            "; default: picture; spheres in orthographic views and for two eyes");
     add_check_options(*verb, a->what, rules);
     add_choice<GazeSource, GazeSource>(*verb, "--gaze-mode", a->gaze.source, {{"head", GazeSource::head}},
                                        "head: no tracker; the viewer looks within 15 degrees of the middle");
     add_tracker_option(*verb, a->gaze, false);
-    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
+    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::two_eyes | Setup::model | Setup::scenes);
     verb->callback([a, visibility, samples = verb->get_option("--samples")] {
-        if (visibility->empty() && !a->view.is_orthographic) a->what.hiding = Hiding::picture;
+        const bool is_of_one_picture = !a->view.is_orthographic && a->view.eye_distance == 0;
+        if (visibility->empty() && is_of_one_picture) a->what.hiding = Hiding::picture;
         if (a->map && !is_for_people(a->out)) refuse("--show draws pictures for people: -o must end in .png.");
         // With fewer, an outline that moves by a fiftieth of a pixel changes a whole sample of some pixel: by more than
         // can be seen.
@@ -151,6 +154,7 @@ Command render_command(CLI::App& app, Setup& setup) {
                  "  unseen render bunny.vdt -o full.pfm --full --size 1024\n"
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
                  "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
+                 "  unseen render bunny.vdt -o pair.png --eyes 0.063 --triangles 20k\n"
                  "  unseen render part.stl -o front.png --orthographic fit --direction 0 -1 0 --up 0 0 1\n"
                  "  unseen render museum.glb -o museum.png --json -\n"
                  "  unseen render dragon.vdt -o lit.png --lights lights.json --setup lab.json");

@@ -112,7 +112,7 @@ Command simplify_command(CLI::App& app, Setup& setup) {
     add_what_options(*verb, a->what, rules);
     add_hiding_option(*verb, a->what, rules);
     add_check_options(*verb, a->what, rules);
-    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::model | Setup::scenes);
+    setup.act_in(*verb, Setup::view | Setup::parallel | Setup::two_eyes | Setup::model | Setup::scenes);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"

@@ -163,7 +163,7 @@ namespace {
 
 Result<void> check_draw(std::span<const Item> items, const Camera& camera, const Target::Impl& target, int attachment) {
     const vdtree::View& view = camera.view;
-    if (auto valid = vdtree::validate(view); !valid) return valid;
+    if (auto valid = vdtree::validate_one_eye(view, "A picture"); !valid) return valid;
     if (camera.near_plane)
         if (auto valid = vdtree::validate_perspective(view, "A near plane of one's own"); !valid) return valid;
     if (camera.tile) {

@@ -448,6 +448,45 @@ TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
                 fails(1, HasSubstr("needs a perspective view")));
 }
 
+// Of the whole model: what the eyes see, beside each other.
+TEST_F(RenderCommandTest, TwoEyesShareACut) {
+    const Words from = {"--eye", "0", "0", "3", "--target", "0", "0", "0", "--full"};
+    render(joined(from, {"--eyes", "0.2,-0.1"}), "pair.pfm");
+    const auto pair = read_image(path("pair.pfm"));
+    ASSERT_TRUE(pair);
+    ASSERT_EQ(pair->image.width, 400);
+    ASSERT_EQ(pair->image.height, 160);
+    const auto first_lit = [&](int from_x) { // column of the eye's own window
+        for (int x = 0; x < 200; ++x)
+            if (std::abs(pair->image.at(from_x + x, 80) - 20) > 0.1f) return x;
+        return -1;
+    };
+    // The ball lies to the right of the left eye and to the left of the right one; windows inward bring them together.
+    const int left = first_lit(0), right = first_lit(200);
+    EXPECT_GT(left, right + 2);
+    render(joined({"--eye", "-0.1", "0", "3", "--target", "-0.1", "0", "0", "--full"}, {}), "left.pfm");
+    const auto one = read_image(path("left.pfm"));
+    ASSERT_TRUE(one);
+    constexpr int shift = 10; // a tenth of half of the window
+    for (int x = 30; x < 170; ++x) ASSERT_NEAR(pair->image.at(x - shift, 80), one->image.at(x, 80), 2e-2) << x;
+
+    const double both = render({"--eyes", "0.5"}, "both.png")["triangles"],
+                 single = render({"--visibility", "spheres"}, "single.png")["triangles"];
+    EXPECT_GE(both, single);
+    EXPECT_LT(both, ball_triangles);
+    EXPECT_THAT(succeed({"fly", "ball.vdt", "--path", "orbit:30", "--eyes", "0.063", "--csv", "turn.csv"}).out,
+                HasSubstr("12 frames"));
+    for (const auto& [words, complaint] :
+         {std::pair<Words, std::string>{{"--eyes", "0"}, "must be METRES or METRES,SHIFT"},
+          {{"--eyes", "0.06,2"}, "must be METRES or METRES,SHIFT"},
+          {{"--eyes", "0.06", "--checked"}, "pictures of one eye"},
+          {{"--eyes", "0.06", "--orthographic", "fit"}, "no two eyes"}})
+        EXPECT_THAT(run(joined({"render", "ball.vdt", "-o", "none.png"}, words)), fails(2, HasSubstr(complaint)));
+    EXPECT_THAT(run({"simplify", "ball.vdt", "-o", "n.ply", "--eyes", "0.06", "--visibility", "picture"}),
+                fails(1, HasSubstr("is of one eye")));
+    EXPECT_THAT(run({"view", "ball.vdt", "--eyes", "0.06"}), fails(2, HasSubstr("does not act in")));
+}
+
 TEST_F(RenderCommandTest, AnEyeInsideIsValid) { render({"--eye", "0", "0", "0.1"}, "inside.png"); }
 
 TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {

@@ -34,7 +34,7 @@ int change(Question& q, int number) {
     const auto set = [&](auto& field, const auto& value) {
         if (count++ == number) field = value;
     };
-    auto& [eye, target, up, fov_y_degrees, width, height, shift, orthographic_height] = q.view;
+    auto& [eye, target, up, fov_y_degrees, width, height, shift, eye_distance, orthographic_height] = q.view;
     set(eye, glm::dvec3(0.3, 0.2, 4));
     set(target, glm::dvec3(0.4, 0, 0));
     set(up, glm::dvec3(1, 1, 0));
@@ -42,6 +42,7 @@ int change(Question& q, int number) {
     set(width, 300);
     set(height, 150);
     set(shift, glm::dvec2(0.3, -0.2));
+    set(eye_distance, 0.3);
     set(orthographic_height, 3.0);
     set(orthographic_height, 30.0);
 

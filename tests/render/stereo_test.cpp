@@ -22,21 +22,25 @@ TEST(Stereo, OneCutForBothEyesIsUnseenByEither) {
     for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = 320, .count = 4, .far_fill = 0.3})) {
         const vdtree::CameraFrame frame = vdtree::camera_frame(look.view);
         const double apart = 0.063, screen = glm::length(look.view.eye - look.view.target); // world units
-        View eyes[2] = {look.view, look.view};
+        View pair = look.view;
+        pair.eye_distance = apart;
+        pair.shift.x = 0.5 * apart / screen / frame.half_window.x;
+        const std::array<View, 2> eyes = vdtree::eyes_of(pair);
         for (int i = 0; i < 2; ++i) {
             const double aside = (i == 0 ? -0.5 : 0.5) * apart;
-            eyes[i].eye += aside * frame.right;
-            eyes[i].target += aside * frame.right;
-            eyes[i].shift.x = -aside / screen / frame.half_window.x;
+            ASSERT_EQ(eyes[i].eye, look.view.eye + aside * frame.right);
+            ASSERT_EQ(eyes[i].target, look.view.target + aside * frame.right);
+            ASSERT_DOUBLE_EQ(eyes[i].shift.x, -aside / screen / frame.half_window.x);
         }
         perception::FoldTestOptions options = look.options;
         options.gaze_px = {};
         const auto criterion = require(perception::error_distances(tree, eyes[0], options));
-        const auto viewpoint = require(vdtree::viewpoint_of_pair(tree, eyes[0], eyes[1]));
+        const vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, pair, options);
+        ASSERT_EQ(viewpoint.frusta.size(), 2u);
         const vdtree::FollowOptions follow{.cull_back_faces = true};
         Cut whole(tree), both(tree);
         whole.unfold_all();
-        ASSERT_TRUE(both.follow(*criterion, *viewpoint, follow));
+        ASSERT_TRUE(both.follow(*criterion, viewpoint, follow));
         EXPECT_LT(both.triangle_count(), whole.triangle_count());
         for (const View& eye : eyes) {
             Cut one(tree);

@@ -157,9 +157,12 @@ private:
             auto recipe = make_recipe(sight, decision);
             if (!recipe) return recipe.error();
             // What comes into the window shall not glide there any more.
-            if (glide_s_ && !recipe->viewpoint.frusta.empty())
-                recipe->viewpoint.frusta = {
-                    vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
+            if (glide_s_ && !recipe->viewpoint.frusta.empty()) {
+                recipe->viewpoint.frusta.clear();
+                for (const vdtree::View& eye : vdtree::eyes_of(sight.view))
+                    recipe->viewpoint.frusta.push_back(
+                        vdtree::frustum_of(sight.object.tree, widened(eye), sight.object.placement));
+            }
             object.recipe = std::move(*recipe);
             object.stats_out_of_sight.reset();
         }

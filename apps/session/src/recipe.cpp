@@ -15,9 +15,12 @@ namespace {
 
 bool is_wholly_in_window(const Sight& sight) {
     const vdtree::Sphere sphere = sight.object.tree.bounding_sphere();
-    const vdtree::Frustum frustum = vdtree::frustum_of(sight.object.tree, sight.view, sight.object.placement);
-    return std::all_of(frustum.begin(), frustum.end(), [&](const vdtree::Plane& plane) {
-        return glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset > static_cast<double>(sphere.radius);
+    return std::ranges::all_of(vdtree::eyes_of(sight.view), [&](const vdtree::View& eye) {
+        return std::ranges::all_of(vdtree::frustum_of(sight.object.tree, eye, sight.object.placement),
+                                   [&](const vdtree::Plane& plane) {
+                                       return glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset >
+                                              static_cast<double>(sphere.radius);
+                                   });
     });
 }
 

@@ -33,7 +33,9 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
 // Around the eye. In perspective the planes go through it, and their offsets are 0.
 std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
     std::vector<vdtree::Plane> planes;
-    for (const glm::dvec3& inward : vdtree::inward_of_window(view)) {
+    std::vector<glm::dvec3> all = vdtree::inward_of_window(view);
+    if (view.eye_distance != 0) all = {all[0], all[3], all[4]}; // what both eyes have in common: not the sides
+    for (const glm::dvec3& inward : all) {
         const double half_up = view.orthographic_height.value_or(0) / 2,
                      half_right = half_up * view.width / view.height;
         if (view.orthographic_height) planes.push_back({inward, planes.size() < 2 ? half_right : half_up});
@@ -82,7 +84,8 @@ bool is_in_sight(const WorldSphere& sphere, const vdtree::View& view) {
 }
 
 bool is_around_eye(const WorldSphere& sphere, const vdtree::View& view) {
-    return !view.orthographic_height && !(glm::length(view.eye - sphere.centre) > sphere.radius);
+    return !view.orthographic_height &&
+           !(glm::length(view.eye - sphere.centre) > sphere.radius + view.eye_distance / 2);
 }
 
 WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
@@ -297,9 +300,9 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view, Shadow
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         auto lit = lighting(view, i);
         if (!lit) return lit.error();
-        if (view.orthographic_height && *lit && vdtree::shadow_lights(**lit) > 0)
-            return unsupported("Where shadows are seen is not known of orthographic views: switch them off, or look "
-                               "at the scene in perspective.");
+        if ((view.orthographic_height || view.eye_distance != 0) && *lit && vdtree::shadow_lights(**lit) > 0)
+            return unsupported("Where shadows are seen is not known of orthographic views, and of those of two eyes: "
+                               "switch them off, or look at the scene in perspective with one eye.");
         LitStretch* const stretch = *lit ? stretch_of(view, i) : nullptr;
         if (*lit && !caches[i]->light_bounds) {
             auto bounds = vdtree::LightBounds::measure(scene.objects[i].tree);

@@ -32,6 +32,17 @@ WholeSphere whole_sphere(const VertexTree& tree) {
     return all;
 }
 
+// Midway between the eyes of two viewpoints, with half of their distance as spread.
+Viewpoint between(const Viewpoint& a, const Viewpoint& b) {
+    Viewpoint both = a;
+    both.eye = a.eye + (b.eye - a.eye) * 0.5;
+    constexpr double rounding = 1e-12; // of the middle and the distance, in doubles
+    both.eye_spread = glm::length(b.eye - a.eye) * 0.5 + rounding * (glm::length(a.eye) + glm::length(b.eye)) +
+                      std::max(a.eye_spread, b.eye_spread);
+    both.frusta.insert(both.frusta.end(), b.frusta.begin(), b.frusta.end());
+    return both;
+}
+
 glm::dvec3 back_in_tree(const View& view, const Similarity& placement) {
     return glm::normalize(placement.direction_to_mesh(camera_frame(view).back));
 }
@@ -74,6 +85,11 @@ Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& p
 }
 
 Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement, bool window_only) {
+    if (view.eye_distance != 0) {
+        const auto [left, right] = eyes_of(view);
+        return between(viewpoint_of(tree, left, placement, window_only),
+                       viewpoint_of(tree, right, placement, window_only));
+    }
     Viewpoint viewpoint;
     viewpoint.eye = eye_in_tree(tree, view, placement);
     if (view.orthographic_height) {
@@ -90,20 +106,12 @@ Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarit
 Result<Viewpoint> viewpoint_of_pair(const VertexTree& tree, const View& left, const View& right,
                                     const Similarity& placement, bool window_only) {
     for (const View* view : {&left, &right})
-        if (const auto valid = validate(*view); !valid) return valid.error();
+        if (const auto valid = validate_one_eye(*view, "Each view of a pair"); !valid) return valid.error();
     if (left.orthographic_height.has_value() != right.orthographic_height.has_value())
         return invalid_argument("Of a stereo pair both views must be orthographic, or none.");
     if (left.orthographic_height && *left.orthographic_height != *right.orthographic_height)
         return invalid_argument("The orthographic views of a stereo pair must be equally high.");
-    const Viewpoint a = viewpoint_of(tree, left, placement, window_only),
-                    b = viewpoint_of(tree, right, placement, window_only);
-    Viewpoint both = a;
-    both.eye = a.eye + (b.eye - a.eye) * 0.5;
-    constexpr double rounding = 1e-12; // of the middle and the distance, in doubles
-    both.eye_spread = glm::length(b.eye - a.eye) * 0.5 + rounding * (glm::length(a.eye) + glm::length(b.eye)) +
-                      std::max(a.eye_spread, b.eye_spread);
-    both.frusta.insert(both.frusta.end(), b.frusta.begin(), b.frusta.end());
-    return both;
+    return between(viewpoint_of(tree, left, placement, window_only), viewpoint_of(tree, right, placement, window_only));
 }
 
 } // namespace unseen::vdtree

@@ -134,7 +134,10 @@ Result<void> validate(const View& view) {
             return invalid_argument("The height of an orthographic view must be above 0 and finite.");
         if (view.shift != glm::dvec2(0))
             return invalid_argument("An orthographic view has no shift; move its eye and target instead.");
+        if (view.eye_distance != 0) return invalid_argument("An orthographic view has no two eyes.");
     }
+    if (!(view.eye_distance >= 0) || !std::isfinite(view.eye_distance))
+        return invalid_argument("The distance of a pair of eyes must be 0 or more and finite.");
     if (view.width < 1 || view.height < 1 || view.width > largest_window_px || view.height > largest_window_px)
         return invalid_argument("The window must have 1 to " + std::to_string(largest_window_px) +
                                 " pixels a side, not " + std::to_string(view.width) + "x" +
@@ -142,10 +145,27 @@ Result<void> validate(const View& view) {
     return {};
 }
 
+Result<void> validate_one_eye(const View& view, const char* what) {
+    if (view.eye_distance != 0)
+        return invalid_argument(std::string(what) + " is of one eye, and this view is a stereo pair's.");
+    return validate(view);
+}
+
 Result<void> validate_perspective(const View& view, const char* what) {
     if (view.orthographic_height)
         return invalid_argument(std::string(what) + " needs a perspective view, and this one is orthographic.");
-    return validate(view);
+    return validate_one_eye(view, what);
+}
+
+std::array<View, 2> eyes_of(const View& view) {
+    View left = view, right = view;
+    left.eye_distance = right.eye_distance = 0;
+    if (view.eye_distance == 0) return {left, right};
+    const glm::dvec3 to_right = camera_frame(view).right * (view.eye_distance / 2);
+    left.eye -= to_right, left.target -= to_right;
+    right.eye += to_right, right.target += to_right;
+    right.shift.x = -view.shift.x;
+    return {left, right};
 }
 
 glm::dvec2 axis_px(const View& view) {

@@ -26,6 +26,27 @@ std::vector<vdtree::Cut> whole_cuts(const Session& session) {
     return whole;
 }
 
+namespace {
+
+render::Frame side_by_side(const render::Frame& left, const render::Frame& right) {
+    render::Frame both;
+    both.width = 2 * left.width, both.height = left.height;
+    both.draw_ms = left.draw_ms + right.draw_ms;
+    const auto join = [&](std::vector<float> render::Frame::*values) {
+        const std::size_t row = (left.*values).size() / static_cast<std::size_t>(left.height);
+        for (std::size_t begin = 0; begin < (left.*values).size(); begin += row)
+            for (const render::Frame* eye : {&left, &right}) {
+                const auto first = (eye->*values).begin() + static_cast<std::ptrdiff_t>(begin);
+                (both.*values).insert((both.*values).end(), first, first + static_cast<std::ptrdiff_t>(row));
+            }
+    };
+    join(&render::Frame::luminance);
+    join(&render::Frame::colour);
+    return both;
+}
+
+} // namespace
+
 struct SceneRenderer::Impl {
     render::Context context;
     Session session;
@@ -97,8 +118,15 @@ Result<render::Frame> SceneRenderer::draw(std::span<const DrawnCut> cuts, const 
     if (auto valid = vdtree::validate(view); !valid) return valid.error();
     const auto items = impl_->items(cuts, view, options);
     if (!items) return items.error();
-    return render::draw_frame(impl_->sum, impl_->context, items->items, view,
-                              {options.samples, options.seed, options.background, items->shadows});
+    const auto drawn = [&](const vdtree::View& eye) {
+        return render::draw_frame(impl_->sum, impl_->context, items->items, eye,
+                                  {options.samples, options.seed, options.background, items->shadows});
+    };
+    const auto [left, right] = vdtree::eyes_of(view);
+    auto frame = drawn(left);
+    if (!frame || view.eye_distance == 0) return frame;
+    const auto other = drawn(right);
+    return other ? side_by_side(*frame, *other) : other;
 }
 
 Result<void> SceneRenderer::draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,

@@ -126,7 +126,7 @@ struct Plane {
 // The convex region that a view shows, or the light of a shadow: inside of all planes.
 using Frustum = std::vector<Plane>;
 
-// The eye's plane and the window's four sides; no far plane. An orthographic view has the four sides only.
+// The eye's plane and the window's four sides; no far plane. An orthographic view has the four sides only. Of one eye.
 Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement = {});
 
 // The eye that a cut is made for, in the tree's frame (relative to its origin, mesh units).
@@ -146,7 +146,8 @@ struct Viewpoint {
 // The viewpoint of a view; if `window_only`, nodes outside the window fold.
 //
 // An orthographic view is replaced by eyes 2000 window heights away from the tree's far side, spread over the whole tree:
-// nothing counts as smaller than it is drawn, or as facing the eyes unless it does.
+// nothing counts as smaller than it is drawn, or as facing the eyes unless it does. A view of two eyes becomes what
+// viewpoint_of_pair() makes of them.
 Viewpoint viewpoint_of(const VertexTree& tree, const View& view, const Similarity& placement = {},
                        bool window_only = true);
 // One viewpoint for both views of a stereo pair: midway between their eyes, with half of their distance as spread. Make the

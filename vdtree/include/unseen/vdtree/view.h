@@ -1,6 +1,7 @@
 // Placements of trees in the world, and views of it.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include <glm/gtc/quaternion.hpp>
@@ -34,6 +35,10 @@ struct View {
     // Offset of the window's middle from the line of sight, in halves of the window, right and up. Not 0 for one eye of a
     // headset, or for a wall seen at an angle. The field of view is that of the centred window.
     glm::dvec2 shift = {0, 0};
+    // World units; not 0: of a stereo pair, midway between both eyes, which look the same way. The shift is the left eye's,
+    // and the right one's is mirrored; so is a place in the window the left eye's. Cuts are made for both eyes at once,
+    // and pictures are of one: see eyes_of().
+    double eye_distance = 0;
     // Makes the view orthographic: world units from the window's bottom to its top, in place of the field of view.
     std::optional<double> orthographic_height = {};
 
@@ -49,10 +54,15 @@ Result<View> view_from_matrices(const glm::dmat4& view_from_world, const glm::dm
                                 int height);
 
 // Values must be finite, the eye apart from the target, `up` not along the line of sight, the field in (0, 180), the window
-// 1 to 32768 pixels a side, and the view not both orthographic and shifted.
+// 1 to 32768 pixels a side, and the view not both orthographic and shifted, or of two eyes.
 Result<void> validate(const View& view);
-// The same, and the view must be perspective. `what` is the subject of the error's sentence, such as "A depth picture".
+// The same, and the view must be of one eye, or in perspective besides. `what` is the subject of the error's sentence, such
+// as "A depth picture".
+Result<void> validate_one_eye(const View& view, const char* what);
 Result<void> validate_perspective(const View& view, const char* what);
+
+// The left and the right view of a stereo pair; of a view with one eye, twice the same.
+std::array<View, 2> eyes_of(const View& view);
 
 // The point of the window on the line of sight, in pixels from the top left.
 glm::dvec2 axis_px(const View& view);

@@ -34,7 +34,8 @@ public:
     SceneRenderer(SceneRenderer&&) noexcept = default;
     SceneRenderer& operator=(SceneRenderer&&) noexcept = default;
 
-    // `cuts`: by object. The lighting of the options is ignored: the session knows how each object is lit.
+    // `cuts`: by object. The lighting of the options is ignored: the session knows how each object is lit. A view of two
+    // eyes gives two pictures side by side, the left eye's on the left.
     Result<render::Frame> draw(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                const render::DrawOptions& options);
     Result<void> draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,
