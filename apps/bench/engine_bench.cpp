@@ -12,6 +12,7 @@
 #include <unseen/meshio/mesh_file.h>
 #include <unseen/perception/criterion.h>
 #include <unseen/perception/fold_measurement.h>
+#include <unseen/vdtree/active_triangles.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/tree_io.h>
 
@@ -173,6 +174,9 @@ public:
     vdtree::AdjustStats follow(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint) const {
         return follow(cut, viewpoint, with_threshold(threshold));
     }
+    vdtree::AdjustStats follow_only(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint) const {
+        return require(cut.follow(*criterion_, viewpoint, with_threshold(threshold)));
+    }
     static vdtree::FollowOptions with_threshold(float threshold) {
         vdtree::FollowOptions options;
         options.threshold = threshold;
@@ -236,25 +240,40 @@ double machine_ms() {
            });
 }
 
-struct OrbitFigures {
-    double median_us = 0, us_of_99 = 0, changes = 0, tests = 0, triangles = 0, writes = 0;
+// What is made of a cut for drawing it.
+enum class Form {
+    gpu,         // what the renderer asks for in frames that follow each other
+    index_buffer // for others
 };
 
-OrbitFigures measure_orbit(const Subject& subject, double step, int frames) {
+struct OrbitFigures {
+    double median_us = 0, us_of_99 = 0, changes = 0, tests = 0, triangles = 0, gpu_writes = 0; // of 16 bytes
+};
+
+OrbitFigures measure_orbit(const Subject& subject, double step, int frames, Form form = Form::gpu) {
     vdtree::Cut cut(subject.tree);
+    vdtree::ActiveTriangles active(subject.tree);
     constexpr int warm_up = 5; // the cut is made, and patching begins
     std::vector<double> microseconds, changes, tests, triangles, writes;
     for (int frame = 0; frame < frames + warm_up; ++frame) {
         const vdtree::Viewpoint viewpoint = subject.at(frame * step);
         vdtree::AdjustStats stats;
-        const double seconds = seconds_of([&] { stats = subject.follow(cut, viewpoint); });
+        bool is_known = true;
+        const double seconds = seconds_of([&] {
+            if (form == Form::index_buffer) {
+                stats = subject.follow(cut, viewpoint);
+                return;
+            }
+            stats = subject.follow_only(cut, viewpoint);
+            is_known = active.update(cut);
+        });
         if (frame < warm_up) continue;
         microseconds.push_back(seconds * 1e6);
         changes.push_back(static_cast<double>(stats.folds + stats.unfolds));
         tests.push_back(static_cast<double>(stats.node_tests));
         triangles.push_back(stats.triangles);
-        const auto written = cut.index_writes();
-        writes.push_back(static_cast<double>(written ? written->size() : cut.indices().size()));
+        writes.push_back(static_cast<double>(is_known ? active.changed_slots().size() + active.changed_runs().size()
+                                                      : active.leaves_at_corners().size()));
     }
     return {median(microseconds), quantile(microseconds, 0.99), median(changes), median(tests), median(triangles),
             median(writes)};
@@ -262,7 +281,7 @@ OrbitFigures measure_orbit(const Subject& subject, double step, int frames) {
 
 Json to_json(const OrbitFigures& f) {
     return {{"median_us", f.median_us}, {"us_of_99_percent", f.us_of_99}, {"changes", f.changes},
-            {"node_tests", f.tests},    {"triangles", f.triangles},       {"index_writes", f.writes}};
+            {"node_tests", f.tests},    {"triangles", f.triangles},       {"gpu_writes", f.gpu_writes}};
 }
 
 double still_us(const Subject& subject, int batches) {
@@ -419,15 +438,20 @@ private:
             return twice;
         };
         add_all(aside, gazing, add_all("", users, {10, 40, 150}));
+        for (const double step : orbit_steps)
+            add_orbit("with an index buffer, ", users, measure_orbit(users, step, frames_, Form::index_buffer), step,
+                      {});
         add_all("imperceptible, " + aside, gazing_imperceptible,
                 add_all("imperceptible, ", imperceptible, {50, 300, 1200}));
     }
 
-    void add_orbit(const std::string& name, const Subject& of, const OrbitFigures& f, double step, double target) {
+    void add_orbit(const std::string& name, const Subject& of, const OrbitFigures& f, double step,
+                   std::optional<double> target) {
         add(name + shortest(step) + " degrees a frame", "us", f.median_us, 1, target,
             rounded(f.triangles, 6) + " active triangles, folds cost up to " +
                 rounded(static_cast<double>(of.threshold), 4) + "; " + rounded(f.changes, 4) + " changes, " +
-                rounded(f.tests, 4) + " tests and " + rounded(f.writes, 4) + " writes to the index buffer a frame");
+                rounded(f.tests, 4) + " tests" +
+                (f.gpu_writes > 0 ? " and " + rounded(f.gpu_writes, 4) + " writes for the GPU" : "") + " a frame");
     }
 
     void add_jumps(const Subject& users, const Subject& gazing, const Json& json, const Json* far) {

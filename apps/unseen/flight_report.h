@@ -19,8 +19,8 @@ inline constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
 // One frame. Times in milliseconds of the wall clock.
 struct FrameRecord {
     vdtree::AdjustStats stats;
-    double cut_ms = 0,
-           index_ms = 0; // the cut with its patches, and gathering the index buffer where patches did not do
+    double cut_ms = 0;
+    double index_ms = 0; // for the index buffer, where nothing is drawn
     double draw_ms = not_drawn, frame_ms = 0;
     double uploaded_bytes = not_drawn;
     double drawn_triangles = not_drawn, gliding = not_drawn;                   // of geomorphs

@@ -93,6 +93,8 @@ public:
             if (!pictures.are_wanted()) continue;
             if (auto written = pictures.write_next(session::code_image(*frame, display())); !written) return written;
         }
+        if (const std::string why = *drawing ? (*drawing)->renderer.why_whole() : std::string(); !why.empty())
+            print_note("whole index buffers were uploaded: " + why);
         return {};
     }
 
@@ -135,7 +137,6 @@ private:
         FrameRecord record;
         record.stats = last_.stats;
         record.cut_ms = last_.adapt_ms;
-        record.index_ms = last_.extract_ms;
         if (last_.drawn_triangles) {
             record.drawn_triangles = *last_.drawn_triangles;
             record.gliding = static_cast<double>(last_.gliding);
@@ -147,6 +148,11 @@ private:
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
             record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
+        } else { // what draws makes indices of its own
+            const auto followed = vdtree::Clock::now();
+            for (const session::DrawnCut& drawn : session::drawn_cuts(follower_, session_.scene().objects.size()))
+                static_cast<void>((drawn.geomorph ? drawn.geomorph->drawn() : *drawn.cut).indices());
+            record.index_ms = vdtree::ms_since(followed);
         }
         record.frame_ms = vdtree::ms_since(start);
         if (changes_) {

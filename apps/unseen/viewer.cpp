@@ -149,6 +149,8 @@ public:
             if (!message_.empty() && Clock::now() > message_end_) say({});
         }
         glfwHideWindow(window_);
+        if (const std::string why = renderer_.why_whole(); !why.empty())
+            print_note("whole index buffers were uploaded: " + why);
         return options_.screenshot.empty() ? Result<void>() : save_picture(options_.screenshot);
     }
 

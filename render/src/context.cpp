@@ -82,6 +82,8 @@ Result<Context> Context::take(std::unique_ptr<Platform> platform) {
     impl->platform = std::move(platform);
     impl->version = gl_text(GL_VERSION);
     impl->renderer_name = gl_text(GL_RENDERER);
+    const auto draws = [&](const char* renderer) { return impl->renderer_name.find(renderer) != std::string::npos; };
+    impl->makes_indices = !draws("llvmpipe") && !draws("softpipe") && !draws("SwiftShader");
     if (auto enough = check_version(impl->version); !enough) return enough.error();
     // Debug output of others stays theirs.
     if (!impl->platform->is_foreign()) impl->errors.attach();

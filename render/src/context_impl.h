@@ -71,6 +71,9 @@ struct Context::Impl {
     std::unique_ptr<Platform> platform;
     std::string renderer_name;
     std::string version;
+    // Whether the GPU makes index buffers from what changes of cuts. Where the processor draws, bringing them there as a
+    // whole takes less.
+    bool makes_indices = true;
     Programs programs;
 
     Impl() = default;

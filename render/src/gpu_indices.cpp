@@ -1,21 +1,35 @@
 #include "gpu_indices.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "shaders.h"
 
 namespace unseen::render {
 namespace {
 
-constexpr std::uint64_t index_bytes = sizeof(std::uint32_t);
-constexpr GLuint64 wait_ns = 1'000'000'000; // a turn of waiting for the GPU; it repeats
-constexpr GLuint writes_binding = 0, window_binding = 1;
-constexpr int write_count_location = 0, window_first_location = 1, window_size_location = 2;
+constexpr std::uint64_t index_bytes = sizeof(std::uint32_t), triangle_bytes = sizeof(vdtree::Triangle);
+// Of change_cut.comp and index_cut.comp.
+constexpr GLuint changes_binding = 0, corners_binding = 1, wedges_binding = 2, indices_binding = 3;
+constexpr int count_location = 0;
+struct Change {
+    std::uint32_t values[4];
+};
+constexpr std::uint32_t is_run = 0xffffffffu;
+constexpr vdtree::Index leaves_a_change = 64; // a thread writes at most as many
 
-void wait_for(GLsync fence) {
-    GLenum state = GL_TIMEOUT_EXPIRED;
-    while (state == GL_TIMEOUT_EXPIRED) state = glClientWaitSync(fence, GL_SYNC_FLUSH_COMMANDS_BIT, wait_ns);
+// Smaller cuts take less time as a whole than two passes do.
+constexpr vdtree::Index least_followed = 4096; // triangles
+// Where a larger share of the nodes changes, everything is listed and uploaded anew anyway.
+constexpr std::uint64_t triangles_per_change = 20;
+
+// False where the memory does not suffice.
+bool store(const Buffer& buffer, std::uint64_t bytes, const void* data) {
+    glNamedBufferData(buffer.id(), static_cast<GLsizeiptr>(bytes), data, GL_STREAM_DRAW);
+    return glGetError() != GL_OUT_OF_MEMORY;
+}
+
+Error no_room(std::string_view what) {
+    return {ErrorCode::unsupported, "The graphics driver gives " + std::string(what)};
 }
 
 } // namespace
@@ -32,97 +46,47 @@ void draw_triangles(const Program& program, const VertexArray& arrays, const Gpu
     glBindVertexArray(0);
 }
 
-std::uint64_t elements_in_a_window(std::uint64_t element_bytes) {
-    GLint64 most_bytes = 0;
-    GLint alignment = 1;
-    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most_bytes);
-    glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
-    const auto step = std::lcm(static_cast<std::uint64_t>(std::max(alignment, 1)), element_bytes);
-    return static_cast<std::uint64_t>(most_bytes) / step * step / element_bytes;
-}
-
-void run_on_windows(const Program& program, std::size_t count, unsigned buffer, std::uint64_t size,
-                    std::uint64_t element_bytes, std::uint64_t window) {
-    constexpr unsigned group_size = 64; // of patch.comp and move.comp
-    program.set(write_count_location, static_cast<unsigned>(count));
-    program.use();
-    for (std::uint64_t first = 0; first < size; first += window) {
-        const std::uint64_t in_window = std::min(window, size - first);
-        program.set(window_first_location, static_cast<unsigned>(first));
-        program.set(window_size_location, static_cast<unsigned>(in_window));
-        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, buffer,
-                          static_cast<GLintptr>(first * element_bytes),
-                          static_cast<GLsizeiptr>(in_window * element_bytes));
-        glDispatchCompute(static_cast<GLuint>((count + group_size - 1) / group_size), 1, 1);
-    }
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, window_binding, 0);
-}
-
-Result<void> GpuIndices::prepare_patching() {
-    if (patch_) return {};
-    const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::patch_comp}};
-    const auto patch = programs_->named("patch indices", source);
-    if (!patch) return patch.error();
-    patch_ = *patch;
-    window_indices_ = elements_in_a_window(index_bytes);
-    constexpr GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-    constexpr auto bytes = static_cast<GLsizeiptr>(part_count * part_writes * sizeof(Write));
-    staging_ = Buffer::create("changes of triangles");
-    glNamedBufferStorage(staging_.id(), bytes, nullptr, access);
-    mapped_ = static_cast<Write*>(glMapNamedBufferRange(staging_.id(), 0, bytes, access));
-    return {};
-}
-
 Result<void> GpuIndices::update(const vdtree::Cut& cut) {
-    const auto indices = cut.indices(); // first: the rest is about what it returned
-    const std::uint64_t version = cut.index_version();
     uploaded_bytes_ = 0;
-    if (version != 0 && version == version_) return {};
+    if (cut.revision() == revision_) return {};
     ++changes_;
-    const bool follows = can_follow(cut);
-    version_ = 0; // until it is done
-    if (follows)
-        if (auto prepared = prepare_patching(); !prepared) return count_ = 0, prepared;
-    if (follows && mapped_ && window_indices_ > 0) {
-        if (auto reserved = reserve(indices.size(), true); !reserved) return reserved;
-        patch(*cut.index_writes(), indices);
-    } else if (auto uploaded = upload_all(indices); !uploaded) {
-        return uploaded;
+    const bool follows = is_worth_following(cut);
+    revision_ = 0; // until it is done
+    if (follows) {
+        if (const auto followed = follow(cut); !followed) {
+            form_.reset();
+            why_whole_ = followed.error().message;
+        }
     }
-    count_ = indices.size();
-    version_ = version;
+    if (!follows || !form_)
+        if (auto uploaded = upload_all(cut.indices()); !uploaded) return uploaded;
+    revision_ = cut.revision();
     return {};
 }
 
-// The changes lead here, and are less than the whole.
-bool GpuIndices::can_follow(const vdtree::Cut& cut) const {
-    const auto writes = cut.index_writes();
-    return version_ != 0 && writes && cut.index_writes_from() == version_ &&
-           writes->size() * sizeof(Write) < cut.indices().size_bytes();
+bool GpuIndices::is_worth_following(const vdtree::Cut& cut) const {
+    return makes_ && cut.changes_from() == revision_ && why_whole_.empty() && cut.triangle_count() >= least_followed &&
+           cut.changes().size() * triangles_per_change < cut.triangle_count();
 }
 
 // A half more than is asked for, so that cuts that grow need not move each time.
-Result<void> GpuIndices::reserve(std::uint64_t count, bool keep) {
+Result<void> GpuIndices::reserve(std::uint64_t count) {
+    count_ = 0;
     if (count <= capacity_) return {};
-    const std::uint64_t wanted = count + count / 2;
-    Buffer larger = Buffer::create("triangles");
-    glNamedBufferStorage(larger.id(), static_cast<GLsizeiptr>(wanted * index_bytes), nullptr, GL_DYNAMIC_STORAGE_BIT);
-    if (glGetError() == GL_OUT_OF_MEMORY) {
-        capacity_ = count_ = 0;
-        buffer_ = {};
-        return Error{ErrorCode::unsupported, "The graphics memory does not hold the cut's " +
-                                                 std::to_string(count / 3) + " triangles; fold more."};
-    }
-    if (keep && count_ > 0)
-        glCopyNamedBufferSubData(buffer_.id(), larger.id(), 0, 0, static_cast<GLsizeiptr>(count_ * index_bytes));
-    buffer_ = std::move(larger);
-    capacity_ = wanted;
-    return {};
+    capacity_ = count + count / 2;
+    buffer_ = Buffer::create("triangles");
+    glNamedBufferStorage(buffer_.id(), static_cast<GLsizeiptr>(capacity_ * index_bytes), nullptr,
+                         GL_DYNAMIC_STORAGE_BIT);
+    if (glGetError() != GL_OUT_OF_MEMORY) return {};
+    capacity_ = 0;
+    buffer_ = {};
+    return Error{ErrorCode::unsupported,
+                 "The graphics memory does not hold the cut's " + std::to_string(count / 3) + " triangles; fold more."};
 }
 
 Result<void> GpuIndices::upload_all(std::span<const std::uint32_t> indices) {
-    count_ = 0;
-    if (auto reserved = reserve(indices.size(), false); !reserved) return reserved;
+    if (auto reserved = reserve(indices.size()); !reserved) return reserved;
+    count_ = indices.size();
     if (indices.empty()) return {};
     glInvalidateBufferData(buffer_.id()); // so that the driver need not wait for the last frame
     glNamedBufferSubData(buffer_.id(), 0, static_cast<GLsizeiptr>(indices.size_bytes()), indices.data());
@@ -130,33 +94,96 @@ Result<void> GpuIndices::upload_all(std::span<const std::uint32_t> indices) {
     return {};
 }
 
-// A place that comes twice gets its last value both times, whichever the GPU does first. What lies beyond the end is
-// nobody's.
-void GpuIndices::patch(std::span<const vdtree::IndexWrite> writes, std::span<const std::uint32_t> indices) {
-    for (std::size_t i = 0; i < writes.size();) {
-        const std::size_t part = next_part_;
-        next_part_ = (next_part_ + 1) % part_count;
-        if (in_use_[part]) wait_for(in_use_[part].get());
-        Write* const out = mapped_ + part * part_writes;
-        std::size_t count = 0;
-        for (; i < writes.size() && count < part_writes; ++i) {
-            const std::uint32_t place = writes[i].place;
-            if (place < indices.size()) out[count++] = {place, indices[place]};
-        }
-        apply(part, count);
-        in_use_[part].reset(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0));
-        uploaded_bytes_ += count * sizeof(Write);
+Result<void> GpuIndices::follow(const vdtree::Cut& cut) {
+    if (!form_)
+        if (auto made = make_form(cut.tree()); !made) return made;
+    Form& form = *form_;
+    const bool is_known = form.triangles.update(cut);
+    const std::uint64_t count = form.triangles.leaves_at_corners().size();
+    if (auto reserved = reserve(3 * count); !reserved) return reserved;
+    GLint64 most_bytes = 0;
+    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most_bytes);
+    if (static_cast<std::uint64_t>(most_bytes) <
+        std::max(capacity_, std::uint64_t{cut.tree().leaf_count()}) * index_bytes)
+        return no_room("shaders " + std::to_string(most_bytes / 1'000'000) +
+                       " MB of a buffer, which is less than the index buffer or the tree's leaves take.");
+    if (!is_known || count > form.capacity) {
+        if (auto uploaded = upload_form(); !uploaded) return uploaded;
+    } else {
+        upload_changes();
     }
-    glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    count_ = 3 * count;
+    if (count > 0) {
+        constexpr std::uint64_t group_size = 256, most_groups = 65535; // GL promises as many
+        const auto bind = [](GLuint at, const Buffer& buffer) {
+            glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, buffer.id());
+        };
+        bind(corners_binding, form.corners);
+        bind(wedges_binding, form.wedges);
+        bind(indices_binding, buffer_);
+        form.index->set(count_location, static_cast<unsigned>(count_));
+        form.index->use();
+        glDispatchCompute(static_cast<GLuint>(std::min((count_ + group_size - 1) / group_size, most_groups)), 1, 1);
+        for (const GLuint at : {corners_binding, wedges_binding, indices_binding})
+            glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, 0);
+        glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    }
+    return {};
 }
 
-void GpuIndices::apply(std::size_t part, std::size_t writes) {
-    if (writes == 0) return;
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, writes_binding, staging_.id(),
-                      static_cast<GLintptr>(part * part_writes * sizeof(Write)),
-                      static_cast<GLsizeiptr>(writes * sizeof(Write)));
-    run_on_windows(*patch_, writes, buffer_.id(), capacity_, index_bytes, window_indices_);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, writes_binding, 0);
+Result<void> GpuIndices::make_form(const vdtree::VertexTree& tree) {
+    Form& form = form_.emplace(tree);
+    const auto program = [&](std::string_view label, std::string_view text) -> Result<const Program*> {
+        const ShaderSource source[] = {{ShaderSource::Stage::compute, text}};
+        return programs_->named(label, source);
+    };
+    const auto take_up = program("change cut", shaders::change_cut_comp);
+    if (!take_up) return take_up.error();
+    const auto index = program("index cut", shaders::index_cut_comp);
+    if (!index) return index.error();
+    form.take_up = *take_up;
+    form.index = *index;
+    form.changes = Buffer::create("changes of a cut");
+    form.corners = Buffer::create("leaves of triangles");
+    form.wedges = Buffer::create("wedges of leaves");
+    return {};
+}
+
+Result<void> GpuIndices::upload_form() {
+    Form& form = *form_;
+    const auto corners = form.triangles.leaves_at_corners();
+    const auto wedges = form.triangles.wedges_of_leaves();
+    form.capacity = corners.size() + corners.size() / 2;
+    if (!store(form.corners, form.capacity * triangle_bytes, nullptr) ||
+        !store(form.wedges, wedges.size_bytes(), wedges.data()))
+        return no_room("no memory for what a cut's index buffer is made from there.");
+    glNamedBufferSubData(form.corners.id(), 0, static_cast<GLsizeiptr>(corners.size_bytes()), corners.data());
+    uploaded_bytes_ = corners.size_bytes() + wedges.size_bytes();
+    return {};
+}
+
+void GpuIndices::upload_changes() {
+    Form& form = *form_;
+    std::vector<Change> changes;
+    const auto corners = form.triangles.leaves_at_corners();
+    for (const vdtree::Index slot : form.triangles.changed_slots())
+        changes.push_back({{slot, corners[slot][0], corners[slot][1], corners[slot][2]}});
+    for (const vdtree::LeafRun& run : form.triangles.changed_runs())
+        for (vdtree::Index done = 0; done < run.count; done += leaves_a_change)
+            changes.push_back({{run.first + done, std::min(run.count - done, leaves_a_change), run.wedge, is_run}});
+    if (changes.empty()) return;
+    uploaded_bytes_ = changes.size() * sizeof(Change);
+    // A new store each time, so that the driver need not wait for the last frame.
+    glNamedBufferData(form.changes.id(), static_cast<GLsizeiptr>(uploaded_bytes_), changes.data(), GL_STREAM_DRAW);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, changes_binding, form.changes.id());
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, corners_binding, form.corners.id());
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, wedges_binding, form.wedges.id());
+    form.take_up->set(count_location, static_cast<unsigned>(changes.size()));
+    form.take_up->use();
+    constexpr std::size_t group_size = 64;
+    glDispatchCompute(static_cast<GLuint>((changes.size() + group_size - 1) / group_size), 1, 1);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, changes_binding, 0);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
 } // namespace unseen::render

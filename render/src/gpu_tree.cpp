@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <unseen/vdtree/colour.h>
 #include <unseen/vdtree/internal/light_bounds.h>
@@ -54,6 +55,16 @@ Error too_large(const std::string& what) {
     return {ErrorCode::unsupported, "The graphics memory does not hold " + what};
 }
 
+// Shaders see a buffer through windows, which begin where a binding may begin. How many vertices one of them holds.
+std::uint64_t vertices_in_a_window() {
+    GLint64 most_bytes = 0;
+    GLint alignment = 1;
+    glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most_bytes);
+    glGetIntegerv(GL_SHADER_STORAGE_BUFFER_OFFSET_ALIGNMENT, &alignment);
+    const auto step = std::lcm(static_cast<std::uint64_t>(std::max(alignment, 1)), sizeof(Vertex));
+    return static_cast<std::uint64_t>(most_bytes) / step * step / sizeof(Vertex);
+}
+
 } // namespace
 
 Result<VertexMover> VertexMover::create(Programs& programs) {
@@ -62,7 +73,7 @@ Result<VertexMover> VertexMover::create(Programs& programs) {
     if (!program) return program.error();
     VertexMover mover(*program);
     mover.moves_ = Buffer::create("moved vertices");
-    mover.window_vertices_ = elements_in_a_window(sizeof(Vertex));
+    mover.window_vertices_ = vertices_in_a_window();
     if (mover.window_vertices_ == 0)
         return Error{ErrorCode::unsupported,
                      "The graphics driver gives shaders no buffer for moved vertices; draw without geomorphs."};
@@ -70,17 +81,30 @@ Result<VertexMover> VertexMover::create(Programs& programs) {
 }
 
 void VertexMover::move(unsigned vertices, std::uint64_t count, std::span<const VertexMove> moves) {
-    constexpr GLuint moves_binding = 0;
+    // Of move.comp.
+    constexpr GLuint moves_binding = 0, window_binding = 1;
+    constexpr int move_count_location = 0, window_first_location = 1, window_size_location = 2;
+    constexpr std::size_t group_size = 64;
     // As many as one pass takes: GL promises 65535 groups, and 2^24 bytes of a shader's block.
     constexpr std::size_t most_moves = std::size_t{1} << 19;
+    program_->use();
     for (; !moves.empty(); moves = moves.subspan(std::min(moves.size(), most_moves))) {
         const auto part = moves.first(std::min(moves.size(), most_moves));
         // A new store each time, so that the driver need not wait for the last frame.
         glNamedBufferData(moves_.id(), static_cast<GLsizeiptr>(part.size_bytes()), part.data(), GL_STREAM_DRAW);
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, moves_binding, moves_.id());
-        run_on_windows(*program_, part.size(), vertices, count, sizeof(Vertex), window_vertices_);
+        program_->set(move_count_location, static_cast<unsigned>(part.size()));
+        for (std::uint64_t first = 0; first < count; first += window_vertices_) { // nearly always one window
+            const std::uint64_t in_window = std::min(window_vertices_, count - first);
+            program_->set(window_first_location, static_cast<unsigned>(first));
+            program_->set(window_size_location, static_cast<unsigned>(in_window));
+            glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, vertices,
+                              static_cast<GLintptr>(first * sizeof(Vertex)),
+                              static_cast<GLsizeiptr>(in_window * sizeof(Vertex)));
+            glDispatchCompute(static_cast<GLuint>((part.size() + group_size - 1) / group_size), 1, 1);
+        }
     }
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, moves_binding, 0);
+    for (const GLuint at : {moves_binding, window_binding}) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, 0);
     glMemoryBarrier(GL_VERTEX_ATTRIB_ARRAY_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 }
 
@@ -213,5 +237,6 @@ Result<void> GpuCut::follow(const vdtree::Geomorph& geomorph) {
 
 const GpuTree& GpuCut::tree() const noexcept { return impl_->tree; }
 std::uint64_t GpuCut::uploaded_bytes() const noexcept { return impl_->uploaded_bytes; }
+const std::string& GpuCut::why_whole() const noexcept { return impl_->indices.why_whole(); }
 
 } // namespace unseen::render

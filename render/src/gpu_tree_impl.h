@@ -62,7 +62,8 @@ struct GpuTree::Impl {
 
 struct GpuCut::Impl {
     explicit Impl(const GpuTree& tree_)
-        : tree(tree_), indices(tree.context().impl().programs), box(tree.impl().box), guard(tree.context()) {}
+        : tree(tree_), indices(tree.context().impl().programs, tree.context().impl().makes_indices),
+          box(tree.impl().box), guard(tree.context()) {}
 
     Result<void> follow(const vdtree::Cut& cut, std::span<const vdtree::MovedVertex> moved);
 

@@ -7,6 +7,7 @@ namespace unseen::render::shaders {
 
 extern const std::string_view accumulate_frag;
 extern const std::string_view blur_frag;
+extern const std::string_view change_cut_comp;
 extern const std::string_view combine_frag;
 extern const std::string_view compare_frag;
 extern const std::string_view elevate_frag;
@@ -14,11 +15,11 @@ extern const std::string_view energy_frag;
 extern const std::string_view examine_comp;
 extern const std::string_view full_screen_vert;
 extern const std::string_view halve_frag;
+extern const std::string_view index_cut_comp;
 extern const std::string_view lighting_glsl;
 extern const std::string_view luminance_frag;
 extern const std::string_view move_comp;
 extern const std::string_view overlay_frag;
-extern const std::string_view patch_comp;
 extern const std::string_view planes_glsl;
 extern const std::string_view pool_frag;
 extern const std::string_view power_frag;

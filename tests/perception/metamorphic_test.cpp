@@ -212,14 +212,14 @@ TEST_F(Metamorphic, AStillViewIsAFixedPoint) {
             const Viewpoint viewpoint = viewpoint_of(tree, view, options_for(view));
             ASSERT_TRUE(cut.follow(criterion, viewpoint, options));
             const std::vector<NodeId> before(cut.indices().begin(), cut.indices().end());
-            const std::uint64_t version = cut.index_version();
+            const std::uint64_t revision = cut.revision();
             for (int again = 0; again < 3; ++again) {
                 const auto stats = require(cut.follow(criterion, viewpoint, options));
                 EXPECT_EQ(stats->node_tests + stats->folds + stats->unfolds, 0u);
                 EXPECT_TRUE(cut.changes().empty());
             }
             EXPECT_TRUE(std::ranges::equal(cut.indices(), before)) << "in the same order";
-            EXPECT_EQ(cut.index_version(), version);
+            EXPECT_EQ(cut.revision(), revision);
         }
     }
 }

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include <unseen/vdtree/active_triangles.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/internal/normal_mask.h>
 #include <unseen/vdtree/internal/vertex_tree_data.h>
@@ -22,13 +23,16 @@
 
 namespace unseen::support {
 
+using vdtree::ActiveTriangles;
 using vdtree::Cut;
 using vdtree::Index;
+using vdtree::LeafRun;
 using vdtree::MeshView;
 using vdtree::no_node;
 using vdtree::NodeId;
 using vdtree::Triangle;
 using vdtree::VertexTree;
+using vdtree::WedgeId;
 
 template <class T>
 bool same_bytes(std::span<const T> a, std::span<const T> b) {
@@ -248,6 +252,45 @@ inline std::vector<Triangle> sorted_triangles(const Cut& cut) {
     std::sort(triangles.begin(), triangles.end());
     return triangles;
 }
+
+// What a GPU keeps of a cut: it is told no more than what changed where that is known.
+class GpuCopy {
+public:
+    explicit GpuCopy(const VertexTree& tree) : active_(tree) {}
+
+    // Whether it was brought to the cut by changes alone.
+    bool update(const Cut& cut) {
+        const bool is_known = active_.update(cut);
+        const auto corners = active_.leaves_at_corners();
+        const auto wedges = active_.wedges_of_leaves();
+        if (!is_known) {
+            leaves_.assign(corners.begin(), corners.end());
+            wedges_.assign(wedges.begin(), wedges.end());
+            return false;
+        }
+        leaves_.resize(corners.size());
+        for (const Index slot : active_.changed_slots()) leaves_.at(slot) = corners[slot];
+        for (const LeafRun& run : active_.changed_runs())
+            for (Index i = 0; i < run.count; ++i) wedges_.at(run.first + i) = run.wedge;
+        written_ += active_.changed_slots().size() + active_.changed_runs().size();
+        return true;
+    }
+    std::uint64_t written() const { return written_; }
+
+    std::vector<Triangle> sorted_triangles() const {
+        std::vector<Triangle> drawn;
+        for (const Triangle& leaves : leaves_)
+            drawn.push_back({wedges_.at(leaves[0]), wedges_.at(leaves[1]), wedges_.at(leaves[2])});
+        std::sort(drawn.begin(), drawn.end());
+        return drawn;
+    }
+
+private:
+    ActiveTriangles active_;
+    std::vector<Triangle> leaves_;
+    std::vector<WedgeId> wedges_;
+    std::uint64_t written_ = 0;
+};
 
 // The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf;
 // a triangle is drawn iff its corners stand for three different active nodes, by the wedges of these that hold its leaves;

@@ -235,8 +235,8 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
     Cut cut(tree);
     Geomorph geomorph = made(tree);
     std::vector<MovedVertex> before;
-    std::vector<NodeId> copy;
-    std::uint64_t changes = 0, version = 0;
+    support::GpuCopy copy(tree);
+    std::uint64_t changes = 0;
     Changed changed(tree);
     for (int frame = 0; frame < 240; ++frame) {
         const double distance = sphere.radius * (5 - 0.015 * frame);
@@ -256,20 +256,8 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
         changed.look_at(cut, frame * frame_seconds);
         before = now;
 
-        // The drawn cut's index buffer can be copied by its writes.
-        const auto indices = geomorph.drawn().indices();
-        const auto writes = geomorph.drawn().index_writes();
-        if (writes && geomorph.drawn().index_writes_from() == version) {
-            for (const IndexWrite& write : *writes) {
-                if (write.place >= copy.size()) copy.resize(write.place + 1);
-                copy[write.place] = write.value;
-            }
-            copy.resize(indices.size());
-        } else {
-            copy.assign(indices.begin(), indices.end());
-        }
-        version = geomorph.drawn().index_version();
-        ASSERT_TRUE(std::equal(copy.begin(), copy.end(), indices.begin(), indices.end())) << "frame " << frame;
+        copy.update(geomorph.drawn());
+        ASSERT_EQ(copy.sorted_triangles(), support::sorted_triangles(geomorph.drawn())) << "frame " << frame;
     }
     EXPECT_GT(changes, 40u);
 }

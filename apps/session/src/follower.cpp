@@ -77,17 +77,16 @@ public:
         if (const auto judged = judge_by_fold_test(*stats); !judged) return judged.error();
         conclude(report, *prepared, *stats);
 
-        const auto adapted = vdtree::Clock::now();
-        if (glide_s_)
+        if (glide_s_) {
+            const auto adapted = vdtree::Clock::now();
             if (const auto glided = glide(report); !glided) return glided.error();
-        for (std::size_t i = 0; i < objects_.size(); ++i) {
+            report.adapt_ms += vdtree::ms_since(adapted);
+        }
+        for (std::size_t i = 0; request.reasons && i < objects_.size(); ++i) {
             const Followed& object = objects_[i];
-            static_cast<void>(object.geomorph ? object.geomorph->drawn().indices() : object.cut->indices());
-            if (!request.reasons) continue;
             report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
             report.effects.back().object = i;
         }
-        report.extract_ms = vdtree::ms_since(adapted);
         return report;
     }
 
@@ -331,7 +330,12 @@ Result<Simplification> Session::simplify(const vdtree::View& view, const Request
     auto report = follower.follow(view, once);
     if (!report) return report.error();
     Simplification result{std::move(*report), {}};
-    for (Follower::State::Followed& object : follower.state_->objects()) result.cuts.push_back(std::move(*object.cut));
+    const auto followed = vdtree::Clock::now();
+    for (Follower::State::Followed& object : follower.state_->objects()) {
+        result.cuts.push_back(std::move(*object.cut));
+        static_cast<void>(result.cuts.back().indices());
+    }
+    result.extract_ms = vdtree::ms_since(followed);
     return result;
 }
 

@@ -126,10 +126,9 @@ void Cut::unfold_all() { state_->unfold_all(); }
 void Cut::fold_all() { state_->fold_subtree(VertexTree::root()); }
 
 std::span<const FoldChange> Cut::changes() const noexcept { return state_->changes(); }
+std::uint64_t Cut::revision() const noexcept { return state_->revision(); }
+std::uint64_t Cut::changes_from() const noexcept { return state_->changes_from(); }
 std::span<const WedgeId> Cut::indices() const { return state_->indices(); }
-std::optional<std::span<const IndexWrite>> Cut::index_writes() const noexcept { return state_->index_writes(); }
-std::uint64_t Cut::index_version() const noexcept { return state_->index_version(); }
-std::uint64_t Cut::index_writes_from() const noexcept { return state_->index_writes_from(); }
 Index Cut::triangle_count() const noexcept { return state_->triangle_count(); }
 std::uint64_t Cut::byte_size() const noexcept { return state_->byte_size(); }
 

@@ -29,7 +29,7 @@ struct CutState::Indices {
     explicit Indices(const VertexTree& tree) : buffer(tree) {}
     IndexBuffer buffer;
     bool is_stale = true;
-    bool is_patched = false;   // writes are the whole difference to the buffer before the last change
+    bool is_patched = false;   // during changes in steps: each is patched
     unsigned quiet_frames = 0; // in a row, of few changes
 
     void count_changes(std::size_t changes, Index triangles) {
@@ -41,22 +41,17 @@ struct CutState::Indices {
         is_patched = false;
         buffer.drop_lists();
     }
-    std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
-
-    void change_version() {
-        static std::atomic<std::uint64_t> last{0};
-        version = ++last;
-    }
 };
 
 CutState::CutState(const VertexTree& tree)
     : tree_(tree.share()), unfolded_(words_for(tree.interior_count())), wanted_(unfolded_.size()), closer_(tree_),
-      proxy_(tree.leaf_count(), VertexTree::root()), revision_(first_revision()) {
+      proxy_(tree.leaf_count(), VertexTree::root()), revision_(first_revision()), changes_from_(revision_) {
     if (!tree.is_locked()) return;
     has_all_needed_ = false; // by the root
     AdjustStats ignored;
     change_to(wanted_, ignored);
     changes_.clear();
+    changes_from_ = revision_;
 }
 CutState::~CutState() = default;
 
@@ -99,7 +94,7 @@ std::span<const NodeId> CutState::children_of(NodeId node) {
 // Somebody else than the follower changes the cut: what it knows, and the index buffer, are out of date.
 void CutState::make_stale() {
     changes_.clear();
-    revision_ += 2;
+    changes_from_ = ++revision_;
     has_all_needed_ = are_needs_counted_ = false;
     forget_followed();
     if (!indices_) return;
@@ -165,11 +160,9 @@ void CutState::unfold_all() {
 void CutState::begin_changes() {
     count_needs();
     changes_.clear();
-    ++revision_;
+    changes_from_ = revision_;
     if (!indices_) return;
     indices_->is_patched = !indices_->is_stale && indices_->buffer.can_patch();
-    indices_->buffer.begin_patch();
-    indices_->writes_from = indices_->version;
 }
 
 // Gives up patching where gathering has become the cheaper way.
@@ -393,13 +386,11 @@ void CutState::count(AdjustStats& stats) const {
 void CutState::end_changes(AdjustStats& stats) {
     settle_needs();
     count(stats);
+    if (!changes_.empty()) ++revision_;
     if (!indices_) return;
     indices_->count_changes(changes_.size(), triangle_count_);
-    if (indices_->is_patched) {
-        indices_->buffer.end_patch();
-        if (!indices_->buffer.writes().empty()) indices_->change_version();
-    } else if (!changes_.empty()) indices_->is_stale = true;
-    else indices_->is_patched = !indices_->is_stale; // by no writes at all
+    if (indices_->is_patched) indices_->buffer.end_patch();
+    else if (!changes_.empty()) indices_->is_stale = true;
 }
 
 // ---- other cuts as wholes
@@ -436,11 +427,12 @@ void CutState::change_further(std::vector<std::uint64_t> wanted) {
     if (tree_.is_locked()) set_bit(wanted, VertexTree::root());
     if (are_few_changes(wanted_, wanted)) return replay(wanted);
     const std::vector<FoldChange> before = std::move(changes_);
+    const std::uint64_t from = changes_from_;
     AdjustStats ignored; // all changes are counted at the end
     missing_.clear();
     spare_.clear();
     change_to(std::move(wanted), ignored);
-    --revision_; // one for all of them
+    revision_ = changes_from_ = from; // one for all of them, at the end
     changes_.insert(changes_.begin(), before.begin(), before.end());
 }
 
@@ -499,7 +491,7 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
 // Every proxy is written at most once, however deep the new cut is.
 void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
-    ++revision_;
+    changes_from_ = revision_;
     are_needs_counted_ = false;
     for_each_change(
         unfolded_, unfolded,
@@ -509,6 +501,7 @@ void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
         [&](NodeId node) {
             changes_.push_back({node, true});
         });
+    if (!changes_.empty()) ++revision_;
     if (tree_.leaf_count() < leaves_per_change * changes_.size()) {
         count_triangles();
         assign_all(unfolded);
@@ -573,20 +566,11 @@ std::span<const WedgeId> CutState::indices() const {
     if (indices_->is_stale) {
         indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
         indices_->is_stale = false;
-        indices_->change_version();
         // When little has changed twice, little will change next; a frame after a jump has enough to do.
         if (indices_->quiet_frames > 1) indices_->buffer.make_lists();
     }
     return indices_->buffer.indices();
 }
-
-std::optional<std::span<const IndexWrite>> CutState::index_writes() const noexcept {
-    if (!indices_ || !indices_->is_patched) return std::nullopt;
-    return indices_->buffer.writes();
-}
-
-std::uint64_t CutState::index_version() const noexcept { return indices_ ? indices_->version : 0; }
-std::uint64_t CutState::index_writes_from() const noexcept { return indices_ ? indices_->writes_from : 0; }
 
 std::uint64_t CutState::byte_size() const noexcept {
     return sizeof(std::uint64_t) * unfolded_.capacity() + sizeof(NodeId) * proxy_.capacity() +

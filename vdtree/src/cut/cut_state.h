@@ -29,8 +29,8 @@ public:
     std::span<const NodeId> proxies() const noexcept { return proxy_; }            // by leaf; always in the same place
     Index triangle_count() const noexcept { return triangle_count_; }
     std::span<const FoldChange> changes() const noexcept { return changes_; }
-    // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
     std::uint64_t revision() const noexcept { return revision_; }
+    std::uint64_t changes_from() const noexcept { return changes_from_; }
     // Precondition of these two: the node is interior.
     bool is_wanted(NodeId node) const noexcept { return test_bit(wanted_, node); }
     bool is_changed_by_hand() const noexcept { return !has_all_needed_; }
@@ -89,9 +89,6 @@ public:
     // ---- the index buffer
 
     std::span<const WedgeId> indices() const;
-    std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
-    std::uint64_t index_version() const noexcept;
-    std::uint64_t index_writes_from() const noexcept;
 
     std::uint64_t byte_size() const noexcept;
 
@@ -133,7 +130,7 @@ private:
     std::vector<NodeId> proxy_; // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
-    std::uint64_t revision_;
+    std::uint64_t revision_, changes_from_;
     std::vector<NodeId> children_, soon_, others_, group_; // scratch
     std::vector<std::size_t> soon_ends_;
     std::unique_ptr<CutFollower> follower_;

@@ -71,7 +71,7 @@ struct Geomorph::State {
     // What leads from the cut at the last step, or from the drawn one, to this cut; parents unfold before their children.
     std::span<const FoldChange> changes_of(const CutState& cut) {
         if (cut.revision() == revision) return {};
-        if (cut.revision() == revision + 1) return cut.changes();
+        if (cut.changes_from() == revision) return cut.changes();
         found.clear();
         for (std::size_t word = 0; word < cut.unfolded().size(); ++word)
             for_each_bit(cut.unfolded()[word] ^ drawn.unfolded()[word], 64 * word, [&](NodeId node) {

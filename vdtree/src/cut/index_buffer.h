@@ -98,12 +98,11 @@ public:
         has_lists_ = false;
         for (const NodeId node : indices_)
             if (node != no_node) block_of_node_[node] = no_block;
-        for (const IndexWrite& removal : removals_) block_of_node_[removal.value] = no_block;
+        for (const Removal& removal : removals_) block_of_node_[removal.node] = no_block;
         removals_.clear();
     }
 
-    // Precondition of all: can_patch(). Between begin_patch() and end_patch() the buffer may have holes.
-    void begin_patch() { write_count_ = 0; }
+    // Precondition of all: can_patch(). Up to end_patch() the buffer may have holes.
     // All children are active, and `children` are they.
     void fold(NodeId node, std::span<const NodeId> children) {
         if (has_seams_) fold_to<true>(node, children);
@@ -145,7 +144,6 @@ public:
             if (indices_[corner] != no_node) moving_.push_back(indices_[corner]);
         prefetch_places(moving_);
         prefetch_lists(moving_);
-        IndexWrite* written = room_for(3 * holes_.size());
         for (const Index hole : holes_) {
             while (end > 0 && is_hole(static_cast<Index>(end - 1))) --end;
             if (hole >= end) continue;
@@ -154,26 +152,21 @@ public:
                 const Index to = hole * 3 + k, from = static_cast<Index>(end) * 3 + k;
                 indices_[to] = indices_[from];
                 if (has_seams_) wedges_[to] = wedges_[from];
-                *written++ = {to, has_seams_ ? wedges_[from] : indices_[from]};
                 replace(indices_[from], from, to);
             }
         }
-        take_room_until(written);
         while (end > 0 && is_hole(static_cast<Index>(end - 1))) --end;
         holes_.clear();
         indices_.resize(3 * end);
         if (has_seams_) wedges_.resize(3 * end);
     }
 
-    // What the patches since begin_patch() wrote, in order; places may come twice, and lie beyond the end by now.
-    std::span<const IndexWrite> writes() const noexcept { return std::span(writes_).first(write_count_); }
     std::uint64_t byte_size() const noexcept {
         std::uint64_t bytes = sizeof(NodeId) * (indices_.capacity() + wedges_.capacity()) +
                               sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
                               sizeof(std::uint64_t) * shown_by_.capacity() +
                               sizeof(Index) * (places_.capacity() + coming_.capacity()) +
-                              sizeof(Block) * block_of_node_.capacity() + sizeof(Line) * pool_.capacity() +
-                              sizeof(IndexWrite) * writes_.capacity();
+                              sizeof(Block) * block_of_node_.capacity() + sizeof(Line) * pool_.capacity();
         for (const auto& blocks : free_blocks_) bytes += sizeof(Block) * blocks.capacity();
         return bytes;
     }
@@ -208,7 +201,6 @@ private:
         scratch_.resize(most);
         vanished_.resize(most);
         NodeId* const indices = indices_.data();
-        IndexWrite* written = room_for(4 * most); // a vanishing triangle is of two corners at least
         std::size_t count = 0, vanished = 0, kept = 0;
         for (const NodeId child : children) {
             const Block block = block_of_node_[child];
@@ -219,10 +211,7 @@ private:
                 const bool is_second =
                     (indices[c0] == node) + (indices[c0 + 1] == node) + (indices[c0 + 2] == node) == 1;
                 indices[entry.corner] = is_shown ? node : no_node;
-                const WedgeId wedge = seams ? tree_->wedge_at(node, entry.leaf) : node;
-                if constexpr (seams) wedges_[entry.corner] = is_shown ? wedge : no_node;
-                *written = {entry.corner, wedge};
-                written += is_shown;
+                if constexpr (seams) wedges_[entry.corner] = is_shown ? tree_->wedge_at(node, entry.leaf) : no_node;
                 scratch_[count] = entry;
                 count += is_shown;
                 vanished_[vanished] = c0;
@@ -237,11 +226,9 @@ private:
                 if (indices[corner] != node) removals_.push_back({corner, indices[corner]});
                 indices[corner] = no_node;
                 if constexpr (seams) wedges_[corner] = no_node;
-                *written++ = {corner, no_node};
             }
             holes_.push_back(c0 / 3);
         }
-        take_room_until(written);
         for (std::size_t i = 0; i < count; ++i) {
             const Entry entry = scratch_[i];
             scratch_[kept] = entry;
@@ -263,7 +250,6 @@ private:
         discard(block);
         block_of_node_[node] = no_block;
         const Index first_triangle = links.first_triangle[node], triangle_end = links.first_triangle[node + 1];
-        IndexWrite* written = room_for(scratch_.size() + std::size_t{3} * (triangle_end - first_triangle));
         for (Index t = first_triangle; t < triangle_end; ++t) {
             const Index c0 = new_triangle() * 3;
             for (Index k = 0; k < 3; ++k) {
@@ -273,7 +259,7 @@ private:
                 } else {
                     const NodeId other = proxies[entry.leaf];
                     indices_[entry.corner] = other;
-                    *written++ = {entry.corner, show<seams>(entry, other)};
+                    show<seams>(entry, other);
                     append(other, entry);
                 }
             }
@@ -294,19 +280,17 @@ private:
             }
             for (std::size_t i = 0; i < count; ++i) {
                 indices[dealt_[i].corner] = child;
-                *written++ = {dealt_[i].corner, show<seams>(dealt_[i], child)};
+                show<seams>(dealt_[i], child);
             }
             block_of_node_[child] = no_block;
             give(child, std::span(dealt_).first(count));
         }
-        take_room_until(written);
     }
 
-    // The wedge of a node that shows an entry's leaf, put where it is shown.
+    // Puts the wedge of a node that shows an entry's leaf where it is shown.
     template <bool seams>
-    WedgeId show(const Entry& entry, NodeId node) {
-        if constexpr (!seams) return node;
-        return wedges_[entry.corner] = tree_->wedge_at(node, entry.leaf);
+    void show(const Entry& entry, NodeId node) {
+        if constexpr (seams) wedges_[entry.corner] = tree_->wedge_at(node, entry.leaf);
     }
 
     // Lines follow each other without gaps: one array of entries.
@@ -367,12 +351,6 @@ private:
         leaves_.swap(next_leaves_);
     }
 
-    // For the writes of one change, so that they need not look for it one by one.
-    IndexWrite* room_for(std::size_t writes) {
-        if (const std::size_t count = write_count_ + writes; writes_.size() < count) writes_.resize(count + count / 2);
-        return writes_.data() + write_count_;
-    }
-    void take_room_until(const IndexWrite* end) { write_count_ = static_cast<std::size_t>(end - writes_.data()); }
     // A list of its own for a node that has none.
     void give(NodeId node, std::span<const Entry> shown) {
         if (shown.empty()) return;
@@ -415,11 +393,11 @@ private:
     void remove_all() {
         constexpr std::size_t far = 32, near = 16; // removals between a prefetch and its use
         for (std::size_t i = 0; i < removals_.size(); ++i) {
-            if (i + far < removals_.size()) prefetch(&block_of_node_[removals_[i + far].value]);
+            if (i + far < removals_.size()) prefetch(&block_of_node_[removals_[i + far].node]);
             if (i + near < removals_.size())
-                if (const Block block = block_of_node_[removals_[i + near].value]; block != no_block)
+                if (const Block block = block_of_node_[removals_[i + near].node]; block != no_block)
                     prefetch(entries(block));
-            remove(removals_[i].value, removals_[i].place);
+            remove(removals_[i].node, removals_[i].corner);
         }
         removals_.clear();
     }
@@ -473,8 +451,11 @@ private:
     std::vector<Line> pool_;             // of entries; blocks are whole lines
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
-    std::vector<IndexWrite>
-        removals_; // what such triangles showed, still in its list until all of these are done at once
+    struct Removal {
+        Index corner;
+        NodeId node;
+    };
+    std::vector<Removal> removals_; // what such triangles showed, still in its list until all of these are done at once
     // From the last gathering: the leaves at the corners, in the buffer's order; the nodes whose triangles these are, one
     // bit each; and where the triangles of each word of these begin.
     std::vector<Triangle> leaves_;
@@ -489,8 +470,6 @@ private:
     std::vector<Entry> scratch_, dealt_;
     std::vector<Index> vanished_;
     std::vector<NodeId> moving_;
-    std::vector<IndexWrite> writes_; // the first ones of it
-    std::size_t write_count_ = 0;
 };
 
 } // namespace unseen::vdtree

@@ -151,6 +151,12 @@ std::uint64_t SceneRenderer::uploaded_bytes() const noexcept {
     return bytes;
 }
 
+std::string SceneRenderer::why_whole() const {
+    for (const render::GpuCut& cut : impl_->objects)
+        if (!cut.why_whole().empty()) return cut.why_whole();
+    return {};
+}
+
 std::optional<render::ShadowFacts> SceneRenderer::shadows() const {
     if (!impl_->shadows) return std::nullopt;
     return impl_->shadows->facts();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include <glm/vec2.hpp>
 
@@ -35,14 +36,15 @@ private:
     std::shared_ptr<Impl> impl_;
 };
 
-// The triangles of a cut on the GPU, 12 bytes each. They change only in follow(). Copies are handles to the same object.
+// The triangles of a cut on the GPU: 12 bytes each, and as much again and 4 bytes a leaf of the tree once the cut is
+// followed. They change only in follow(). Copies are handles to the same object.
 class GpuCut {
 public:
     explicit GpuCut(const GpuTree& tree); // without triangles; keeps a handle to the tree
 
-    // Takes over the cut's triangles. Uploads nothing if the cut has not changed, 8 bytes a changed corner if the cut knows
-    // its changes since the last follow(), otherwise everything. Fails on the cut of another tree, and if memory runs out;
-    // then there are no triangles.
+    // Takes over the cut's triangles. Uploads nothing if the cut has not changed, some 50 bytes a fold or unfold if these
+    // are few and all since the last follow(), and the GPU makes the index buffer from them; otherwise, and in software,
+    // all of the cut's indices. Fails on the cut of another tree, and if memory runs out; then there are no triangles.
     Result<void> follow(const vdtree::Cut& cut);
 
     // The drawn cut of a geomorph, with its gliding vertices in place: 32 bytes for each of them, and for each that glided
@@ -52,6 +54,8 @@ public:
 
     const GpuTree& tree() const noexcept;
     std::uint64_t uploaded_bytes() const noexcept; // by the last follow() and by draws since
+    // Why even few changes upload all indices, as where graphics memory is short; empty: they do not.
+    const std::string& why_whole() const noexcept;
 
     struct Impl; // the library's own
     Impl& impl() const noexcept { return *impl_; }

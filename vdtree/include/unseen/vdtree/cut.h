@@ -52,12 +52,6 @@ struct FoldChange {
     bool folded = false;
 };
 
-// One change of the index buffer.
-struct IndexWrite {
-    Index place = 0;
-    NodeId value = 0;
-};
-
 // Used from one thread at a time. Several cuts over one tree may be used from several threads.
 class Cut {
 public:
@@ -104,20 +98,18 @@ public:
     Result<AdjustStats> follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                const FollowOptions& options = {});
 
-    // The changes of the last adjust() or follow(), in order: each node is active when its turn comes.
+    // The changes of the last adjust() or follow(), in order: each node is active when its turn comes. They lead from the
+    // revision changes_from() to revision(). Every change makes a new revision; no two cuts share one. What has seen the
+    // cut at another revision than changes_from() has missed something; after changes by hand, everybody has.
     std::span<const FoldChange> changes() const noexcept;
+    std::uint64_t revision() const noexcept;
+    std::uint64_t changes_from() const noexcept;
 
     // The simplification: triangles over wedges (positions()[index] is the vertex), oriented like the input, of three
     // different nodes each. Valid until the cut changes. The order of the triangles depends on the cut's history.
-    // Cost: what changed, or the active triangles if much did.
+    // Made when it is asked for; from then on kept current. Cost: what changed, or the active triangles if much did. For
+    // drawing with a GPU, ActiveTriangles costs less.
     std::span<const WedgeId> indices() const;
-    // Updates for copies of the index buffer: the writes of the last follow(), in order. A place may occur twice, or lie
-    // beyond the new end. nullopt: copy the whole buffer.
-    std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
-    // The version of the buffer that indices() returned last: a new number after every change, different for every cut; 0
-    // before the first. index_writes() lead from version index_writes_from() to this one.
-    std::uint64_t index_version() const noexcept;
-    std::uint64_t index_writes_from() const noexcept;
     Index triangle_count() const noexcept;
 
     std::uint64_t byte_size() const noexcept; // resident bytes of the cut and its index buffer, without the tree

@@ -22,6 +22,7 @@
 #include <unseen/vdtree/vertex_tree.h>
 
 // Views, fold criteria and cuts.
+#include <unseen/vdtree/active_triangles.h>
 #include <unseen/vdtree/criteria.h>
 #include <unseen/vdtree/cut.h>
 #include <unseen/vdtree/depth_picture.h>

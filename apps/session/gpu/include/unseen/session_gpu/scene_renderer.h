@@ -46,6 +46,7 @@ public:
                              const render::DrawOptions& options = {});
 
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
+    std::string why_whole() const;                 // see GpuCut::why_whole(), of the first object that has one
 
     // Facts of the last draw; empty if no light casts shadows. Waits for the GPU.
     std::optional<render::ShadowFacts> shadows() const;
