@@ -230,7 +230,7 @@ Result<int> run(const FlyArguments& options) {
     session->set_velocity(options.what.velocity());
     const vdtree::View first_view = make_view(*session, options.view);
     session::Request request = options.what.request_for(session->triangle_count());
-    request.purpose = session::Purpose::picture;
+    request.purpose = session::Purpose::flight;
     if (const auto ready = session->prepare(first_view, request); !ready) return ready.error();
     if (options.judges_changes && session->scene().is_of_file())
         return Error{ErrorCode::unsupported,

@@ -86,7 +86,7 @@ public:
     Result<session::Report> follow(const vdtree::View& view) {
         session::Request request{.goal = Goal::budget(static_cast<vdtree::Index>(triangles_))};
         request.fold_test = session::FoldTest::extent;
-        request.purpose = session::Purpose::picture;
+        request.purpose = session::Purpose::flight;
         request.may_measure = request.reasons = false;
         return follower_.follow(view, request);
     }
@@ -115,7 +115,7 @@ public:
           view_(options.first_view), request_(options.what.request_for(session.triangle_count())),
           gaze_px_(options.what.gaze_px), draw_(options.draw),
           gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse), gaze_(std::move(gaze)) {
-        request_.purpose = session::Purpose::picture;
+        request_.purpose = session::Purpose::flight;
         request_.may_measure = false; // nobody waits for that here
         request_.reasons = false;
         draw_.background = session.background();
@@ -571,7 +571,7 @@ private:
 Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze,
                         const ViewerOptions& options) {
     session::Request request = options.what.request_for(session.triangle_count());
-    request.purpose = session::Purpose::picture;
+    request.purpose = session::Purpose::flight;
     const bool lights_move = session.scene().lights && session.scene().lights->moves();
     request.may_measure = request.fold_test || !lights_move; // else the viewer takes a test that needs none
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();

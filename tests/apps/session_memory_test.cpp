@@ -58,6 +58,7 @@ int change(Question& q, int number) {
     set(goal, Goal::up_to(3));
     set(hysteresis, 2.0f);
     set(purpose, session::Purpose::picture);
+    set(purpose, session::Purpose::flight);
     set(order, session::Order::largest);
     set(keeps_shadows, false);
     set(may_measure, false);

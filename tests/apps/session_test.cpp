@@ -175,6 +175,27 @@ TEST(Session, OrthographicViewsKeepWhatTheWindowShows) {
     EXPECT_EQ(followed->stats.triangles, at_first.first);
 }
 
+// What faces away: a picture folds it, a flight within budgets, a mesh never.
+TEST(Session, FoldsWhatFacesAwayWhereThatPays) {
+    Session session = two_balls();
+    const auto triangles = [&](session::Purpose purpose, const Goal& goal) {
+        const auto made =
+            require(session.simplify({.goal = goal, .fold_test = FoldTest::luebke_hallen, .purpose = purpose}));
+        const auto effect = std::ranges::find(made->effects, "back-face folding", &session::Effect::name);
+        EXPECT_TRUE(effect != made->effects.end());
+        return std::pair{made->stats.triangles, effect != made->effects.end() && effect->on};
+    };
+    using enum session::Purpose;
+    const auto [of_picture, picture_folds] = triangles(picture, Goal::imperceptible());
+    const auto [of_flight, flight_folds] = triangles(flight, Goal::imperceptible());
+    const auto [of_mesh, mesh_folds] = triangles(mesh, Goal::imperceptible());
+    EXPECT_TRUE(picture_folds && !flight_folds && !mesh_folds);
+    EXPECT_LT(of_picture, of_flight);
+    EXPECT_EQ(of_flight, of_mesh) << "all is in the window";
+    EXPECT_TRUE(triangles(flight, Goal::budget(500)).second);
+    EXPECT_FALSE(triangles(mesh, Goal::budget(500)).second);
+}
+
 TEST(Follower, ComesWhereACutFromScratchIs) {
     Session session = two_balls();
     session::Follower follower(session);

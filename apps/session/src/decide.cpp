@@ -84,7 +84,7 @@ Result<void> check_knowledge(Sight& sight, FoldTest test, const Request& request
 } // namespace
 
 Result<Decision> decide(Sight& sight, const Request& request) {
-    if (request.purpose == Purpose::picture && !request.shown.empty() && request.shown[0].view() != sight.view)
+    if (request.purpose != Purpose::mesh && !request.shown.empty() && request.shown[0].view() != sight.view)
         return invalid_field("{request.shown} is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors =

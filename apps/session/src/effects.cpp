@@ -221,11 +221,14 @@ Reason imperceptible_distance(const Cutting& c) {
             "the display's distance times " + rounded(c.decision.request.goal.cost, 4) + ", above which no fold costs"};
 }
 
+constexpr const char* too_long = "from view to view it takes longer than drawing what it folds";
+
 Reason back_face_folding(const Cutting& c) {
-    if (culls_back_faces(c.sight))
+    if (folds_back_faces(c.sight, c.decision))
         return {true, casts_shadows(c.sight) ? c.but_shadows("what faces away is folded")
                                              : "what faces away is not drawn, so it is folded"};
     if (c.sight.object.tree.closedness() == vdtree::Closedness::open) return {false, "the surface is open"};
+    if (may_fold_back_faces(c.sight)) return {false, too_long};
     return {false, is_translucent(c.sight) ? "what faces away may show through" : "the eye is in the model"};
 }
 
@@ -234,6 +237,8 @@ Reason hidden_folding(const Cutting& c) {
         return {true, c.but_shadows("what lies behind what the view shows is folded, by pictures of its depths")};
     if (c.is_for_mesh()) return {false, from_elsewhere};
     if (may_cast_anything(c.sight, c.decision)) return {false, may_cast};
+    if (!folds_hidden(c.sight, c.decision) && c.is_perceptual() && may_fold_back_faces(c.sight))
+        return {false, too_long};
     if (!folds_hidden(c.sight, c.decision))
         return {false, c.is_perceptual() ? "nothing solid is looked at from outside"
                                          : "only the perceptual fold tests know what a fold changes"};

@@ -26,11 +26,15 @@ bool casts_shadows(const Sight& sight);
 // Whether what is not seen may not fold: shadows of it may be seen, and nobody asks what they show.
 bool may_cast_anything(const Sight& sight, const Decision& decision);
 bool is_translucent(const Sight& sight);
-// Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
-bool culls_back_faces(const Sight& sight);
+// Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside. And whether they
+// are: from view to view several times as many nodes change for it, which takes longer than drawing them. So there only
+// within budgets, which then have more for what is seen.
+bool may_fold_back_faces(const Sight& sight);
+bool folds_back_faces(const Sight& sight, const Decision& decision);
 // Whether what lies outside of the window folds, and all of the object does, by more than any rounding.
 bool is_out_of_sight(Sight& sight, const Decision& decision);
-bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
+// What a solid's inside hides. Mostly that faces away, too: the rest is not worth its tests from view to view.
+bool folds_hidden(const Sight& sight, const Decision& decision);
 // Shadows of what is not seen.
 inline constexpr const char* may_cast = "what is not seen may cast shadows that are";
 bool knows_shown(const Sight& sight, const Decision& decision);  // how much of each part pictures show

@@ -26,8 +26,8 @@ bool is_wholly_in_window(const Sight& sight) {
 
 vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
-    const bool window_only = decision.request.purpose == Purpose::picture && !may_cast_anything(sight, decision) &&
-                             !is_wholly_in_window(sight);
+    const bool window_only =
+        decision.request.purpose != Purpose::mesh && !may_cast_anything(sight, decision) && !is_wholly_in_window(sight);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(sight.object.tree, sight.view, test_options(sight),
                                                            sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
@@ -42,11 +42,12 @@ vdtree::Viewpoint viewpoint_of(Sight& sight, const Decision& decision) {
     return viewpoint;
 }
 
-vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
+vdtree::FollowOptions follow_options(const Sight& sight, const Decision& decision) {
+    const Request& request = decision.request;
     vdtree::FollowOptions options;
     options.threshold = static_cast<float>(request.goal.cost);
     options.milliseconds = request.milliseconds;
-    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
+    options.cull_back_faces = folds_back_faces(sight, decision);
     if (request.goal.kind == Goal::Kind::budget) {
         options.triangle_budget = request.goal.triangles;
         options.fill_budget = request.goal.fill;
@@ -80,14 +81,21 @@ bool is_translucent(const Sight& sight) {
     return sight.object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
 }
 
-bool culls_back_faces(const Sight& sight) {
+bool may_fold_back_faces(const Sight& sight) {
     const WorldSphere sphere = world_sphere(sight.object);
     return !is_translucent(sight) && sight.object.tree.closedness() != vdtree::Closedness::open &&
            !is_around_eye(sphere, sight.view);
 }
 
+bool folds_back_faces(const Sight& sight, const Decision& decision) {
+    const Request& request = decision.request;
+    const bool is_worth_it = request.purpose == Purpose::picture ||
+                             (request.purpose == Purpose::flight && request.goal.kind == Goal::Kind::budget);
+    return is_worth_it && may_fold_back_faces(sight);
+}
+
 bool is_out_of_sight(Sight& sight, const Decision& decision) {
-    if (decision.request.purpose != Purpose::picture || may_cast_anything(sight, decision)) return false;
+    if (decision.request.purpose == Purpose::mesh || may_cast_anything(sight, decision)) return false;
     const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
     const glm::dvec3 away = sphere.centre - sight.view.eye;
     // Far more than planes and spheres in single floats are off by.
@@ -106,7 +114,7 @@ bool is_out_of_sight(Sight& sight, const Decision& decision) {
 // Extent and displacement look at supports, which do not contain all that a fold changes.
 bool folds_hidden(const Sight& sight, const Decision& decision) {
     return decision.request.purpose == Purpose::picture && is_perceptual(decision) &&
-           !may_cast_anything(sight, decision) && culls_back_faces(sight);
+           !may_cast_anything(sight, decision) && may_fold_back_faces(sight);
 }
 
 bool knows_shown(const Sight& sight, const Decision& decision) {
@@ -232,7 +240,7 @@ Result<CutRecipe> make_recipe(Sight& sight, const Decision& decision) {
         if (!edges) return edges.error();
         kept = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
     }
-    CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision)};
     if (!knows_shown(sight, decision)) {
         if (!kept->edges || !decision.request.keeps_shadows) return recipe;
         auto with_outlines = keep_outlines(sight, decision, kept);

@@ -61,7 +61,7 @@ bool goes_by_sum(const Request& r) noexcept {
 }
 
 Result<void> validate(const Request& r) {
-    if (r.shown.size() > 1 && r.purpose == Purpose::picture)
+    if (r.shown.size() > 1 && r.purpose != Purpose::mesh)
         return invalid_field("{request.shown} is of several views: set {request.purpose} = mesh.");
     if (const auto goal = validate_goal(r); !goal) return goal;
     if (r.milliseconds && !(*r.milliseconds >= 0 && std::isfinite(*r.milliseconds)))

@@ -156,7 +156,7 @@ std::shared_ptr<const ShadowReach> reach_of(Sight& sight, const Decision& decisi
     std::shared_ptr<const ShadowReach>& reach = sight.memory.reach;
     const vdtree::Lighting lighting = in_world(*sight.lighting, sight.object);
     std::span<const vdtree::Plane> window;
-    if (decision.request.purpose == Purpose::picture) window = *sight.window;
+    if (decision.request.purpose != Purpose::mesh) window = *sight.window;
     if (reach && reach->holds_for(lighting, edges.get(), sight.view.eye, window)) return reach;
     if (!all.receivers) all.receivers.emplace(all_standing(all));
     if (!all.lit || !is_alike(all.lit->lighting, lighting))

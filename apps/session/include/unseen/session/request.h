@@ -83,6 +83,9 @@ enum class Order {
 enum class Purpose {
     mesh,    // it may be looked at from anywhere
     picture, // it is seen from this view only: whatever is outside the window, faces away or is hidden in a solid folds
+    // It is seen from this view only, and the next one follows: whatever is outside the window folds, and within budgets
+    // what faces away. Folding more takes longer from view to view than drawing it.
+    flight,
 };
 
 // Error messages and reasons call these fields request.goal, request.fold_test and so on.
