@@ -126,7 +126,8 @@ Result<void> GpuIndices::follow(const vdtree::Cut& cut) {
         glDispatchCompute(static_cast<GLuint>(std::min((count_ + group_size - 1) / group_size, most_groups)), 1, 1);
         for (const GLuint at : {corners_binding, wedges_binding, indices_binding})
             glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, 0);
-        glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+        // For the draw, for uploads of the whole, and for the passes of the next update.
+        glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
     }
     return {};
 }

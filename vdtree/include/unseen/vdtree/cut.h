@@ -99,15 +99,15 @@ public:
                                const FollowOptions& options = {});
 
     // The changes of the last adjust() or follow(), in order: each node is active when its turn comes. They lead from the
-    // revision changes_from() to revision(). Every change makes a new revision; no two cuts share one. What has seen the
-    // cut at another revision than changes_from() has missed something; after changes by hand, everybody has.
+    // revision changes_from() to revision(); every change makes a new one, and no two cuts share one. A copy of the cut as of
+    // another revision than changes_from() has missed something, as all copies have after changes by hand.
     std::span<const FoldChange> changes() const noexcept;
     std::uint64_t revision() const noexcept;
     std::uint64_t changes_from() const noexcept;
 
     // The simplification: triangles over wedges (positions()[index] is the vertex), oriented like the input, of three
     // different nodes each. Valid until the cut changes. The order of the triangles depends on the cut's history.
-    // Made when it is asked for; from then on kept current. Cost: what changed, or the active triangles if much did. For
+    // Made when it is asked for. Cost: what changed since it was last asked for, or the active triangles if much did. For
     // drawing with a GPU, ActiveTriangles costs less.
     std::span<const WedgeId> indices() const;
     Index triangle_count() const noexcept;
