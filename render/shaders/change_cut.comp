@@ -15,10 +15,7 @@ layout(std430, binding = 2) writeonly buffer Wedges {
 
 layout(location = 0) uniform uint change_count;
 
-void main() {
-    if (gl_GlobalInvocationID.x >= change_count)
-        return;
-    uvec4 change = changes[gl_GlobalInvocationID.x];
+void take_up(uvec4 change) {
     if (change.w == is_run) {
         for (uint i = 0; i < change.y; ++i)
             wedge_of_leaf[change.x + i] = change.z;
@@ -26,4 +23,9 @@ void main() {
     }
     for (uint k = 0; k < 3; ++k)
         leaf_at_corner[3 * change.x + k] = change[k + 1];
+}
+
+void main() {
+    for (uint i = gl_GlobalInvocationID.x; i < change_count; i += gl_NumWorkGroups.x * gl_WorkGroupSize.x)
+        take_up(changes[i]);
 }

@@ -28,6 +28,19 @@ bool store(const Buffer& buffer, std::uint64_t bytes, const void* data) {
     return glGetError() != GL_OUT_OF_MEMORY;
 }
 
+void bind(GLuint at, const Buffer& buffer) { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, buffer.id()); }
+void unbind(std::initializer_list<GLuint> all) {
+    for (const GLuint at : all) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, 0);
+}
+
+// A thread for each of `count`, or each in turn for several of them.
+void compute(const Program& program, std::uint64_t count, std::uint64_t group_size) {
+    constexpr std::uint64_t most_groups = 65535; // GL promises as many
+    program.set(count_location, static_cast<unsigned>(count));
+    program.use();
+    glDispatchCompute(static_cast<GLuint>(std::min((count + group_size - 1) / group_size, most_groups)), 1, 1);
+}
+
 Error no_room(std::string_view what) {
     return {ErrorCode::unsupported, "The graphics driver gives " + std::string(what)};
 }
@@ -113,23 +126,19 @@ Result<void> GpuIndices::follow(const vdtree::Cut& cut) {
         upload_changes();
     }
     count_ = 3 * count;
-    if (count > 0) {
-        constexpr std::uint64_t group_size = 256, most_groups = 65535; // GL promises as many
-        const auto bind = [](GLuint at, const Buffer& buffer) {
-            glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, buffer.id());
-        };
-        bind(corners_binding, form.corners);
-        bind(wedges_binding, form.wedges);
-        bind(indices_binding, buffer_);
-        form.index->set(count_location, static_cast<unsigned>(count_));
-        form.index->use();
-        glDispatchCompute(static_cast<GLuint>(std::min((count_ + group_size - 1) / group_size, most_groups)), 1, 1);
-        for (const GLuint at : {corners_binding, wedges_binding, indices_binding})
-            glBindBufferBase(GL_SHADER_STORAGE_BUFFER, at, 0);
-        // For the draw, for uploads of the whole, and for the passes of the next update.
-        glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
-    }
+    if (count > 0) make_indices();
     return {};
+}
+
+void GpuIndices::make_indices() {
+    constexpr std::uint64_t group_size = 256; // of index_cut.comp
+    bind(corners_binding, form_->corners);
+    bind(wedges_binding, form_->wedges);
+    bind(indices_binding, buffer_);
+    compute(*form_->index, count_, group_size);
+    unbind({corners_binding, wedges_binding, indices_binding});
+    // For the draw, for uploads of the whole, and for the passes of the next update.
+    glMemoryBarrier(GL_ELEMENT_ARRAY_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
 }
 
 Result<void> GpuIndices::make_form(const vdtree::VertexTree& tree) {
@@ -176,14 +185,12 @@ void GpuIndices::upload_changes() {
     uploaded_bytes_ = changes.size() * sizeof(Change);
     // A new store each time, so that the driver need not wait for the last frame.
     glNamedBufferData(form.changes.id(), static_cast<GLsizeiptr>(uploaded_bytes_), changes.data(), GL_STREAM_DRAW);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, changes_binding, form.changes.id());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, corners_binding, form.corners.id());
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, wedges_binding, form.wedges.id());
-    form.take_up->set(count_location, static_cast<unsigned>(changes.size()));
-    form.take_up->use();
-    constexpr std::size_t group_size = 64;
-    glDispatchCompute(static_cast<GLuint>((changes.size() + group_size - 1) / group_size), 1, 1);
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, changes_binding, 0);
+    constexpr std::uint64_t group_size = 64; // of change_cut.comp
+    bind(changes_binding, form.changes);
+    bind(corners_binding, form.corners);
+    bind(wedges_binding, form.wedges);
+    compute(*form.take_up, changes.size(), group_size);
+    unbind({changes_binding, corners_binding, wedges_binding});
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
 }
 

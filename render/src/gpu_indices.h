@@ -12,11 +12,11 @@
 
 namespace unseen::render {
 
-// While little changes from one update to the next, the GPU holds the cut as active triangles and what stands for each
-// leaf (vdtree::ActiveTriangles): 16 bytes a change are uploaded, a compute pass takes them up, and another one makes the
-// index buffer. After a jump, for small cuts, and where the processor draws, the index buffer is uploaded as a whole, and
-// that is all that cuts that do not move ever have. So it is, too, where this GL has no room for more; why_whole() says
-// so. Move-only; needs a current context for everything.
+// While little changes from one update to the next, the GPU holds the cut as vdtree::ActiveTriangles does. What changes is
+// uploaded, 16 bytes each; a compute pass takes it up, and another one makes the index buffer. After a jump, for small
+// cuts, and where the processor draws, the index buffer is uploaded as a whole. Cuts that do not move have nothing else.
+// Where this GL has no room for more, it is so, too, and why_whole() says why. Move-only; needs a current context for
+// everything.
 class GpuIndices {
 public:
     // `makes`: see Context::Impl. Does no GL. The programs outlive it.
@@ -48,6 +48,7 @@ private:
     Result<void> make_form(const vdtree::VertexTree& tree);
     Result<void> upload_form();
     void upload_changes();
+    void make_indices();
 
     Programs* programs_;
     bool makes_;

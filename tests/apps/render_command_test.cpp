@@ -454,7 +454,7 @@ TEST_F(RenderCommandTest, OrthographicViewsAreDrawnAndJudged) {
                 fails(1, HasSubstr("needs a perspective view")));
 }
 
-// Of the whole model: what the eyes see, beside each other.
+// Each eye sees the whole model from its own place, and the pictures lie side by side.
 TEST_F(RenderCommandTest, TwoEyesShareACut) {
     const Words full = {"--full", "--fov", "60"};
     render(joined(full, {"--eye", "0", "0", "3", "--target", "0", "0", "0", "--eyes", "0.2,-0.02"}), "pair.pfm");

@@ -42,9 +42,10 @@ class GpuCut {
 public:
     explicit GpuCut(const GpuTree& tree); // without triangles; keeps a handle to the tree
 
-    // Takes over the cut's triangles. Uploads nothing if the cut has not changed, some 50 bytes a fold or unfold if these
-    // are few and all since the last follow(), and the GPU makes the index buffer from them; otherwise, and in software,
-    // all of the cut's indices. Fails on the cut of another tree, and if memory runs out; then there are no triangles.
+    // Takes over the cut's triangles. Uploads nothing if the cut has not changed. If a few folds and unfolds are all that
+    // has changed since the last follow(), some 50 bytes each are uploaded, and the GPU makes the index buffer. Otherwise,
+    // and in software, all of the cut's indices are. Fails on the cut of another tree, and if memory runs out; then there
+    // are no triangles.
     Result<void> follow(const vdtree::Cut& cut);
 
     // The drawn cut of a geomorph, with its gliding vertices in place: 32 bytes for each of them, and for each that glided
